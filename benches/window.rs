@@ -47,9 +47,7 @@ impl Scene for DenseStreet {
         let farther = |round: usize| 1.0 + 1e-3 * round as f32;
         let points = (0..rounds)
             .flat_map(|round| {
-                sparse
-                    .iter()
-                    .map(move |point| Point3::from(farther(round) * point.coords))
+                sparse.iter().map(move |point| Point3::from(farther(round) * point.coords))
             })
             .take(POINTS)
             .collect();
@@ -67,9 +65,8 @@ fn with_window(run: impl FnOnce(&mut Window)) {
 }
 
 fn open() -> Window {
-    let street: Arc<dyn Scene> = Arc::new(DenseStreet(
-        scene::open("street", None).expect("is built in"),
-    ));
+    let street: Arc<dyn Scene> =
+        Arc::new(DenseStreet(scene::open("street", None).expect("is built in")));
     let query = street.find("000070").expect("a frame");
     let reference = street.find("000062").expect("a frame");
     let mut task = Task::of("street");
@@ -89,10 +86,7 @@ fn open() -> Window {
         .with_size(SIZE)
         .wgpu()
         .build_eframe(|creation| App::new(creation, setup));
-    while matches!(
-        window.state().app_state().run_state(),
-        RunState::Loading | RunState::Running
-    ) {
+    while matches!(window.state().app_state().run_state(), RunState::Loading | RunState::Running) {
         window.step();
         std::thread::sleep(std::time::Duration::from_millis(5));
     }
@@ -192,9 +186,7 @@ impl ManyResults {
             .map(|at| {
                 let mut result = own[at % own.len()].clone();
                 let frames = scene.frames();
-                result
-                    .query
-                    .clone_from(&frames[at / own.len() % frames.len()]);
+                result.query.clone_from(&frames[at / own.len() % frames.len()]);
                 let line = serde_json::to_string(&result).expect("written");
                 line + "\n"
             })
@@ -211,11 +203,7 @@ impl ManyResults {
             queries: Vec::new(),
             times_s: Vec::new(),
         };
-        Self {
-            folder,
-            pair,
-            scene,
-        }
+        Self { folder, pair, scene }
     }
 
     fn read(&self) -> Results {
@@ -227,22 +215,14 @@ impl ManyResults {
 
     /// A window with them, arranged for a batch.
     fn open(&self, like: &Window) -> Window {
-        let setup = Setup {
-            mode: RunMode::Paused,
-            ..like.state().app_state().setup.clone()
-        };
+        let setup = Setup { mode: RunMode::Paused, ..like.state().app_state().setup.clone() };
         let results = self.read();
         let before = results.clone();
-        let known = KnownResults {
-            now: results,
-            before: Some(before),
-        };
+        let known = KnownResults { now: results, before: Some(before) };
         let mut window = Harness::builder()
             .with_size(SIZE)
             .build_eframe(|creation| App::new(creation, setup).with_results(known));
-        window
-            .state_mut()
-            .send(Command::Arrange(Arrangement::Batch));
+        window.state_mut().send(Command::Arrange(Arrangement::Batch));
         window.run_steps(4);
         window
     }

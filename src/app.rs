@@ -198,13 +198,7 @@ impl App {
 
     /// The parts of the window at their places.
     fn frame(&mut self, ui: &mut egui::Ui) {
-        let Self {
-            state,
-            panes,
-            commands,
-            lesson,
-            ..
-        } = self;
+        let Self { state, panes, commands, lesson, .. } = self;
         let sizes = Sizes::of(ui.ctx().content_rect().size());
         let fill = ui.visuals().panel_fill;
         let plain = |margin: Margin| egui::Frame::NONE.fill(fill).inner_margin(margin);

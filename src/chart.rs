@@ -66,12 +66,7 @@ pub(crate) enum Shape {
 
 impl Mark {
     pub(crate) fn new(shape: Shape, color: Rgb) -> Self {
-        Self {
-            shape,
-            color,
-            title: String::new(),
-            link: None,
-        }
+        Self { shape, color, title: String::new(), link: None }
     }
 
     /// Text centred at a position.
@@ -94,17 +89,13 @@ impl Axis {
         let step = round_up((to - from) / 6.0);
         let first = (from / step).ceil();
         let ticks = (0..=6).map(|index| first + f64::from(index));
-        let ticks = ticks
-            .map(|count| count * step)
-            .filter(|tick| *tick <= to * (1.0 + 1e-9));
+        let ticks = ticks.map(|count| count * step).filter(|tick| *tick <= to * (1.0 + 1e-9));
         let decimals = (-step.log10().floor()).max(0.0) as usize;
         Self {
             label: label.into(),
             ends: (from, to),
             is_log: false,
-            ticks: ticks
-                .map(|tick| (tick, format!("{tick:.decimals$}")))
-                .collect(),
+            ticks: ticks.map(|tick| (tick, format!("{tick:.decimals$}"))).collect(),
             length_px: None,
         }
     }
@@ -129,11 +120,7 @@ impl Axis {
     pub(crate) fn named(label: impl Into<String>, names: impl IntoIterator<Item = String>) -> Self {
         let names = names.into_iter().enumerate();
         let ticks: Vec<_> = names.map(|(at, name)| (at as f64 + 0.5, name)).collect();
-        Self {
-            ends: (0.0, ticks.len().max(1) as f64),
-            ticks,
-            ..Self::linear(label, 0.0, 1.0)
-        }
+        Self { ends: (0.0, ticks.len().max(1) as f64), ticks, ..Self::linear(label, 0.0, 1.0) }
     }
 
     pub(crate) fn long(mut self, length_px: f64) -> Self {
@@ -167,10 +154,7 @@ impl Chart {
 
     fn size(&self) -> (f64, f64) {
         let ((width, height), [left, above, right, below]) = (self.inside(), AROUND);
-        (
-            width + left + right,
-            height + above + below + LEGEND.0 * self.legend_rows(),
-        )
+        (width + left + right, height + above + below + LEGEND.0 * self.legend_rows())
     }
 
     /// The SVG element; with title and offset if it stands alone.
@@ -219,10 +203,8 @@ fn drawn(mark: &Mark, x: &dyn Fn(f64) -> String, y: &dyn Fn(f64) -> String) -> M
     let title = html! { @if !mark.title.is_empty() { title { (mark.title) } } };
     match &mark.shape {
         Shape::Line(points) => {
-            let points: Vec<String> = points
-                .iter()
-                .map(|at| format!("{},{}", x(at.0), y(at.1)))
-                .collect();
+            let points: Vec<String> =
+                points.iter().map(|at| format!("{},{}", x(at.0), y(at.1))).collect();
             html! { polyline points=(points.join(" ")) fill="none" stroke=(color) stroke-width="2" { (title) } }
         }
         Shape::Dot { at, filled: true } => {
@@ -243,10 +225,7 @@ fn drawn(mark: &Mark, x: &dyn Fn(f64) -> String, y: &dyn Fn(f64) -> String) -> M
 
 /// An SVG file with the charts below each other.
 pub(crate) fn file(charts: &[Chart]) -> String {
-    let width = charts
-        .iter()
-        .map(|chart| chart.size().0)
-        .fold(0.0, f64::max);
+    let width = charts.iter().map(|chart| chart.size().0).fold(0.0, f64::max);
     let height: f64 = charts.iter().map(|chart| chart.size().1).sum();
     let mut down = 0.0;
     let stacked = charts.iter().map(|chart| {
@@ -285,10 +264,7 @@ mod tests {
 
     #[test]
     fn marks_lie_between_the_axes_and_their_words_are_no_markup() {
-        let dot = Shape::Dot {
-            at: (1.0, 10.0),
-            filled: true,
-        };
+        let dot = Shape::Dot { at: (1.0, 10.0), filled: true };
         let mut mark = Mark::new(dot, [0, 114, 178]).titled("a < \"b\"");
         mark.link = Some("#r1".to_owned());
         let chart = Chart {
@@ -305,28 +281,14 @@ mod tests {
         assert!(svg.contains("<title>a &lt; &quot;b&quot;</title>"), "{svg}");
         assert!(!svg.contains("xmlns"));
         let file = file(&[chart.clone(), chart]);
-        assert!(
-            file.starts_with("<svg xmlns=") && !file.contains("href"),
-            "{file}"
-        );
+        assert!(file.starts_with("<svg xmlns=") && !file.contains("href"), "{file}");
     }
 
     #[test]
     fn ticks_are_round() {
-        let names = |axis: Axis| {
-            axis.ticks
-                .into_iter()
-                .map(|tick| tick.1)
-                .collect::<Vec<_>>()
-        };
-        assert_eq!(
-            names(Axis::percent("")),
-            ["0", "20", "40", "60", "80", "100"]
-        );
-        assert_eq!(
-            names(Axis::linear("", 0.5, 2.0)),
-            ["0.5", "1.0", "1.5", "2.0"]
-        );
+        let names = |axis: Axis| axis.ticks.into_iter().map(|tick| tick.1).collect::<Vec<_>>();
+        assert_eq!(names(Axis::percent("")), ["0", "20", "40", "60", "80", "100"]);
+        assert_eq!(names(Axis::linear("", 0.5, 2.0)), ["0.5", "1.0", "1.5", "2.0"]);
         assert_eq!(names(Axis::log("", 0.05, 200.0)), ["0.1", "1", "10", "100"]);
         let widths = [0.7, 1.0, 1.01, 2.5, 6.0, 30.0].map(round_up);
         assert_eq!(widths, [1.0, 1.0, 2.0, 5.0, 10.0, 50.0]);

@@ -109,9 +109,7 @@ fn opened_by(words: &[OsString]) -> Result<Arguments, CliError> {
 /// The error message for a word that is neither a command nor a scene.
 fn no_command(name: &str) -> String {
     let command = Arguments::command();
-    let commands = command
-        .get_subcommands()
-        .filter(|command| !command.is_hide_set());
+    let commands = command.get_subcommands().filter(|command| !command.is_hide_set());
     let names: Vec<&str> = commands.map(clap::Command::get_name).collect();
     match posescope::text::similar(name, names.iter().copied()) {
         Some(known) => format!("`{name}` is not a command; did you mean `{known}`?"),

@@ -51,9 +51,7 @@ impl Examination {
 /// A compared frame that cannot be read.
 pub fn examine(scene: &dyn Scene) -> Result<Examination, SceneError> {
     let (inventory, remarks) = inventory::take(scene);
-    let poses: Vec<Pose> = (0..scene.frames().len())
-        .filter_map(|at| scene.pose(at))
-        .collect();
+    let poses: Vec<Pose> = (0..scene.frames().len()).filter_map(|at| scene.pose(at)).collect();
     let mut examination = Examination {
         inventory,
         remarks,

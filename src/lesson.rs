@@ -84,10 +84,7 @@ impl Lesson {
         }
         let all = Self::all()?;
         let names: Vec<&str> = all.iter().map(|lesson| lesson.name.as_str()).collect();
-        let unknown = LessonError::Unknown {
-            name: name.to_owned(),
-            known: names.join(", "),
-        };
+        let unknown = LessonError::Unknown { name: name.to_owned(), known: names.join(", ") };
         let mut all = all.into_iter();
         all.find(|lesson| lesson.name == name).ok_or(unknown)
     }

@@ -35,11 +35,9 @@ pub(crate) fn sentence(event: &Event) -> Option<String> {
             "{} of the cloud's {} points are in the reference's view",
             event.in_view, event.points
         ),
-        Event::DepthsLifted(event) => format!(
-            "{} of {} matches have a depth",
-            event.with_depth(),
-            event.matches.len()
-        ),
+        Event::DepthsLifted(event) => {
+            format!("{} of {} matches have a depth", event.with_depth(), event.matches.len())
+        }
         Event::HypothesisTried(event) if event.trial.is_best => {
             let score = event.trial.best?.score;
             format!(
@@ -53,33 +51,19 @@ pub(crate) fn sentence(event: &Event) -> Option<String> {
         ),
         Event::ConsensusJudged(event) => format!(
             "{}: {} {} agree, {} needed, log10 of false alarms {:.1}, {:.2} m from the reference",
-            if event.accepted {
-                "accepted"
-            } else {
-                "refused"
-            },
+            if event.accepted { "accepted" } else { "refused" },
             event.acceptance.inliers,
             event.counted.name(),
-            event
-                .acceptance
-                .needed
-                .map_or("more than all".to_owned(), |needed| needed.to_string()),
+            event.acceptance.needed.map_or("more than all".to_owned(), |needed| needed.to_string()),
             event.acceptance.log10_nfa,
             event.distance_m
         ),
         Event::MatchesGuided(event) => format!(
             "{} matches have a depth after matching again",
-            event
-                .matches
-                .iter()
-                .filter(|one| one.point.is_some())
-                .count()
+            event.matches.iter().filter(|one| one.point.is_some()).count()
         ),
         Event::FeaturesClassified(event) => {
-            format!(
-                "the states of all {} query keypoints are known",
-                event.states.len()
-            )
+            format!("the states of all {} query keypoints are known", event.states.len())
         }
         Event::CloudColored(event) => {
             let counts = &event.cloud.counts;
@@ -191,14 +175,9 @@ fn fused(event: &ReferencesFused) -> String {
                 ShareOutcome::Kept | ShareOutcome::Outvoted => format!("weight {}", share.words()),
                 _ => share.words(),
             };
-            let support = share
-                .support
-                .map(|support| format!(", {}", support.words()));
+            let support = share.support.map(|support| format!(", {}", support.words()));
             let support = support.unwrap_or_default();
-            format!(
-                "{} {say} ({} matches{support})",
-                share.reference, share.matches
-            )
+            format!("{} {say} ({} matches{support})", share.reference, share.matches)
         })
         .collect();
     format!("{} of {}", event.fusion, shares.join(", "))
@@ -218,12 +197,7 @@ fn ranked(event: &ReferencesRanked) -> String {
             Criterion::Matches => format!("{} ({:.0} matches)", reference.name, ranked.score),
         }
     };
-    let chosen: Vec<String> = ranking
-        .frames
-        .iter()
-        .take(ranking.chosen)
-        .map(say)
-        .collect();
+    let chosen: Vec<String> = ranking.frames.iter().take(ranking.chosen).map(say).collect();
     format!(
         "{} of {} frames are references: {}",
         chosen.len(),

@@ -29,13 +29,8 @@ pub const NOTHING: Rgb = [0x18, 0x18, 0x18];
 pub const INELIGIBLE: Rgb = [70; 3];
 
 /// The colour of a state, by its position in [`FeatureState::NAMES`].
-pub const STATES: [Rgb; FeatureState::NAMES.len()] = [
-    [0x80, 0x80, 0x80],
-    [0x56, 0xB4, 0xE9],
-    [0xF0, 0xE4, 0x42],
-    ESTIMATE,
-    TRUTH,
-];
+pub const STATES: [Rgb; FeatureState::NAMES.len()] =
+    [[0x80, 0x80, 0x80], [0x56, 0xB4, 0xE9], [0xF0, 0xE4, 0x42], ESTIMATE, TRUTH];
 
 /// The colours of methods, in the order of the registry; those after the paper's repeat.
 const METHODS: [Rgb; 6] = [
@@ -188,20 +183,12 @@ mod tests {
         ];
         let linear = color.map(|channel| {
             let share = f64::from(channel) / 255.0;
-            if share <= 0.04045 {
-                share / 12.92
-            } else {
-                ((share + 0.055) / 1.055).powf(2.4)
-            }
+            if share <= 0.04045 { share / 12.92 } else { ((share + 0.055) / 1.055).powf(2.4) }
         });
         let seen = seen_by.map_or(linear, |matrix| times(matrix, linear));
         let [x, y, z] = times(&XYZ, seen.map(|channel| channel.clamp(0.0, 1.0)));
         let [x, y, z] = [x / 0.950_47, y, z / 1.088_83].map(|share| {
-            if share > 0.008_856 {
-                share.cbrt()
-            } else {
-                7.787 * share + 16.0 / 116.0
-            }
+            if share > 0.008_856 { share.cbrt() } else { 7.787 * share + 16.0 / 116.0 }
         });
         [116.0 * y - 16.0, 500.0 * (x - y), 200.0 * (y - z)]
     }
@@ -219,16 +206,8 @@ mod tests {
             for (at, (name, color)) in colors.iter().enumerate() {
                 for (other, second) in &colors[at + 1..] {
                     let (a, b) = (lab(*color, eye), lab(*second, eye));
-                    let apart = a
-                        .iter()
-                        .zip(b)
-                        .map(|(a, b)| (a - b).powi(2))
-                        .sum::<f64>()
-                        .sqrt();
-                    assert!(
-                        apart >= LEAST,
-                        "{name} {color:?} and {other} {second:?}: {apart:.1}"
-                    );
+                    let apart = a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt();
+                    assert!(apart >= LEAST, "{name} {color:?} and {other} {second:?}: {apart:.1}");
                 }
             }
         }

@@ -76,11 +76,8 @@ pub(crate) fn over(query: &GrayImage, view: &SyntheticView) -> RgbImage {
         let ground = f64::from(query.get_pixel(x, y).0[0]) * GROUND;
         let painted = f64::from(synthetic.get_pixel(x, y).0[0]);
         let is_painted = painted > 0.0 || covered[(y * view.width + x) as usize];
-        let [red, green, blue] = if is_painted {
-            [painted; 3]
-        } else {
-            [0.75 * ground, 0.85 * ground, ground]
-        };
+        let [red, green, blue] =
+            if is_painted { [painted; 3] } else { [0.75 * ground, 0.85 * ground, ground] };
         Rgb([red as u8, green as u8, blue as u8])
     })
 }
@@ -115,9 +112,7 @@ pub(crate) fn preference(
         }
     }
     // The strongest tile has the full colour; the square root keeps weaker ones visible.
-    let most = balance
-        .iter()
-        .fold(0.0_f64, |most, tile| most.max(tile.abs()));
+    let most = balance.iter().fold(0.0_f64, |most, tile| most.max(tile.abs()));
     Some(RgbImage::from_fn(width, height, |x, y| {
         let share = balance[tile(y * width + x)] / most.max(f64::MIN_POSITIVE);
         let color = palette::diverging(share.signum() * share.abs().sqrt());
@@ -159,10 +154,8 @@ fn evidence(comparison: &Comparison) -> Option<Vec<f64>> {
 pub fn surface(surface: &ScoredLattice) -> RgbImage {
     let lattice = &surface.lattice;
     let costs = || (0..surface.scores.len()).filter_map(|cell| surface.eligible_cost(cell));
-    let (least, most) = (
-        costs().fold(f64::INFINITY, f64::min),
-        costs().fold(f64::NEG_INFINITY, f64::max),
-    );
+    let (least, most) =
+        (costs().fold(f64::INFINITY, f64::min), costs().fold(f64::NEG_INFINITY, f64::max));
     RgbImage::from_fn(lattice.columns as u32, lattice.rows as u32, |x, y| {
         let row = lattice.rows - 1 - y as usize;
         let cell = row * lattice.columns + x as usize;
@@ -214,18 +207,11 @@ impl<'a> Painter<'a> {
 
     /// A picture of values, one per covered pixel, row by row.
     pub(crate) fn paint<V: Copy>(&self, background: V, values: impl Iterator<Item = V>) -> Vec<V> {
-        let SyntheticView {
-            width,
-            height,
-            pixels,
-        } = self.view;
+        let SyntheticView { width, height, pixels } = self.view;
         let [width, height] = [*width, *height].map(|side| side as usize);
         let mut picture = vec![background; width * height];
-        let covered: Vec<(usize, V)> = pixels
-            .iter()
-            .map(|pixel| pixel.index as usize)
-            .zip(values)
-            .collect();
+        let covered: Vec<(usize, V)> =
+            pixels.iter().map(|pixel| pixel.index as usize).zip(values).collect();
         for (index, value) in self.order.iter().filter_map(|&place| covered.get(place)) {
             let (x, y) = (index % width, index / width);
             for row in y.saturating_sub(1)..(y + 2).min(height) {
@@ -260,11 +246,7 @@ mod tests {
 
     #[test]
     fn a_covered_pixel_keeps_its_value_and_the_nearer_one_spreads_over_the_farther() {
-        let pixel = |index, depth, intensity| SplattedPixel {
-            index,
-            depth,
-            intensity,
-        };
+        let pixel = |index, depth, intensity| SplattedPixel { index, depth, intensity };
         let view = SyntheticView {
             width: 5,
             height: 1,

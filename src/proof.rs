@@ -159,10 +159,7 @@ impl ProofPicture {
 
     /// All panels: the large one, that below it, those beside it.
     pub fn panels(&self) -> impl Iterator<Item = &Panel> {
-        [&self.large]
-            .into_iter()
-            .chain(&self.below)
-            .chain(&self.beside)
+        [&self.large].into_iter().chain(&self.below).chain(&self.beside)
     }
 }
 
@@ -233,10 +230,7 @@ impl Panel {
     /// A plain ground for lines and marks.
     fn plain(title: impl Into<String>, width: u32, height: u32) -> Self {
         let ground = RgbImage::from_pixel(width, height, image::Rgb(palette::NOTHING));
-        Self {
-            is_plain: true,
-            ..Self::new(title, ground)
-        }
+        Self { is_plain: true, ..Self::new(title, ground) }
     }
 
     fn mark(&mut self, thing: Thing, at: [f32; 2], label: impl Into<String>) {
@@ -244,11 +238,7 @@ impl Panel {
     }
 
     fn line(&mut self, color: Rgb, width: f32, points: impl IntoIterator<Item = [f32; 2]>) {
-        self.lines.push(Line {
-            points: points.into_iter().collect(),
-            color,
-            width,
-        });
+        self.lines.push(Line { points: points.into_iter().collect(), color, width });
     }
 
     /// Width over height.
@@ -264,11 +254,7 @@ fn is_near(one: [f32; 2], other: [f32; 2], within: f32) -> bool {
 
 impl Mark {
     fn new(thing: Thing, at: [f32; 2], label: impl Into<String>) -> Self {
-        Self {
-            at,
-            thing,
-            label: label.into(),
-        }
+        Self { at, thing, label: label.into() }
     }
 }
 

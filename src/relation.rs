@@ -48,9 +48,7 @@ impl Relation {
 
     /// The first sign in a text, with the trimmed texts before and after it.
     pub fn split(text: &str) -> Option<(&str, Self, &str)> {
-        let (at, _) = text
-            .char_indices()
-            .find(|(at, _)| Self::at_start(&text[*at..]).is_some())?;
+        let (at, _) = text.char_indices().find(|(at, _)| Self::at_start(&text[*at..]).is_some())?;
         let (relation, right) = Self::at_start(&text[at..])?;
         Some((text[..at].trim(), relation, right.trim()))
     }
@@ -95,11 +93,7 @@ impl FromStr for Relation {
     fn from_str(text: &str) -> Result<Self, UnknownWord> {
         match Self::at_start(text) {
             Some((relation, "")) => Ok(relation),
-            _ => Err(UnknownWord::among(
-                text,
-                "relation",
-                SIGNS.map(|(sign, _)| sign),
-            )),
+            _ => Err(UnknownWord::among(text, "relation", SIGNS.map(|(sign, _)| sign))),
         }
     }
 }

@@ -95,9 +95,7 @@ impl RunReport {
     fn of(folder: &Path, baseline: Option<&Path>, pictures: usize) -> Result<Self, FolderError> {
         let run = read_run(folder)?;
         let measured = RunResults::of(read_rows(folder)?, run.failure_radius_m());
-        let charts = Plot::value_variants()
-            .iter()
-            .flat_map(|plot| plot.charts(&measured));
+        let charts = Plot::value_variants().iter().flat_map(|plot| plot.charts(&measured));
         let charts = charts.collect();
         let tables = tables(&measured, run.protocol.preset.map(|one| one.name()));
         let mut params = Params::default();
@@ -113,11 +111,7 @@ impl RunReport {
         let worst = worst_first(&results);
         let mut thumbnails = BTreeMap::new();
         let protocol = &run.protocol;
-        let scenes = Scenes::open(
-            &run.scenes,
-            &protocol.query_scene,
-            protocol.format.as_deref(),
-        );
+        let scenes = Scenes::open(&run.scenes, &protocol.query_scene, protocol.format.as_deref());
         match scenes.and_then(|scenes| scenes.with_protocol(protocol)) {
             Ok(scenes) => {
                 thumbnails = self::thumbnails(&run, &scenes, &results);
@@ -183,11 +177,7 @@ fn reported(folder: &Path, run: &RunFile, results: &[QueryResult]) -> Vec<Report
     let several_pairs = run.pairs.len() > 1;
     let results = results.iter().enumerate().map(|(number, result)| {
         let query_scene = result.query_scene.clone();
-        let key = [
-            result.scene.clone(),
-            query_scene.unwrap_or_default(),
-            result.query.clone(),
-        ];
+        let key = [result.scene.clone(), query_scene.unwrap_or_default(), result.query.clone()];
         let next = queries.len();
         let query = *queries.entry(key).or_insert(next);
         let recording = run
@@ -236,11 +226,8 @@ fn thumbnails(
     results: &[ReportedResult],
 ) -> BTreeMap<usize, String> {
     let mut seen = BTreeSet::new();
-    let firsts: Vec<&ReportedResult> = results
-        .iter()
-        .filter(|one| seen.insert(one.query))
-        .take(MOST_PHOTOS)
-        .collect();
+    let firsts: Vec<&ReportedResult> =
+        results.iter().filter(|one| seen.insert(one.query)).take(MOST_PHOTOS).collect();
     let painted = firsts.par_iter().filter_map(|one| {
         let scene = scenes.of_queries(run.pair_of(&one.result)?);
         let photo = scene.photo(scene.find(&one.result.query).ok()?).ok()?;
@@ -268,9 +255,7 @@ fn draw_failures(
         let localizer = localizer.with_foreign(foreign).explaining(0);
         for &at in failures {
             let result = &results[at].result;
-            let is_of_pair = run
-                .pair_of(result)
-                .is_some_and(|found| std::ptr::eq(found, pair));
+            let is_of_pair = run.pair_of(result).is_some_and(|found| std::ptr::eq(found, pair));
             if is_of_pair {
                 results[at].proof = drawn_failure(&localizer, run, result, params);
             }
@@ -299,14 +284,9 @@ fn drawn_failure(
     };
     let mut witness = Witness::default();
     localizer
-        .localize(
-            0,
-            query,
-            &[request],
-            &[result.method],
-            &mut witness,
-            |_, _| Ok::<(), LocalizeError>(()),
-        )
+        .localize(0, query, &[request], &[result.method], &mut witness, |_, _| {
+            Ok::<(), LocalizeError>(())
+        })
         .ok()?;
     let truth = localizer.queries().pose(query);
     witness.proof(truth.as_ref(), result, params)

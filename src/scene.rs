@@ -65,12 +65,8 @@ pub fn open(argument: &str, format: Option<&str>) -> Result<Box<dyn Scene>, Scen
         names.join(", ")
     };
     let entry = match format {
-        Some(name) => {
-            (ALL.iter().find(|entry| entry.name == name)).ok_or_else(|| SceneError::UnknownFormat {
-                format: name.to_owned(),
-                known: known(),
-            })
-        }
+        Some(name) => (ALL.iter().find(|entry| entry.name == name))
+            .ok_or_else(|| SceneError::UnknownFormat { format: name.to_owned(), known: known() }),
         None => (ALL.iter().find(|entry| (entry.recognizes)(argument))).ok_or_else(|| {
             let argument = argument.to_owned();
             if std::path::Path::new(&argument).exists() {

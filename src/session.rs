@@ -49,18 +49,11 @@ impl Session {
     ) -> Self {
         // Unbounded: a full queue that nobody drains would keep a cancelled worker waiting.
         let (messages, inbox) = mpsc::channel();
-        let outbox = Outbox {
-            messages,
-            wake: Arc::new(wake),
-        };
+        let outbox = Outbox { messages, wake: Arc::new(wake) };
         let (control, observer) = PausingObserver::new(mode, breakpoints, outbox.clone());
         let run = Run::of(&job.task);
         job::spawn(job, observer, outbox);
-        Self {
-            control,
-            inbox,
-            run,
-        }
+        Self { control, inbox, run }
     }
 
     /// Takes the worker's messages since the last call. Returns whether there were any.
@@ -90,10 +83,7 @@ impl Session {
 
     /// Whether more events may come.
     pub fn is_alive(&self) -> bool {
-        matches!(
-            self.run.state,
-            RunState::Loading | RunState::Running | RunState::Paused { .. }
-        )
+        matches!(self.run.state, RunState::Loading | RunState::Running | RunState::Paused { .. })
     }
 
     /// Changes the mode: a paused run continues at once, a running one pauses soon.

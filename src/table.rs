@@ -58,11 +58,7 @@ impl Table {
             at if right.contains(&at) => Align::Right,
             _ => Align::Left,
         });
-        Self {
-            align: align.collect(),
-            shared,
-            ..Self::new("", "", header)
-        }
+        Self { align: align.collect(), shared, ..Self::new("", "", header) }
     }
 
     /// Adds a row; missing cells are empty.
@@ -94,10 +90,7 @@ impl Table {
 
     /// The header and the rows.
     fn all(&self) -> impl Iterator<Item = &[String]> {
-        [&self.header]
-            .into_iter()
-            .chain(&self.rows)
-            .map(Vec::as_slice)
+        [&self.header].into_iter().chain(&self.rows).map(Vec::as_slice)
     }
 
     fn with_notes_below(&self, width: usize) -> String {
@@ -136,15 +129,11 @@ impl Table {
         let from = self.shared;
         let labels = self.header.iter().skip(from).enumerate();
         // The first column has the names of the rows and needs no label.
-        let labels: Vec<&str> = labels
-            .map(|(at, label)| if at == 0 { "" } else { label.as_str() })
-            .collect();
+        let labels: Vec<&str> =
+            labels.map(|(at, label)| if at == 0 { "" } else { label.as_str() }).collect();
         let label_width = labels.iter().map(|label| length(label)).max().unwrap_or(0);
         let mut text = String::new();
-        for group in self
-            .rows
-            .chunk_by(|a, b| from == 0 || a[..from] == b[..from])
-        {
+        for group in self.rows.chunk_by(|a, b| from == 0 || a[..from] == b[..from]) {
             if let (true, Some(first)) = (from > 0, group.first()) {
                 text += &format!("{}\n", first[..from].join(", "));
             }
@@ -318,10 +307,7 @@ mod tests {
         let markdown = "100 % of a_b\n\n| method | RMSE (m) |\n|:--|--:|\n\
                         | a\\|b, \"c\" | 1.0 |\n| only |  |\n";
         assert_eq!(table.to_markdown(), markdown);
-        assert_eq!(
-            table.to_csv(),
-            "method,RMSE (m)\n\"a|b, \"\"c\"\"\",1.0\nonly,\n"
-        );
+        assert_eq!(table.to_csv(), "method,RMSE (m)\n\"a|b, \"\"c\"\"\",1.0\nonly,\n");
         let latex = table.to_latex();
         assert!(latex.contains("\\caption{100 \\% of a\\_b}"), "{latex}");
         assert!(latex.contains("\\begin{tabular}{lr}"), "{latex}");
@@ -331,18 +317,8 @@ mod tests {
     fn with_notes() -> Table {
         let mut table = Table::with_notes(["query", "method", "error", "evidence"], &[2], 1);
         for row in [
-            [
-                "000070",
-                "fb",
-                "0.1 m",
-                "20 inliers of 61 matches with depth",
-            ],
-            [
-                "000070",
-                "mi",
-                "12.5 m",
-                "D3 the search missed a cheaper pose near the truth",
-            ],
+            ["000070", "fb", "0.1 m", "20 inliers of 61 matches with depth"],
+            ["000070", "mi", "12.5 m", "D3 the search missed a cheaper pose near the truth"],
             ["000071", "fb", "", ""],
         ] {
             table.push(row);
@@ -382,11 +358,8 @@ query 000071
 
     #[test]
     fn a_table_of_figures_is_turned_where_it_is_too_wide() {
-        let mut table = Table::new(
-            "t",
-            "How well it went",
-            ["", "method", "queries", "success (%)"],
-        );
+        let mut table =
+            Table::new("t", "How well it went", ["", "method", "queries", "success (%)"]);
         table.shared = 1;
         table.push(["street, 15 m", "FB", "3", "66.7"]);
         table.push(["street, 15 m", "MI", "3", "100.0"]);
@@ -420,10 +393,7 @@ town, 15 m
     #[test]
     fn words_stay_whole() {
         assert_eq!(wrapped("  a bc def", 6, "__"), "  a bc\n__def\n");
-        assert_eq!(
-            wrapped("incomprehensible a", 6, ""),
-            "incomprehensible\na\n"
-        );
+        assert_eq!(wrapped("incomprehensible a", 6, ""), "incomprehensible\na\n");
         assert_eq!(wrapped("", 6, ""), "\n");
     }
 }

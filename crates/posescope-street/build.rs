@@ -27,10 +27,7 @@ const LOCK: &str = "../../Cargo.lock";
 fn main() -> io::Result<()> {
     println!("cargo::rerun-if-changed=build.rs");
     let mut files = Vec::new();
-    for source in SOURCES
-        .into_iter()
-        .filter(|source| Path::new(source).exists())
-    {
+    for source in SOURCES.into_iter().filter(|source| Path::new(source).exists()) {
         println!("cargo::rerun-if-changed={source}");
         collect(Path::new(source), &mut files)?;
     }
@@ -45,10 +42,7 @@ fn main() -> io::Result<()> {
         println!("cargo::rerun-if-changed={LOCK}");
         versions(&fs::read_to_string(LOCK)?).hash(&mut hasher);
     }
-    println!(
-        "cargo::rustc-env=POSESCOPE_STREET_FINGERPRINT={:016x}",
-        hasher.finish()
-    );
+    println!("cargo::rustc-env=POSESCOPE_STREET_FINGERPRINT={:016x}", hasher.finish());
     Ok(())
 }
 
@@ -71,10 +65,5 @@ fn versions(lock: &str) -> Vec<&str> {
         let name = pair[0].strip_prefix("name = ");
         name.is_some_and(|name| PACKAGES.contains(&name.trim_matches('"')))
     };
-    lines
-        .windows(2)
-        .filter(is_meant)
-        .flatten()
-        .copied()
-        .collect()
+    lines.windows(2).filter(is_meant).flatten().copied().collect()
 }

@@ -96,13 +96,7 @@ const fn switch(
     command: Command,
     is_on: fn(&AppState) -> bool,
 ) -> Action {
-    Action {
-        group,
-        text,
-        keys,
-        command,
-        is_on,
-    }
+    Action { group, text, keys, command, is_on }
 }
 
 use Group::{Camera, Compare, Lesson, Look, Query, Run, Show, Window};
@@ -254,9 +248,8 @@ pub(super) fn read_keys(ctx: &egui::Context, commands: &Queue) {
     if ctx.egui_wants_keyboard_input() {
         return;
     }
-    let pairs = ACTIONS
-        .iter()
-        .flat_map(|action| action.keys.iter().map(move |keys| (keys, action)));
+    let pairs =
+        ACTIONS.iter().flat_map(|action| action.keys.iter().map(move |keys| (keys, action)));
     let mut pairs: Vec<_> = pairs.collect();
     // An open menu takes the key that closes it.
     if egui::Popup::is_any_open(ctx) {
@@ -264,12 +257,7 @@ pub(super) fn read_keys(ctx: &egui::Context, commands: &Queue) {
     }
     // egui takes a key with Shift for one without: those with more modifiers come first.
     pairs.sort_by_key(|(keys, _)| {
-        let Modifiers {
-            alt,
-            shift,
-            command,
-            ..
-        } = keys.modifiers;
+        let Modifiers { alt, shift, command, .. } = keys.modifiers;
         std::cmp::Reverse(u8::from(alt) + u8::from(shift) + u8::from(command))
     });
     for (keys, action) in pairs {
@@ -287,10 +275,8 @@ mod tests {
     fn no_key_does_two_things_and_no_command_has_two_entries() {
         let keys = ACTIONS.iter().flat_map(|action| action.keys);
         let mut keys: Vec<_> = keys.map(|keys| format!("{keys:?}")).collect();
-        let mut commands: Vec<_> = ACTIONS
-            .iter()
-            .map(|action| format!("{:?}", action.command))
-            .collect();
+        let mut commands: Vec<_> =
+            ACTIONS.iter().map(|action| format!("{:?}", action.command)).collect();
         for names in [&mut keys, &mut commands] {
             names.sort();
             let all = names.len();

@@ -33,28 +33,22 @@ pub(super) fn configuration(backends: wgpu::Backends) -> WgpuConfiguration {
         required_limits: adapter.limits(),
         ..wgpu::DeviceDescriptor::default()
     });
-    WgpuConfiguration {
-        wgpu_setup: WgpuSetup::CreateNew(setup),
-        ..WgpuConfiguration::default()
-    }
+    WgpuConfiguration { wgpu_setup: WgpuSetup::CreateNew(setup), ..WgpuConfiguration::default() }
 }
 
 /// The lowest is taken, of equals the first: hardware before software, then anything before OpenGL,
 /// then the kind of card that is preferred.
 fn rank(info: &wgpu::AdapterInfo, preference: wgpu::PowerPreference) -> (bool, bool, u8) {
     let kinds = match preference {
-        wgpu::PowerPreference::LowPower => [
-            wgpu::DeviceType::IntegratedGpu,
-            wgpu::DeviceType::DiscreteGpu,
-        ],
-        wgpu::PowerPreference::HighPerformance | wgpu::PowerPreference::None => [
-            wgpu::DeviceType::DiscreteGpu,
-            wgpu::DeviceType::IntegratedGpu,
-        ],
+        wgpu::PowerPreference::LowPower => {
+            [wgpu::DeviceType::IntegratedGpu, wgpu::DeviceType::DiscreteGpu]
+        }
+        wgpu::PowerPreference::HighPerformance | wgpu::PowerPreference::None => {
+            [wgpu::DeviceType::DiscreteGpu, wgpu::DeviceType::IntegratedGpu]
+        }
     };
-    let kind = (0..)
-        .zip(kinds)
-        .find_map(|(place, kind)| (info.device_type == kind).then_some(place));
+    let kind =
+        (0..).zip(kinds).find_map(|(place, kind)| (info.device_type == kind).then_some(place));
     (
         info.device_type == wgpu::DeviceType::Cpu,
         info.backend == wgpu::Backend::Gl,
@@ -90,14 +84,10 @@ mod tests {
             (DeviceType::DiscreteGpu, Backend::Vulkan),
         ];
         let order = |preference| {
-            let mut infos: Vec<_> = adapters
-                .map(|(kind, backend)| wgpu::AdapterInfo::new(kind, backend))
-                .into();
+            let mut infos: Vec<_> =
+                adapters.map(|(kind, backend)| wgpu::AdapterInfo::new(kind, backend)).into();
             infos.sort_by_key(|info| rank(info, preference));
-            infos
-                .iter()
-                .map(|info| (info.device_type, info.backend))
-                .collect::<Vec<_>>()
+            infos.iter().map(|info| (info.device_type, info.backend)).collect::<Vec<_>>()
         };
         let fast = order(PowerPreference::HighPerformance);
         let [dedicated, built_in] = [DeviceType::DiscreteGpu, DeviceType::IntegratedGpu];

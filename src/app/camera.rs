@@ -23,14 +23,8 @@ pub enum NamedPose {
 
 impl NamedPose {
     /// All named poses, in the order of the search.
-    pub const ALL: [Self; 6] = [
-        Self::Start,
-        Self::Coarse,
-        Self::Fine,
-        Self::Estimate,
-        Self::Truth,
-        Self::Last,
-    ];
+    pub const ALL: [Self; 6] =
+        [Self::Start, Self::Coarse, Self::Fine, Self::Estimate, Self::Truth, Self::Last];
 
     /// The name on a button.
     pub fn name(self) -> &'static str {

@@ -58,9 +58,7 @@ impl AppState {
     /// At the end of a part, shows the picture that proves its result, as the storyboard does.
     pub(super) fn show_why_at_end(&mut self) {
         let cursor = self.shown_cursor();
-        let at_end = self
-            .shown_span()
-            .filter(|span| span.records.end == cursor + 1);
+        let at_end = self.shown_span().filter(|span| span.records.end == cursor + 1);
         self.options.shows_why = at_end.is_some_and(|span| self.needs_why(span.part));
     }
 
@@ -71,18 +69,12 @@ impl AppState {
             return;
         };
         let (part, cursor) = (span.part, self.shown_cursor());
-        let ends: Vec<usize> = self
-            .stages_of(span)
-            .iter()
-            .map(|bar| self.stage_end(span, bar))
-            .collect();
+        let ends: Vec<usize> =
+            self.stages_of(span).iter().map(|bar| self.stage_end(span, bar)).collect();
         let next = if back {
             let before = ends.iter().rev().find(|end| **end < cursor).copied();
             // From the picture of the cause to the last stage.
-            ends.last()
-                .copied()
-                .filter(|_| self.options.shows_why)
-                .or(before)
+            ends.last().copied().filter(|_| self.options.shows_why).or(before)
         } else {
             ends.into_iter().find(|end| *end > cursor)
         };
@@ -164,10 +156,7 @@ impl AppState {
     /// The next query in the list that is `wanted`, round the end.
     pub(super) fn next_query(&mut self, back: bool, wanted: impl Fn(&Self, usize) -> bool) {
         let offered = &self.setup.offered;
-        let here = offered
-            .iter()
-            .position(|query| *query == self.setup.query)
-            .unwrap_or(0);
+        let here = offered.iter().position(|query| *query == self.setup.query).unwrap_or(0);
         let count = offered.len();
         let next = (1..=count)
             .map(|step| if back { count - step } else { step })
@@ -255,18 +244,14 @@ impl AppState {
         self.keep();
         self.setup = setup;
         self.restart_run();
-        self.note(
-            format!("Localised with {}; X shows the run before", args.join(" ")),
-            false,
-        );
+        self.note(format!("Localised with {}; X shows the run before", args.join(" ")), false);
     }
 
     pub(super) fn set_breakpoints(&mut self, texts: Vec<String>) {
         let parsed: Result<Vec<Breakpoint>, _> = texts.iter().map(|text| text.parse()).collect();
         match parsed {
             Ok(breakpoints) => {
-                self.session
-                    .set_breakpoints(Breakpoints::new(breakpoints.iter().cloned()));
+                self.session.set_breakpoints(Breakpoints::new(breakpoints.iter().cloned()));
                 self.setup.task.breakpoints = breakpoints;
             }
             Err(error) => self.note(error.to_string(), true),
@@ -292,10 +277,7 @@ impl AppState {
         let minimum = |wanted: Phase| {
             let events = run.all_until::<PhaseSearched>(self.cursor());
             let mut latest = events.rev();
-            let best = latest
-                .find(|(_, event)| event.surface.lattice.phase == wanted)?
-                .1
-                .best?;
+            let best = latest.find(|(_, event)| event.surface.lattice.phase == wanted)?.1.best?;
             Some(problem.world_from_query(&best.reference_from_camera()))
         };
         match target {

@@ -22,10 +22,7 @@ pub(super) fn deciding(result: &QueryResult) -> Moment {
     };
     match stage {
         Some(stage) => of_a_method(result.method, stage),
-        None => Moment::After {
-            method: None,
-            stage: result.method.name(),
-        },
+        None => Moment::After { method: None, stage: result.method.name() },
     }
 }
 
@@ -40,11 +37,7 @@ mod tests {
         for rule in RULES {
             if let DecidedAt::Stage(stage) = rule.decided_at {
                 let name = stage.name();
-                assert!(
-                    Breakpoint::stages().contains(&name),
-                    "{}: {name}",
-                    rule.code
-                );
+                assert!(Breakpoint::stages().contains(&name), "{}: {name}", rule.code);
             }
         }
         assert!(Breakpoint::is_outside(Stage::Fuse.name()));

@@ -147,10 +147,7 @@ impl App {
             Command::SetBreakpoints(texts) => state.set_breakpoints(texts),
             Command::Pin => {
                 state.keep();
-                state.note(
-                    "This run is kept as A; change a parameter to compare",
-                    false,
-                );
+                state.note("This run is kept as A; change a parameter to compare", false);
             }
             Command::Unpin => {
                 state.kept = None;
@@ -219,11 +216,7 @@ impl App {
             }
             Command::SwitchTheme => {
                 let is_dark = ctx.global_style().visuals.dark_mode;
-                ctx.set_theme(if is_dark {
-                    egui::Theme::Light
-                } else {
-                    egui::Theme::Dark
-                });
+                ctx.set_theme(if is_dark { egui::Theme::Light } else { egui::Theme::Dark });
             }
             Command::Help => self.help = !self.help,
             Command::Dismiss(note) => {
@@ -234,34 +227,16 @@ impl App {
             Command::SaveRecording(path) => {
                 let done = format!("Recording: {}", path.display());
                 let save = Some(path);
-                state.record_to(
-                    &Targets {
-                        save,
-                        ..Targets::default()
-                    },
-                    done,
-                );
+                state.record_to(&Targets { save, ..Targets::default() }, done);
             }
             Command::StreamRecording => {
                 let connect = Some(String::new());
                 let done = "The run was sent to the Rerun viewer".to_owned();
-                state.record_to(
-                    &Targets {
-                        connect,
-                        ..Targets::default()
-                    },
-                    done,
-                );
+                state.record_to(&Targets { connect, ..Targets::default() }, done);
             }
             Command::SpawnViewer => {
                 let done = "A Rerun viewer shows the run".to_owned();
-                state.record_to(
-                    &Targets {
-                        spawn: true,
-                        ..Targets::default()
-                    },
-                    done,
-                );
+                state.record_to(&Targets { spawn: true, ..Targets::default() }, done);
             }
             Command::AskWhere(target) => self.asking = Some(Asking::new(target, &state.setup)),
             Command::SavePicture { of_canvas, path } => {
@@ -301,10 +276,7 @@ impl App {
         self.state.options.shows_truth = open.asked().is_none();
         let page = open.page();
         self.state.options.lockstep = page.lockstep;
-        let named = page
-            .show
-            .iter()
-            .filter_map(|name| super::views::name_of(name));
+        let named = page.show.iter().filter_map(|name| super::views::name_of(name));
         let named: Vec<_> = named.collect();
         self.state.options.presented = Some(named).filter(|named| !named.is_empty());
     }
@@ -313,9 +285,7 @@ impl App {
         let layout = self.state.options.layout;
         let saved = SavedSession::new(&self.state.setup, self.state.cursor(), layout);
         match saved.write(path) {
-            Ok(()) => self
-                .state
-                .note(format!("Session: {}", path.display()), false),
+            Ok(()) => self.state.note(format!("Session: {}", path.display()), false),
             Err(why) => self.state.note(why, true),
         }
     }

@@ -35,9 +35,7 @@ impl Panes {
     pub(super) fn new(render_state: Option<&RenderState>) -> Self {
         let views = views::ALL.iter();
         Self {
-            views: views
-                .map(|entry| (entry.name, (entry.new)(render_state)))
-                .collect(),
+            views: views.map(|entry| (entry.name, (entry.new)(render_state))).collect(),
             swapped: None,
             proof_of: None,
         }

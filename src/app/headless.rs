@@ -72,9 +72,8 @@ impl Painter {
             pixels_per_point: output.pixels_per_point,
         };
         let shapes = ctx.tessellate(output.shapes, output.pixels_per_point);
-        let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor {
-            label: Some("window"),
-        });
+        let mut encoder = device
+            .create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("window") });
         let mut renderer = self.state.renderer.write();
         let prepared = renderer.update_buffers(device, queue, &mut encoder, &shapes, &screen);
         let texture = self.texture();
@@ -101,11 +100,7 @@ impl Painter {
         let [width, height] = self.size_px;
         self.state.device.create_texture(&wgpu::TextureDescriptor {
             label: Some("window"),
-            size: wgpu::Extent3d {
-                width,
-                height,
-                depth_or_array_layers: 1,
-            },
+            size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
             mip_level_count: 1,
             sample_count: 1,
             dimension: wgpu::TextureDimension::D2,
@@ -127,9 +122,8 @@ impl Painter {
             usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
             mapped_at_creation: false,
         });
-        let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor {
-            label: Some("picture"),
-        });
+        let mut encoder = device
+            .create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("picture") });
         encoder.copy_texture_to_buffer(
             texture.as_image_copy(),
             wgpu::TexelCopyBufferInfo {
@@ -151,10 +145,8 @@ impl Painter {
         });
         let lost =
             |why: &dyn std::fmt::Display| format!("the graphics adapter gave no picture: {why}");
-        let wait = wgpu::PollType::Wait {
-            submission_index: Some(submitted),
-            timeout: Some(PATIENCE),
-        };
+        let wait =
+            wgpu::PollType::Wait { submission_index: Some(submitted), timeout: Some(PATIENCE) };
         device.poll(wait).map_err(|why| lost(&why))?;
         let mapped = told.recv().map_err(|why| lost(&why))?;
         mapped.map_err(|why| lost(&why))?;

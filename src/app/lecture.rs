@@ -32,12 +32,7 @@ pub(super) fn ui(ui: &mut Ui, state: &AppState, commands: &Queue) {
                 let method = span.part.method();
                 let color = method.map_or(ui.visuals().text_color(), theme::method);
                 let color = theme::text(ui.visuals(), color);
-                ui.label(
-                    RichText::new(part_name(span.part))
-                        .size(15.0)
-                        .color(color)
-                        .strong(),
-                );
+                ui.label(RichText::new(part_name(span.part)).size(15.0).color(color).strong());
             }
             if let Some(place) = place {
                 ui.weak(format!("stage {}", place + 1));
@@ -53,39 +48,17 @@ pub(super) fn ui(ui: &mut Ui, state: &AppState, commands: &Queue) {
             ui.add(egui::Label::new(RichText::new(second).size(SMALL).weak()).truncate());
         });
         let button = |ui: &mut Ui, text: &str, help: &str, command: Command| {
-            let button = ui
-                .add_sized([52.0, 34.0], Button::new(text))
-                .on_hover_text(help);
+            let button = ui.add_sized([52.0, 34.0], Button::new(text)).on_hover_text(help);
             if button.clicked() {
                 commands.send(command);
             }
         };
         if state.options.lockstep.is_some() {
-            button(
-                ui,
-                "◀",
-                "All methods one step back (,)",
-                Command::GoTogether(-1),
-            );
-            button(
-                ui,
-                "▶",
-                "All methods one step on (.)",
-                Command::GoTogether(1),
-            );
+            button(ui, "◀", "All methods one step back (,)", Command::GoTogether(-1));
+            button(ui, "▶", "All methods one step on (.)", Command::GoTogether(1));
         } else {
-            button(
-                ui,
-                "◀",
-                "Previous stage (↑)",
-                Command::NextStage { back: true },
-            );
-            button(
-                ui,
-                "▶",
-                "Next stage (↓)",
-                Command::NextStage { back: false },
-            );
+            button(ui, "◀", "Previous stage (↑)", Command::NextStage { back: true });
+            button(ui, "▶", "Next stage (↓)", Command::NextStage { back: false });
         }
     });
 }
@@ -98,10 +71,7 @@ fn sentences(state: &AppState, run: &Run, span: Option<&Span>, cursor: usize) ->
         );
     }
     let Some(span) = span else {
-        return (
-            "I takes the first step, Space runs to the end.".to_owned(),
-            String::new(),
-        );
+        return ("I takes the first step, Space runs to the end.".to_owned(), String::new());
     };
     let stage = run.stages_at(cursor).last().map(|bar| bar.stage);
     let first = stage.map_or("", about).to_owned();

@@ -122,9 +122,8 @@ impl OpenLesson {
 
     /// Answers by the place of the camera in hand; whether that was asked for.
     pub(super) fn guess(&mut self, camera: Option<Pose>) -> bool {
-        let is_asked = self
-            .asked()
-            .is_some_and(|question| matches!(question.answer, Answer::Place(_)));
+        let is_asked =
+            self.asked().is_some_and(|question| matches!(question.answer, Answer::Place(_)));
         match camera {
             Some(pose) if is_asked => {
                 self.given.insert(self.page, Given::Place(pose));
@@ -136,14 +135,7 @@ impl OpenLesson {
 
     /// Takes the keys that answer what is asked; others keep their meaning.
     pub(super) fn read_keys(&self, ctx: &egui::Context, commands: &Queue) {
-        const DIGITS: [Key; 6] = [
-            Key::Num1,
-            Key::Num2,
-            Key::Num3,
-            Key::Num4,
-            Key::Num5,
-            Key::Num6,
-        ];
+        const DIGITS: [Key; 6] = [Key::Num1, Key::Num2, Key::Num3, Key::Num4, Key::Num5, Key::Num6];
         if ctx.egui_wants_keyboard_input() {
             return;
         }
@@ -197,22 +189,19 @@ impl OpenLesson {
         });
         ui.separator();
         larger(ui);
-        ScrollArea::vertical()
-            .id_salt(("page", self.page))
-            .auto_shrink(false)
-            .show(ui, |ui| {
-                ui.heading(self.lesson.pages[self.page].title.clone());
-                let page = &self.lesson.pages[self.page];
-                CommonMarkViewer::new().show(ui, &mut self.words, &page.text);
-                if let Some(question) = &page.question {
-                    ui.separator();
-                    let given = self.given.get(&self.page).copied();
-                    asked_ui(ui, state, commands, question, given);
-                    if given.is_some() {
-                        CommonMarkViewer::new().show(ui, &mut self.words, &question.because);
-                    }
+        ScrollArea::vertical().id_salt(("page", self.page)).auto_shrink(false).show(ui, |ui| {
+            ui.heading(self.lesson.pages[self.page].title.clone());
+            let page = &self.lesson.pages[self.page];
+            CommonMarkViewer::new().show(ui, &mut self.words, &page.text);
+            if let Some(question) = &page.question {
+                ui.separator();
+                let given = self.given.get(&self.page).copied();
+                asked_ui(ui, state, commands, question, given);
+                if given.is_some() {
+                    CommonMarkViewer::new().show(ui, &mut self.words, &question.because);
                 }
-            });
+            }
+        });
     }
 }
 
@@ -282,11 +271,7 @@ fn place(state: &AppState, camera: &Pose) -> Option<String> {
     let run = state.run();
     let problem = run.loaded.as_deref()?.problems.first()?;
     let offset = Offset::of(&problem.reference_from_query(camera));
-    let side = if offset.right_m < 0.0 {
-        "left"
-    } else {
-        "right"
-    };
+    let side = if offset.right_m < 0.0 { "left" } else { "right" };
     Some(format!(
         "Your guess: {:.1} m ahead of the reference, {:.1} m to the {side}",
         offset.forward_m,
@@ -303,11 +288,9 @@ fn outcome(state: &AppState, method: Method, guess: &Pose) -> Vec<String> {
     let pose = span.and_then(|span| span.result.as_ref()?.pose.as_ref()?.to_pose());
     let mut words: Vec<String> = place(state, guess).into_iter().collect();
     match pose {
-        Some(pose) => words.push(format!(
-            "{} puts it {:.2} m from there",
-            method.label(),
-            apart(&pose)
-        )),
+        Some(pose) => {
+            words.push(format!("{} puts it {:.2} m from there", method.label(), apart(&pose)))
+        }
         None => words.push(format!("{} is at work", method.label())),
     }
     let truth = run.loaded.as_deref().and_then(|loaded| loaded.truth);

@@ -18,39 +18,24 @@ pub(super) struct Navigation {
 /// At the beginning of a run, and along with it.
 impl Default for Navigation {
     fn default() -> Self {
-        Self {
-            cursor: 0,
-            follows: true,
-            anchor: None,
-        }
+        Self { cursor: 0, follows: true, anchor: None }
     }
 }
 
 impl Navigation {
     /// In a new run, towards the record of a number.
     pub(super) fn towards_record(record: usize) -> Self {
-        Self {
-            follows: false,
-            anchor: Some(Anchor::Record(record)),
-            ..Self::default()
-        }
+        Self { follows: false, anchor: Some(Anchor::Record(record)), ..Self::default() }
     }
 
     /// In a new run, towards a moment.
     pub(super) fn towards_moment(moment: Moment) -> Self {
-        Self {
-            follows: false,
-            anchor: Some(Anchor::Moment(moment)),
-            ..Self::default()
-        }
+        Self { follows: false, anchor: Some(Anchor::Moment(moment)), ..Self::default() }
     }
 
     /// In this run, to a moment, as soon as the run has come so far.
     pub(super) fn seeking(&self, moment: Moment, run: &Run, is_alive: bool) -> Self {
-        let mut navigation = Self {
-            cursor: self.cursor,
-            ..Self::towards_moment(moment)
-        };
+        let mut navigation = Self { cursor: self.cursor, ..Self::towards_moment(moment) };
         navigation.on_records(run, is_alive);
         navigation
     }

@@ -22,10 +22,7 @@ pub(in crate::app) fn residual_range(pairs: &[IntensityPair]) -> f64 {
     let (_, most, _) = differences.select_nth_unstable_by(within, f32::total_cmp);
     let most = f64::from(*most);
     let ranges = [16.0, 32.0, 64.0, 128.0];
-    ranges
-        .into_iter()
-        .find(|range| *range >= most)
-        .unwrap_or(256.0)
+    ranges.into_iter().find(|range| *range >= most).unwrap_or(256.0)
 }
 
 /// Query minus synthetic view, coloured over ±`range` grey values: blue where the query is darker, orange where it is
@@ -35,18 +32,14 @@ pub(in crate::app) fn residual_within(
     pairs: &[IntensityPair],
     range: f64,
 ) -> RgbImage {
-    let values = pairs
-        .iter()
-        .map(|pair| palette::diverging(f64::from(pair.query - pair.synthetic) / range));
+    let values =
+        pairs.iter().map(|pair| palette::diverging(f64::from(pair.query - pair.synthetic) / range));
     in_color(view, Painter::new(view).paint(palette::NOTHING, values))
 }
 
 /// The pixels that the photometric cost counted (white) and ignored (grey).
 pub(in crate::app) fn weights(view: &SyntheticView, weights: &PhotometricWeights) -> GrayImage {
-    let values = weights
-        .counted
-        .iter()
-        .map(|&counted| WEIGHT_GRAYS[usize::from(counted)]);
+    let values = weights.counted.iter().map(|&counted| WEIGHT_GRAYS[usize::from(counted)]);
     in_gray(view, Painter::new(view).paint(0, values))
 }
 
@@ -107,10 +100,7 @@ mod tests {
     fn residuals_have_colours_up_to_the_range_that_they_have() {
         let pairs = |most: f32| -> Vec<IntensityPair> {
             (0..=100)
-                .map(|at| IntensityPair {
-                    query: most * at as f32 / 100.0,
-                    synthetic: 0.0,
-                })
+                .map(|at| IntensityPair { query: most * at as f32 / 100.0, synthetic: 0.0 })
                 .collect()
         };
         let ranges = [10.0, 30.0, 100.0, 250.0].map(|most| residual_range(&pairs(most)));
@@ -123,16 +113,9 @@ mod tests {
     }
 
     fn view(width: u32, height: u32, indices: &[u32]) -> SyntheticView {
-        let pixels = indices.iter().map(|&index| SplattedPixel {
-            index,
-            depth: 10.0,
-            intensity: 50.0,
-        });
-        SyntheticView {
-            width,
-            height,
-            pixels: pixels.collect(),
-        }
+        let pixels =
+            indices.iter().map(|&index| SplattedPixel { index, depth: 10.0, intensity: 50.0 });
+        SyntheticView { width, height, pixels: pixels.collect() }
     }
 
     #[test]

@@ -41,11 +41,7 @@ impl Proofs {
             });
             (question.part, picture)
         });
-        Self {
-            worker,
-            known: HashMap::new(),
-            shows_truth: true,
-        }
+        Self { worker, known: HashMap::new(), shows_truth: true }
     }
 
     /// Drops everything: the run is another one.
@@ -75,9 +71,7 @@ impl Proofs {
                 continue;
             };
             // The ranking of the references belongs to no method, and proves that the right one was not found.
-            let ranking = run
-                .span_of(Part::Retrieval)
-                .map(|span| span.records.clone());
+            let ranking = run.span_of(Part::Retrieval).map(|span| span.records.clone());
             let records = ranking.into_iter().chain([span.records.clone()]);
             let records = records.flat_map(|records| &run.records()[records]);
             let records = records.filter(|record| proof::KINDS.contains(record.event.kind()));

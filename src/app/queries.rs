@@ -127,35 +127,28 @@ impl Queries {
         let stop = Arc::new(AtomicBool::new(false));
         let (setup, flag, ctx) = (setup.clone(), Arc::clone(&stop), self.ctx.clone());
         let all = setup.offered.len();
-        let started = thread::Builder::new()
-            .name("queries".to_owned())
-            .spawn(move || {
-                let frames = Arc::default();
-                for &query in &setup.offered {
-                    let localized =
-                        catch_unwind(AssertUnwindSafe(|| localize(&setup, query, &frames, &flag)));
-                    let outcome = match localized {
-                        Ok(Ok(results)) => Ok(results),
-                        Ok(Err(error)) if error.is_cancelled() => break,
-                        Ok(Err(error)) => Err(error.to_string()),
-                        Err(_) => {
-                            let name = &setup.queries.frames()[query];
-                            Err(format!("internal error at query {name}"))
-                        }
-                    };
-                    if outbox.send((query, outcome)).is_err() {
-                        break;
+        let started = thread::Builder::new().name("queries".to_owned()).spawn(move || {
+            let frames = Arc::default();
+            for &query in &setup.offered {
+                let localized =
+                    catch_unwind(AssertUnwindSafe(|| localize(&setup, query, &frames, &flag)));
+                let outcome = match localized {
+                    Ok(Ok(results)) => Ok(results),
+                    Ok(Err(error)) if error.is_cancelled() => break,
+                    Ok(Err(error)) => Err(error.to_string()),
+                    Err(_) => {
+                        let name = &setup.queries.frames()[query];
+                        Err(format!("internal error at query {name}"))
                     }
-                    ctx.request_repaint();
+                };
+                if outbox.send((query, outcome)).is_err() {
+                    break;
                 }
-            });
+                ctx.request_repaint();
+            }
+        });
         if started.is_ok() {
-            self.batch = Some(Batch {
-                outcomes,
-                stop,
-                done: 0,
-                all,
-            });
+            self.batch = Some(Batch { outcomes, stop, done: 0, all });
         }
     }
 
@@ -192,40 +185,32 @@ impl Queries {
         let (queries, references) = (Arc::clone(&setup.queries), Arc::clone(&setup.references));
         let wanted = Arc::clone(&self.wanted);
         let (outbox, ctx) = (self.pictures.0.clone(), self.ctx.clone());
-        let started = thread::Builder::new()
-            .name("thumbnails".to_owned())
-            .spawn(move || {
-                loop {
-                    let next = wanted
-                        .lock()
-                        .unwrap_or_else(PoisonError::into_inner)
-                        .pop_first();
-                    let Some((side, frame)) = next else { break };
-                    let scene = match side {
-                        Side::Query => queries.as_ref(),
-                        Side::Reference => references.as_ref(),
-                    };
-                    let image = catch_unwind(AssertUnwindSafe(|| thumbnail(scene, frame)));
-                    let picture = PainterMessage::Thumbnail((side, frame), image.ok().flatten());
-                    let told = outbox.send(picture);
-                    if told.is_err() {
-                        return;
-                    }
-                    ctx.request_repaint();
+        let started = thread::Builder::new().name("thumbnails".to_owned()).spawn(move || {
+            loop {
+                let next = wanted.lock().unwrap_or_else(PoisonError::into_inner).pop_first();
+                let Some((side, frame)) = next else { break };
+                let scene = match side {
+                    Side::Query => queries.as_ref(),
+                    Side::Reference => references.as_ref(),
+                };
+                let image = catch_unwind(AssertUnwindSafe(|| thumbnail(scene, frame)));
+                let picture = PainterMessage::Thumbnail((side, frame), image.ok().flatten());
+                let told = outbox.send(picture);
+                if told.is_err() {
+                    return;
                 }
-                let _ = outbox.send(PainterMessage::Idle);
                 ctx.request_repaint();
-            });
+            }
+            let _ = outbox.send(PainterMessage::Idle);
+            ctx.request_repaint();
+        });
         self.painter_is_busy = started.is_ok();
     }
 }
 
 impl Drop for Queries {
     fn drop(&mut self) {
-        self.wanted
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
-            .clear();
+        self.wanted.lock().unwrap_or_else(PoisonError::into_inner).clear();
     }
 }
 

@@ -27,10 +27,9 @@ fn offered(target: SaveTarget, setup: &Setup) -> PathBuf {
 fn command(target: SaveTarget, path: PathBuf) -> Command {
     match target {
         SaveTarget::Recording => Command::SaveRecording(path),
-        SaveTarget::Picture | SaveTarget::Canvas => Command::SavePicture {
-            of_canvas: target == SaveTarget::Canvas,
-            path,
-        },
+        SaveTarget::Picture | SaveTarget::Canvas => {
+            Command::SavePicture { of_canvas: target == SaveTarget::Canvas, path }
+        }
         SaveTarget::Session => Command::SaveSession(path),
         SaveTarget::Restored => Command::RestoreSession(path),
     }
@@ -45,11 +44,7 @@ fn name_of(setup: &Setup) -> String {
     words.push(setup.query_name().to_owned());
     words.extend(setup.reference_names());
     let plain = |c: char| {
-        if c.is_alphanumeric() || "-_.".contains(c) {
-            c
-        } else {
-            '-'
-        }
+        if c.is_alphanumeric() || "-_.".contains(c) { c } else { '-' }
     };
     words.join("-").chars().map(plain).collect()
 }
@@ -64,11 +59,7 @@ pub(super) struct Asking {
 
 impl Asking {
     pub(super) fn new(target: SaveTarget, setup: &Setup) -> Self {
-        Self {
-            target,
-            path: offered(target, setup).display().to_string(),
-            is_focused: false,
-        }
+        Self { target, path: offered(target, setup).display().to_string(), is_focused: false }
     }
 
     /// Draws the question; whether it is answered or taken back.
@@ -200,11 +191,7 @@ impl Picture {
             None => egui::ColorImage::clone(&self.image),
         };
         let [width, height] = image.size.map(|side| side as u32);
-        let bytes: Vec<u8> = image
-            .pixels
-            .iter()
-            .flat_map(|p| [p.r(), p.g(), p.b()])
-            .collect();
+        let bytes: Vec<u8> = image.pixels.iter().flat_map(|p| [p.r(), p.g(), p.b()]).collect();
         let picture = image::RgbImage::from_raw(width, height, bytes)
             .ok_or_else(|| "the window gave no picture".to_owned())?;
         let said = |error: &dyn std::fmt::Display| format!("{}: {error}", self.path.display());

@@ -78,10 +78,7 @@ impl SavedSession {
         let opened = |argument: &str| -> Option<Arc<dyn Scene>> {
             (is_same_format && *argument == now.scene).then(|| Arc::clone(&present.references))
         };
-        let TaskScenes {
-            references,
-            queries,
-        } = if is_same_format && is_same_scene {
+        let TaskScenes { references, queries } = if is_same_format && is_same_scene {
             TaskScenes {
                 references: Arc::clone(&present.references),
                 queries: task.protocol.degraded(&present.queries),

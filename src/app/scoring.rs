@@ -103,19 +103,15 @@ impl ProbeRequest {
         // another method makes of the frame would take up a part of that itself, and wait for ever.
         let comparisons = std::thread::scope(|scope| {
             let methods = self.methods.iter();
-            let started: Vec<_> = methods
-                .map(|&method| scope.spawn(move || compare(method)))
-                .collect();
+            let started: Vec<_> =
+                methods.map(|&method| scope.spawn(move || compare(method))).collect();
             let ended = started.into_iter().map(|thread| match thread.join() {
                 Ok(comparison) => comparison,
                 Err(panic) => std::panic::resume_unwind(panic),
             });
             ended.flatten().collect()
         });
-        Probe {
-            pose: self.pose,
-            comparisons,
-        }
+        Probe { pose: self.pose, comparisons }
     }
 }
 
@@ -201,16 +197,11 @@ impl LineTracer {
                 estimator.with_scorer(&problem, &mut |scorer| scores = scorer.score(&poses));
                 CostAlong {
                     line,
-                    scores: CostLine::shares()
-                        .zip(scores.into_iter().map(Some))
-                        .collect(),
+                    scores: CostLine::shares().zip(scores.into_iter().map(Some)).collect(),
                 }
             },
         );
-        Self {
-            worker,
-            along: Vec::new(),
-        }
+        Self { worker, along: Vec::new() }
     }
 
     /// Asks for the cost along a line, unless it is known or asked for.
@@ -219,10 +210,7 @@ impl LineTracer {
             return;
         }
         self.along.retain(|along| along.line.method != line.method);
-        self.along.push(CostAlong {
-            line,
-            scores: Vec::new(),
-        });
+        self.along.push(CostAlong { line, scores: Vec::new() });
         self.worker.ask((problem.clone(), Arc::clone(params), line));
     }
 
@@ -237,11 +225,7 @@ impl LineTracer {
         for answer in self.worker.poll() {
             let answer = answer.ok_or("the cost between two poses could not be computed")?;
             // Another line may be wanted by now.
-            if let Some(along) = self
-                .along
-                .iter_mut()
-                .find(|along| along.line == answer.line)
-            {
+            if let Some(along) = self.along.iter_mut().find(|along| along.line == answer.line) {
                 *along = answer;
             }
         }
@@ -425,12 +409,7 @@ impl DenseFiller {
 
 /// Scores batch after batch for as long as more is wanted.
 fn fill(mut request: DenseRequest, emit: &mut dyn FnMut(Scored) -> bool) {
-    let DenseRequest {
-        problem,
-        params,
-        ask,
-        surface,
-    } = &mut request;
+    let DenseRequest { problem, params, ask, surface } = &mut request;
     let estimator = estimator::entry(ask.method).make(params);
     let has_cost = estimator.with_scorer(problem, &mut |scorer| {
         let mut is_wanted = true;
@@ -438,19 +417,11 @@ fn fill(mut request: DenseRequest, emit: &mut dyn FnMut(Scored) -> bool) {
             let begun = Instant::now();
             let scores = Some(surface.score_next(scorer));
             let took = begun.elapsed();
-            is_wanted = emit(Scored {
-                ask: *ask,
-                scores,
-                took,
-            });
+            is_wanted = emit(Scored { ask: *ask, scores, took });
         }
     });
     if !has_cost {
-        emit(Scored {
-            ask: *ask,
-            scores: None,
-            took: Duration::ZERO,
-        });
+        emit(Scored { ask: *ask, scores: None, took: Duration::ZERO });
     }
 }
 

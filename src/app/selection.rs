@@ -147,9 +147,7 @@ impl Selection {
             let is_other = |[before, now]: [Option<Code>; 2]| before != now;
             has_become
                 && (!wanted.only_changed || known.verdicts(row.query, result).is_some_and(is_other))
-                && condition
-                    .as_ref()
-                    .is_none_or(|condition| condition.is_met(result))
+                && condition.as_ref().is_none_or(|condition| condition.is_met(result))
         };
         let rows: Rc<[ResultRow]> = known.rows().filter(is_wanted).map(|(row, _)| row).collect();
         *latest = Some((known.version, wanted.clone(), Rc::clone(&rows)));

@@ -72,12 +72,7 @@ pub struct Setup {
 impl Setup {
     /// What a lesson localises.
     pub fn of_lesson(open: OpenSetting, folder: PathBuf) -> Self {
-        let OpenSetting {
-            task,
-            scenes,
-            query,
-            references,
-        } = open;
+        let OpenSetting { task, scenes, query, references } = open;
         Self {
             offered: vec![query],
             references: scenes.references,
@@ -244,9 +239,8 @@ impl Setup {
     /// What the window is about, for its title.
     pub fn title(&self) -> String {
         let references = self.chosen.frames.iter();
-        let references: Vec<String> = references
-            .map(|&frame| self.label(Side::Reference, frame))
-            .collect();
+        let references: Vec<String> =
+            references.map(|&frame| self.label(Side::Reference, frame)).collect();
         let query = self.label(Side::Query, self.query);
         let from = if references.is_empty() {
             String::new()
@@ -259,11 +253,8 @@ impl Setup {
             String::new()
         };
         let degradation = self.task.protocol.degrade;
-        let degraded = if degradation.is_none() {
-            String::new()
-        } else {
-            format!(" ({degradation})")
-        };
+        let degraded =
+            if degradation.is_none() { String::new() } else { format!(" ({degradation})") };
         format!("posescope: {scene}{query}{degraded}{from}")
     }
 
@@ -275,9 +266,7 @@ impl Setup {
     /// The names of its references.
     pub fn reference_names(&self) -> Vec<String> {
         let chosen = self.chosen.frames.iter();
-        chosen
-            .map(|&frame| self.references.frames()[frame].clone())
-            .collect()
+        chosen.map(|&frame| self.references.frames()[frame].clone()).collect()
     }
 
     /// The references that repeating the run has to name: those that were ranked are ranked again.

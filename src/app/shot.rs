@@ -112,13 +112,7 @@ impl<'a> Window<'a> {
         let app = App::of(&ctx, Some(painter.render_state()), setup).with_results(results);
         // Nothing moves in a picture.
         ctx.all_styles_mut(|style| style.animation_time = 0.0);
-        Self {
-            app,
-            ctx,
-            painter,
-            shot,
-            frames: 0,
-        }
+        Self { app, ctx, painter, shot, frames: 0 }
     }
 
     /// The frame that was asked for.

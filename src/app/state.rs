@@ -218,8 +218,7 @@ impl AppState {
             {
                 self.setup.chosen = chosen.clone();
             }
-            self.navigation
-                .on_records(self.session.run(), self.session.is_alive());
+            self.navigation.on_records(self.session.run(), self.session.is_alive());
             if was_alive && !self.session.is_alive() {
                 self.on_run_end();
             }
@@ -246,12 +245,10 @@ impl AppState {
             let methods = self.setup.direct_methods();
             self.prober.ask(&problem, &methods, &self.params, pose);
         }
-        self.pictures
-            .update(self.session.run(), &self.params, self.options.shows_truth);
+        self.pictures.update(self.session.run(), &self.params, self.options.shows_truth);
         if let Some(kept) = &mut self.kept {
             let params = Arc::new(kept.run.params.clone());
-            kept.pictures
-                .update(&kept.run, &params, self.options.shows_truth);
+            kept.pictures.update(&kept.run, &params, self.options.shows_truth);
         }
         if let Err(why) = self.line_tracer.poll() {
             self.note(why, true);
@@ -268,10 +265,7 @@ impl AppState {
             || self.dense_filler.is_busy()
             || self.queries.is_painting()
             || self.pictures.is_busy()
-            || self
-                .kept
-                .as_ref()
-                .is_some_and(|kept| kept.pictures.is_busy())
+            || self.kept.as_ref().is_some_and(|kept| kept.pictures.is_busy())
     }
 
     /// What is known of a method's cost along the line that was asked for last.
@@ -319,10 +313,8 @@ impl AppState {
         let run = self.session.run();
         let results = || run.spans().iter().filter(|span| span.result.is_some());
         let has_failed = |span: &&Span| {
-            let grade = span
-                .result
-                .as_ref()
-                .map(|result| result.grade_shown(self.options.shows_truth));
+            let grade =
+                span.result.as_ref().map(|result| result.grade_shown(self.options.shows_truth));
             grade.is_some_and(Grade::is_failure)
         };
         let failed = results().find(has_failed).map(|span| span.part);
@@ -335,10 +327,7 @@ impl AppState {
 
     /// Moves the cursor to the end of a part of the run, where `why` with the picture that proves its result.
     pub(super) fn show_part(&mut self, part: Part, why: bool) {
-        let last = self
-            .shown_run()
-            .span_of(part)
-            .and_then(|span| span.records.end.checked_sub(1));
+        let last = self.shown_run().span_of(part).and_then(|span| span.records.end.checked_sub(1));
         match (last, part.method()) {
             (Some(last), _) => {
                 self.move_cursor(last);
@@ -418,10 +407,7 @@ impl AppState {
     /// What all queries were run with holds no longer.
     pub(super) fn stop_queries(&mut self) {
         if self.queries.stop_all() {
-            self.note(
-                "The run over all queries has stopped: its settings were changed",
-                false,
-            );
+            self.note("The run over all queries has stopped: its settings were changed", false);
         }
     }
 
@@ -457,9 +443,7 @@ impl AppState {
     /// Takes the cursor to a moment of the present run, as soon as the run has come so far.
     pub(super) fn seek(&mut self, moment: Moment) {
         let is_alive = self.session.is_alive();
-        self.navigation = self
-            .navigation
-            .seeking(moment, self.session.run(), is_alive);
+        self.navigation = self.navigation.seeking(moment, self.session.run(), is_alive);
     }
 
     /// Other settings for the same query: what does not depend on them is reused, and the cursor

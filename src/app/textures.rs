@@ -12,10 +12,8 @@ use super::theme::rgb;
 /// Frames for which an unused picture is kept: blinking must not upload it anew each time.
 const KEPT_FRAMES: u64 = 120;
 
-const OPTIONS: TextureOptions = TextureOptions {
-    minification: TextureFilter::Linear,
-    ..TextureOptions::NEAREST
-};
+const OPTIONS: TextureOptions =
+    TextureOptions { minification: TextureFilter::Linear, ..TextureOptions::NEAREST };
 
 /// Textures by what they show.
 #[derive(Default)]
@@ -56,9 +54,7 @@ impl Textures {
     pub(super) fn end_frame(&self) {
         let now = self.frame.get() + 1;
         self.frame.set(now);
-        self.entries
-            .borrow_mut()
-            .retain(|_, entry| now - entry.last_used < KEPT_FRAMES);
+        self.entries.borrow_mut().retain(|_, entry| now - entry.last_used < KEPT_FRAMES);
     }
 }
 

@@ -135,11 +135,7 @@ fn over(ground: Color32, color: Color32) -> Color32 {
 /// The colour of something as text: as near to its own as can be read on every ground of the theme.
 pub fn text(visuals: &Visuals, color: Color32) -> Color32 {
     const STEPS: usize = 20;
-    let end = if visuals.dark_mode {
-        Color32::WHITE
-    } else {
-        Color32::BLACK
-    };
+    let end = if visuals.dark_mode { Color32::WHITE } else { Color32::BLACK };
     let grounds = grounds(visuals);
     let mixed = (0..=STEPS).map(|step| color.lerp_to_gamma(end, step as f32 / STEPS as f32));
     let mut readable = mixed.filter(|mixed| {
@@ -154,11 +150,7 @@ pub fn contrast(a: Color32, b: Color32) -> f32 {
     let luminance = |color: Color32| {
         let linear = |channel: u8| {
             let share = f32::from(channel) / 255.0;
-            if share <= 0.04045 {
-                share / 12.92
-            } else {
-                ((share + 0.055) / 1.055).powf(2.4)
-            }
+            if share <= 0.04045 { share / 12.92 } else { ((share + 0.055) / 1.055).powf(2.4) }
         };
         0.2126 * linear(color.r()) + 0.7152 * linear(color.g()) + 0.0722 * linear(color.b())
     };
@@ -187,14 +179,12 @@ fn visuals(theme: egui::Theme) -> Visuals {
         visuals.widgets.inactive.weak_bg_fill = Color32::from_rgb(0x2A, 0x2D, 0x34);
     }
     let (ground, words) = match theme {
-        egui::Theme::Dark => (
-            Color32::from_rgb(0x3A, 0x37, 0x70),
-            Color32::from_rgb(0xE8, 0xE6, 0xFF),
-        ),
-        egui::Theme::Light => (
-            Color32::from_rgb(0xCD, 0xCB, 0xFA),
-            Color32::from_rgb(0x1E, 0x1B, 0x50),
-        ),
+        egui::Theme::Dark => {
+            (Color32::from_rgb(0x3A, 0x37, 0x70), Color32::from_rgb(0xE8, 0xE6, 0xFF))
+        }
+        egui::Theme::Light => {
+            (Color32::from_rgb(0xCD, 0xCB, 0xFA), Color32::from_rgb(0x1E, 0x1B, 0x50))
+        }
     };
     visuals.selection.bg_fill = ground;
     visuals.selection.stroke.color = words;
@@ -263,19 +253,11 @@ mod tests {
             for color in told.chain(plain) {
                 for ground in grounds(&visuals) {
                     let contrast = contrast(color, ground);
-                    assert!(
-                        contrast >= CONTRAST,
-                        "{theme:?} {color:?} on {ground:?}: {contrast}"
-                    );
+                    assert!(contrast >= CONTRAST, "{theme:?} {color:?} on {ground:?}: {contrast}");
                 }
             }
             let widgets = &visuals.widgets;
-            for widget in [
-                &widgets.inactive,
-                &widgets.hovered,
-                &widgets.active,
-                &widgets.open,
-            ] {
+            for widget in [&widgets.inactive, &widgets.hovered, &widgets.active, &widgets.open] {
                 let contrast = contrast(widget.text_color(), widget.weak_bg_fill);
                 assert!(contrast >= CONTRAST, "{theme:?} {widget:?}: {contrast}");
             }

@@ -43,12 +43,7 @@ impl Thumbnails {
             let small = picture.resize(SIZE.0, SIZE.1, FilterType::Triangle);
             (question.record, color_image(&small))
         });
-        Self {
-            ctx,
-            worker,
-            made: HashMap::new(),
-            shows: HashMap::new(),
-        }
+        Self { ctx, worker, made: HashMap::new(), shows: HashMap::new() }
     }
 
     /// Drops everything: the run is another one.
@@ -61,11 +56,8 @@ impl Thumbnails {
     /// Takes in the pictures that are ready.
     pub(super) fn poll(&mut self) {
         for (record, image) in self.worker.poll().into_iter().flatten() {
-            let options = if image.size[0] < 64 {
-                TextureOptions::NEAREST
-            } else {
-                TextureOptions::LINEAR
-            };
+            let options =
+                if image.size[0] < 64 { TextureOptions::NEAREST } else { TextureOptions::LINEAR };
             let texture = self.ctx.load_texture("stage", image, options);
             self.made.insert(record, Some(texture));
         }
@@ -96,13 +88,12 @@ impl Thumbnails {
         }
         let loaded = run.loaded.as_deref()?;
         let problem = loaded.problems.get(run.reference_at(record))?;
-        let keypoints = run.records()[part.start..=record]
-            .iter()
-            .rev()
-            .find_map(|record| match &record.event {
+        let keypoints = run.records()[part.start..=record].iter().rev().find_map(|record| {
+            match &record.event {
                 Event::FeaturesDetected(event) if event.side == Side::Query => Some(event.clone()),
                 _ => None,
-            });
+            }
+        });
         self.made.insert(record, None);
         self.worker.ask(Question {
             record,
@@ -117,10 +108,8 @@ impl Thumbnails {
 fn is_drawn(event: &Event) -> bool {
     matches!(
         event,
-        Event::FeaturesDetected(FeaturesDetected {
-            side: Side::Query,
-            ..
-        }) | Event::MatchesDecided(_)
+        Event::FeaturesDetected(FeaturesDetected { side: Side::Query, .. })
+            | Event::MatchesDecided(_)
             | Event::DepthsLifted(_)
             | Event::FeaturesClassified(_)
             | Event::ViewRendered(_)
@@ -137,10 +126,9 @@ fn picture_of(question: &Question) -> DynamicImage {
         dotted(&picture::photo(&problem.query.photo), keypoints, &colors)
     };
     match &question.event {
-        Event::FeaturesDetected(event) => dots(vec![
-            Some(palette::STATES[1]);
-            event.features.keypoints.len()
-        ]),
+        Event::FeaturesDetected(event) => {
+            dots(vec![Some(palette::STATES[1]); event.features.keypoints.len()])
+        }
         Event::MatchesDecided(event) => dots(
             event
                 .decisions
@@ -157,11 +145,8 @@ fn picture_of(question: &Question) -> DynamicImage {
             let mut colors = vec![None; last.map_or(0, |last| last + 1)];
             for one in event.matches.iter() {
                 let has_depth = one.point.is_some();
-                colors[one.query] = Some(if has_depth {
-                    palette::UNDECIDED
-                } else {
-                    palette::STATES[2]
-                });
+                colors[one.query] =
+                    Some(if has_depth { palette::UNDECIDED } else { palette::STATES[2] });
             }
             dots(colors)
         }

@@ -88,11 +88,7 @@ impl<'a> ViewContext<'a> {
     /// The run that this one is compared with: A beside the present one, and the other way round.
     pub fn other_run(&self) -> Option<&'a Run> {
         let kept = &self.state.kept.as_ref()?.run;
-        Some(if self.is_present() {
-            kept
-        } else {
-            self.state.run()
-        })
+        Some(if self.is_present() { kept } else { self.state.run() })
     }
 
     /// The colours of the theme.
@@ -317,11 +313,7 @@ impl<'a> ViewContext<'a> {
         }
         // A hybrid's views are those of the direct method inside it. Where it kept the other's pose it
         // has none.
-        let within_hybrid = if self.is_inside_hybrid(method) {
-            self.latest()
-        } else {
-            None
-        };
+        let within_hybrid = if self.is_inside_hybrid(method) { self.latest() } else { None };
         let event: &ViewRendered = within_hybrid.or_else(|| self.latest_of(method))?;
         let problem = self.problem()?;
         Some(ShownView {
@@ -353,9 +345,7 @@ impl<'a> ViewContext<'a> {
         CostBounds {
             shuffled: assessed.and_then(|assessed| assessed.shuffled),
             best: assessed.map(|assessed| assessed.best),
-            truth: report
-                .and_then(|report| report.truth)
-                .filter(|_| self.options.shows_truth),
+            truth: report.and_then(|report| report.truth).filter(|_| self.options.shows_truth),
         }
     }
 }

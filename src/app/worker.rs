@@ -59,19 +59,12 @@ impl<Q: Send + 'static, A: Send + 'static> Worker<Q, A> {
                 };
                 let mut emit = |part| send(Message::Part(part)) && is_wanted();
                 let answered = catch_unwind(AssertUnwindSafe(|| answer(question, &mut emit)));
-                if !send(Message::End {
-                    is_whole: answered.is_ok(),
-                }) {
+                if !send(Message::End { is_whole: answered.is_ok() }) {
                     break;
                 }
             }
         });
-        Self {
-            questions,
-            answers,
-            epoch,
-            waiting: 0,
-        }
+        Self { questions, answers, epoch, waiting: 0 }
     }
 
     /// Asks a question.

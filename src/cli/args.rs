@@ -121,9 +121,7 @@ pub fn definition() -> clap::Command {
     let single = |command: clap::Command| {
         ["limit", "preset"]
             .into_iter()
-            .fold(command, |command, id| {
-                command.mut_arg(id, |arg| arg.hide(true))
-            })
+            .fold(command, |command, id| command.mut_arg(id, |arg| arg.hide(true)))
     };
     let command = Arguments::command().mut_subcommand("run", single);
     #[cfg(feature = "app")]
@@ -174,10 +172,7 @@ impl ConfigArgs {
             let text = std::fs::read_to_string(path).map_err(CliError::io(path))?;
             params
                 .merge_toml(&text)
-                .map_err(|source| CliError::Config {
-                    path: path.clone(),
-                    source,
-                })?;
+                .map_err(|source| CliError::Config { path: path.clone(), source })?;
         }
         for assignment in &self.assignments {
             params.assign(assignment)?;
@@ -269,11 +264,7 @@ mod tests {
             let lines = help.lines().count();
             assert!(lines <= 60, "{}: {lines} lines\n{help}", command.get_name());
             let widest = help.lines().map(|line| line.chars().count()).max();
-            assert!(
-                widest <= Some(100),
-                "{}: {widest:?}\n{help}",
-                command.get_name()
-            );
+            assert!(widest <= Some(100), "{}: {widest:?}\n{help}", command.get_name());
         }
     }
 

@@ -26,13 +26,7 @@ impl<'a> ChoiceProgress<'a> {
         interrupt: &'a Interrupt,
         index_for: Option<&'a str>,
     ) -> Self {
-        Self {
-            terminal,
-            interrupt,
-            index_for,
-            bar: None,
-            has_advised: false,
-        }
+        Self { terminal, interrupt, index_for, bar: None, has_advised: false }
     }
 }
 

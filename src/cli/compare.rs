@@ -18,11 +18,8 @@ pub fn compare(args: &CompareArgs, terminal: &Terminal) -> Result<(), CliError> 
     for run in [&args.before, &args.after] {
         read_run(run)?;
     }
-    let comparison = RunComparison::of(
-        &read_rows(&args.before)?,
-        &read_rows(&args.after)?,
-        &args.tolerance,
-    );
+    let comparison =
+        RunComparison::of(&read_rows(&args.before)?, &read_rows(&args.after)?, &args.tolerance);
     if comparison.common == 0 {
         return Err(CliError::Usage(format!(
             "{} and {} have no result in common; compare runs of the same scenes, queries, methods and settings",
@@ -42,12 +39,7 @@ pub fn compare(args: &CompareArgs, terminal: &Terminal) -> Result<(), CliError> 
         };
         let results = [read_rows(&args.before)?, read_rows(&args.after)?];
         let names = [name(&args.before), name(&args.after)];
-        record_comparison(
-            &Targets::file(path),
-            names,
-            &results,
-            &shown(&comparison, None),
-        )?;
+        record_comparison(&Targets::file(path), names, &results, &shown(&comparison, None))?;
         terminal.say(|| format!("Recording: {0} (open it with `rerun {0}`)", path.display()));
     }
     if comparison.is_regression() {

@@ -126,10 +126,7 @@ fn report(scene: &dyn Scene, found: &Examination, width: Option<usize>) -> Strin
         None if found.agreement.is_some() => {
             line("mistakes", "none of the usual ones found");
         }
-        None => line(
-            "mistakes",
-            "not checked: no frame has a photo, a pose and a cloud",
-        ),
+        None => line("mistakes", "not checked: no frame has a photo, a pose and a cloud"),
     }
     text
 }

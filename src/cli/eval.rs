@@ -93,11 +93,7 @@ fn execute(
     folder: &Path,
     terminal: &Terminal,
 ) -> Result<RunFile, CliError> {
-    let PlannedRun {
-        run,
-        scenes,
-        params,
-    } = match &args.rerun_failed {
+    let PlannedRun { run, scenes, params } = match &args.rerun_failed {
         Some(before) => again::plan(args, before)?,
         None => plan(args, swept)?,
     };
@@ -134,12 +130,7 @@ fn execute(
         interrupt.clone(),
         events,
     )?;
-    let execution = Execution {
-        run: &run,
-        scenes: &scenes,
-        params: &params,
-        indices: &indices,
-    };
+    let execution = Execution { run: &run, scenes: &scenes, params: &params, indices: &indices };
     let outcome = execution.run_remaining(&mut run_folder, &mut observer);
     bar.finish_and_clear();
     let closed = observer.close();
@@ -183,11 +174,7 @@ fn plan(args: &EvalArgs, swept: Option<(&Sweep, &str)>) -> Result<PlannedRun, Cl
     if let Some((sweep, value)) = swept {
         sweep.apply(value, &mut protocol.degrade, &mut params);
     }
-    let draw = Draw {
-        limit: protocol.limit,
-        only: &args.query,
-        seed: protocol.seed,
-    };
+    let draw = Draw { limit: protocol.limit, only: &args.query, seed: protocol.seed };
     let pairs = pairs(&draw, &scenes)?;
     let run = RunFile {
         schema: RUN_SCHEMA.to_owned(),
@@ -199,11 +186,7 @@ fn plan(args: &EvalArgs, swept: Option<(&Sweep, &str)>) -> Result<PlannedRun, Cl
         pairs,
         params: written(&params),
     };
-    Ok(PlannedRun {
-        run,
-        scenes,
-        params,
-    })
+    Ok(PlannedRun { run, scenes, params })
 }
 
 fn written(params: &Params) -> toml::Table {
@@ -305,11 +288,7 @@ fn finish(
     run: &RunFile,
     terminal: &Terminal,
 ) -> Result<(), CliError> {
-    let Judged {
-        report,
-        known,
-        mut failures,
-    } = Judged::of(args, again, folder, run)?;
+    let Judged { report, known, mut failures } = Judged::of(args, again, folder, run)?;
     if !terminal.is_quiet() {
         show(&report, run, terminal.width())?;
         eprintln!("Run: {}", folder.display());

@@ -145,10 +145,7 @@ impl From<RunError> for CliError {
 /// Reports a panic, which is a bug, in one line with its location.
 pub fn report_panics_in_one_line() {
     std::panic::set_hook(Box::new(|panic| {
-        let message = panic
-            .payload_as_str()
-            .unwrap_or("no message")
-            .replace('\n', " ");
+        let message = panic.payload_as_str().unwrap_or("no message").replace('\n', " ");
         let place = panic
             .location()
             .map(|location| format!("{}:{}", location.file(), location.line()))

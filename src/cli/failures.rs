@@ -75,9 +75,7 @@ impl<'a> FailureRecordings<'a> {
         let frames = query.request.references.frames.iter();
         let identity = Identity {
             queries: vec![query.item.query.to_owned()],
-            references: frames
-                .map(|&frame| references.frames()[frame].clone())
-                .collect(),
+            references: frames.map(|&frame| references.frames()[frame].clone()).collect(),
             ..Identity::of(references, queries, self.params, self.protocol)
         };
         let mut recorder = Recorder::open(&Targets::file(path), &identity, &[query.method])?;
@@ -147,9 +145,7 @@ impl RunObserver for FailureRecordings<'_> {
 
     fn begin(&mut self, item: &RunItem<'_>) {
         if let Some(events) = &mut self.observer.events {
-            let ScenePair {
-                scene, query_scene, ..
-            } = item.pair;
+            let ScenePair { scene, query_scene, .. } = item.pair;
             events.name_scenes(SceneNames {
                 references: scene.clone(),
                 query: Some(query_scene.clone()).filter(|query| query != scene),
@@ -158,12 +154,8 @@ impl RunObserver for FailureRecordings<'_> {
     }
 
     fn failed(&mut self, query: &FailedQuery<'_>) -> Result<(), RunError> {
-        let name = recording_name(
-            query.item.pair,
-            query.item.query,
-            query.method,
-            self.several_pairs,
-        );
+        let name =
+            recording_name(query.item.pair, query.item.query, query.method, self.several_pairs);
         let path = self.folder.join(format!("{name}.rrd"));
         match fs::remove_file(&path) {
             Err(error) if error.kind() != ErrorKind::NotFound => {

@@ -19,11 +19,8 @@ pub fn index(args: &IndexArgs, terminal: &Terminal) -> Result<(), CliError> {
         Some(path) => path.clone(),
         None => Retriever::default_path(scene.as_ref(), &args.scene).ok_or(NoIndex::NoFolder)?,
     };
-    let options = IndexOptions {
-        words: params.index.words,
-        every: args.every.get(),
-        seed: args.seed,
-    };
+    let options =
+        IndexOptions { words: params.index.words, every: args.every.get(), seed: args.seed };
     let without = left_out(scene.as_ref(), &args.without)?;
     let request = Retriever::request_without(scene.as_ref(), &options, &without, &params);
     if !args.force {
@@ -54,10 +51,9 @@ pub fn index(args: &IndexArgs, terminal: &Terminal) -> Result<(), CliError> {
     let summary = built.map_err(|error| match error {
         BuildError::Frame(error) => CliError::Scene(error),
         BuildError::Io { path, source } => CliError::Io { path, source },
-        BuildError::TooFewDescriptors { .. } => CliError::Usage(format!(
-            "{}: {error}; lower --set index.words",
-            scene.name()
-        )),
+        BuildError::TooFewDescriptors { .. } => {
+            CliError::Usage(format!("{}: {error}; lower --set index.words", scene.name()))
+        }
     })?;
     terminal.say(|| {
         format!(

@@ -44,10 +44,6 @@ impl Interrupt {
 
     /// Cancels the caller once Ctrl-C was pressed.
     pub fn check(&self) -> Result<(), Cancelled> {
-        if self.is_raised() {
-            Err(Cancelled)
-        } else {
-            Ok(())
-        }
+        if self.is_raised() { Err(Cancelled) } else { Ok(()) }
     }
 }

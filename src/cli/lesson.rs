@@ -57,11 +57,7 @@ fn window(lesson: Lesson, terminal: &Terminal) -> Result<(), CliError> {
 /// A program without the window records the lesson instead.
 #[cfg(not(feature = "app"))]
 fn window(lesson: Lesson, terminal: &Terminal) -> Result<(), CliError> {
-    save_instead(
-        &lesson,
-        &"this posescope is built without the window",
-        terminal,
-    )
+    save_instead(&lesson, &"this posescope is built without the window", terminal)
 }
 
 fn save_instead(
@@ -84,9 +80,7 @@ fn save(lesson: &Lesson, path: &Path, terminal: &Terminal) -> Result<(), CliErro
     let mut scenes: BTreeMap<String, Arc<dyn Scene>> = BTreeMap::new();
     let mut settings: Vec<OpenSetting> = Vec::new();
     for (variant, _) in &groups {
-        let open = lesson
-            .setting(variant)
-            .open(&|name| scenes.get(name).cloned())?;
+        let open = lesson.setting(variant).open(&|name| scenes.get(name).cloned())?;
         scenes.extend(open.named_scenes());
         settings.push(open);
     }
@@ -132,12 +126,9 @@ fn recorder(lesson: &Lesson, settings: &[OpenSetting], path: &Path) -> Result<Re
         references: protocol.named_references().map(str::to_owned).collect(),
         ..Identity::of(references, queries, &first.task.params, protocol)
     };
-    let requested = settings
-        .iter()
-        .flat_map(|setting| &setting.task.protocol.methods);
+    let requested = settings.iter().flat_map(|setting| &setting.task.protocol.methods);
     // In the order in which the methods run.
-    let methods: Vec<Method> = estimator::methods()
-        .filter(|method| requested.clone().any(|one| one == method))
-        .collect();
+    let methods: Vec<Method> =
+        estimator::methods().filter(|method| requested.clone().any(|one| one == method)).collect();
     Ok(Recorder::open(&Targets::file(path), &identity, &methods)?.with_pages())
 }

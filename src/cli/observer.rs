@@ -161,14 +161,9 @@ impl LocalizeObserver for CliObserver {
         if tried == 0 {
             self.explaining_since = Instant::now();
         }
-        let explaining = Explaining {
-            method: result.method,
-            tried,
-            remedies,
-            since: self.explaining_since,
-        };
-        self.bar
-            .set_message(format!("{} {explaining}", result.query));
+        let explaining =
+            Explaining { method: result.method, tried, remedies, since: self.explaining_since };
+        self.bar.set_message(format!("{} {explaining}", result.query));
     }
 
     fn explained(&mut self, result: &QueryResult) {

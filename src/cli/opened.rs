@@ -66,9 +66,5 @@ pub fn open(args: &TaskArgs, scene: &str, queries: &[String]) -> Result<OpenedTa
             .map(|name| scenes.queries.find(name))
             .collect::<Result<_, SceneError>>()?,
     };
-    Ok(OpenedTask {
-        task,
-        scenes,
-        queries,
-    })
+    Ok(OpenedTask { task, scenes, queries })
 }

@@ -23,10 +23,7 @@ impl JsonLines {
         } else {
             Box::new(File::create(path).map_err(CliError::io(path))?)
         };
-        Ok(Self {
-            path: path.to_owned(),
-            writer,
-        })
+        Ok(Self { path: path.to_owned(), writer })
     }
 
     /// Writes one result and flushes it.
@@ -48,12 +45,10 @@ pub fn print(text: &dyn Display) -> Result<(), CliError> {
 }
 
 fn print_to(writer: &mut dyn Write, text: &dyn Display, path: &Path) -> Result<(), CliError> {
-    writeln!(writer, "{text}")
-        .and_then(|()| writer.flush())
-        .map_err(|error| match error.kind() {
-            io::ErrorKind::BrokenPipe => CliError::ReaderGone,
-            _ => CliError::io(path)(error),
-        })
+    writeln!(writer, "{text}").and_then(|()| writer.flush()).map_err(|error| match error.kind() {
+        io::ErrorKind::BrokenPipe => CliError::ReaderGone,
+        _ => CliError::io(path)(error),
+    })
 }
 
 /// Whether `-` was given.

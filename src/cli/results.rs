@@ -17,16 +17,8 @@ use super::output::{self, JsonLines};
 use super::terminal::Terminal;
 
 /// The fields shown in a terminal by default.
-const COLUMNS: [&str; 8] = [
-    "query",
-    "reference",
-    "method",
-    "grade",
-    "error",
-    "rotation",
-    "code",
-    "probability",
-];
+const COLUMNS: [&str; 8] =
+    ["query", "reference", "method", "grade", "error", "rotation", "code", "probability"];
 
 pub fn results(args: &ResultsArgs, terminal: &Terminal) -> Result<(), CliError> {
     let run = read_run(&args.run)?;
@@ -62,10 +54,7 @@ pub fn results(args: &ResultsArgs, terminal: &Terminal) -> Result<(), CliError> 
         let results = shown.iter().map(|&index| &results[index]);
         let tables = match args.table {
             TableName::Rows => vec![row_table(args, form, results)?],
-            table => table.of(&RunResults::of(
-                results.cloned().collect(),
-                run.failure_radius_m(),
-            )),
+            table => table.of(&RunResults::of(results.cloned().collect(), run.failure_radius_m())),
         };
         if tables.is_empty() {
             return Err(CliError::Usage(

@@ -40,11 +40,8 @@ struct PlannedQuery {
 }
 
 pub fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), CliError> {
-    let OpenedTask {
-        task,
-        scenes,
-        queries: wanted,
-    } = opened::open(&args.task, &args.scene, &args.query)?;
+    let OpenedTask { task, scenes, queries: wanted } =
+        opened::open(&args.task, &args.scene, &args.query)?;
     let queries = scenes.queries.as_ref();
     let localizer = task.protocol.configured(Localizer::new(
         scenes.references.as_ref(),
@@ -57,11 +54,7 @@ pub fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), CliError> {
         task: &task,
         localizer: localizer.with_foreign(task.protocol.foreign(queries)?),
     };
-    let wanted = if args.all {
-        (0..queries.frames().len()).collect()
-    } else {
-        wanted
-    };
+    let wanted = if args.all { (0..queries.frames().len()).collect() } else { wanted };
     let interrupt = Interrupt::listen();
     let has_index = matches!(task.protocol.selection(), Selection::Retrieved(_));
     let index_for = (!has_index).then_some(args.scene.as_str());
@@ -141,9 +134,7 @@ pub fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), CliError> {
             closed?;
             shown?;
             let (done, all) = (results.len(), estimates_planned);
-            return Err(CliError::Interrupted(format!(
-                "{done} of {all} results are done"
-            )));
+            return Err(CliError::Interrupted(format!("{done} of {all} results are done")));
         }
         Ok(()) | Err(CliError::Stopped(_)) => {}
         Err(error) => return Err(error),

@@ -16,11 +16,7 @@ pub fn screenshot(args: &ViewArgs, out: &Path, terminal: &Terminal) -> Result<()
         moment: options.at,
         size_px: options.window,
         scale: options.scale,
-        theme: if options.light {
-            egui::Theme::Light
-        } else {
-            egui::Theme::Dark
-        },
+        theme: if options.light { egui::Theme::Light } else { egui::Theme::Dark },
     };
     let picture = app::shoot(setup, results, &shot).map_err(|error| match error {
         ShotError::Unknown(why) => CliError::Usage(why),

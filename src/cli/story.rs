@@ -22,11 +22,7 @@ pub fn story(results: &[(QueryResult, Duration)], width: Option<usize>) -> Strin
             1 => String::new(),
             _ => format!(" against {}", result.references.join(" ")),
         };
-        let sentence = format!(
-            "{} {}{against}: {verdict}",
-            result.query,
-            result.method_name()
-        );
+        let sentence = format!("{} {}{against}: {verdict}", result.query, result.method_name());
         text += &format!("\n{}", lines(sentence));
         for paragraph in result.paragraphs() {
             text += &lines(format!("  {paragraph}"));

@@ -26,11 +26,7 @@ const CELL_PX: u32 = 3;
 
 pub fn surface(args: &RunArgs, out: &Path, terminal: &Terminal) -> Result<(), CliError> {
     let writer = writer(out)?;
-    let OpenedTask {
-        task,
-        scenes,
-        queries,
-    } = opened::open(&args.task, &args.scene, &args.query)?;
+    let OpenedTask { task, scenes, queries } = opened::open(&args.task, &args.scene, &args.query)?;
     let method = method(args.task.protocol.has("methods"), &task.protocol.methods)?;
     let (references, queried) = (scenes.references.as_ref(), scenes.queries.as_ref());
     let named: Vec<&str> = task.protocol.named_references().collect();
@@ -150,9 +146,7 @@ fn writer(out: &Path) -> Result<Writer, CliError> {
 
 /// The pose of lowest cost as text.
 fn described(surface: &DenseSurface, problem: &Problem, truth: Option<&Pose>) -> String {
-    let least = surface
-        .minimum()
-        .and_then(|(at, score)| Some((at, score.cost?)));
+    let least = surface.minimum().and_then(|(at, score)| Some((at, score.cost?)));
     let Some((offset, cost)) = least else {
         return "no hypothesis covers enough to have a cost; lower grid.coverage_floor".to_owned();
     };
@@ -185,10 +179,7 @@ fn write_csv(surface: &DenseSurface, out: &Path) -> Result<(), CliError> {
     for (_, offset, cost, covered) in costs(surface) {
         let (right_m, forward_m) = (offset.right_m, offset.forward_m);
         let yaw_deg = offset.yaw_rad.to_degrees();
-        let _ = writeln!(
-            text,
-            "{right_m:.3},{forward_m:.3},{yaw_deg:.3},{cost},{covered}"
-        );
+        let _ = writeln!(text, "{right_m:.3},{forward_m:.3},{yaw_deg:.3},{cost},{covered}");
     }
     std::fs::write(out, text).map_err(CliError::io(out))
 }

@@ -14,15 +14,9 @@ use super::terminal::Terminal;
 
 /// Runs the command: one drive per condition, named after it.
 pub fn synth(args: &SynthArgs, terminal: &Terminal) -> Result<(), CliError> {
-    let layout = LAYOUTS
-        .iter()
-        .find(|layout| layout.name == args.layout)
-        .ok_or_else(|| {
-            CliError::Usage(format!(
-                "there is no layout `{}`; --help lists them",
-                args.layout
-            ))
-        })?;
+    let layout = LAYOUTS.iter().find(|layout| layout.name == args.layout).ok_or_else(|| {
+        CliError::Usage(format!("there is no layout `{}`; --help lists them", args.layout))
+    })?;
     let streets = streets(args)?;
     if !args.force && holds_anything(&args.folder)? {
         return Err(CliError::Usage(format!(
@@ -79,10 +73,7 @@ fn write(
         intrinsics: street.intrinsics(0),
         names: street.frames().to_vec(),
         poses: all.clone().filter_map(|frame| street.pose(frame)).collect(),
-        times_s: all
-            .clone()
-            .filter_map(|frame| street.time_s(frame))
-            .collect(),
+        times_s: all.clone().filter_map(|frame| street.time_s(frame)).collect(),
         written: all.clone().step_by(every).collect(),
         scanner: Street::scanner_position(),
     };
@@ -90,9 +81,7 @@ fn write(
     let traversal = street.traversal();
     all.into_par_iter().step_by(every).try_for_each(|index| {
         let scan = traversal.cloud(index).into_iter();
-        let scan: Vec<_> = scan
-            .map(|point| (point.position, point.reflectance))
-            .collect();
+        let scan: Vec<_> = scan.map(|point| (point.position, point.reflectance)).collect();
         writer.frame(&Shot {
             index,
             photo: &traversal.image(index),

@@ -40,10 +40,7 @@ impl Terminal {
         if LogWrapper::new(bars.clone(), logger).try_init().is_ok() {
             log::set_max_level(level);
         }
-        Self {
-            bars,
-            quiet: everywhere.quiet,
-        }
+        Self { bars, quiet: everywhere.quiet }
     }
 
     /// Prints a message on stderr unless `--quiet` is given.

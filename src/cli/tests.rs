@@ -9,10 +9,7 @@ use commands::{commands, documents, own_arguments};
 
 #[test]
 fn every_command_of_the_documentation_is_understood() {
-    if !std::path::Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("docs")
-        .exists()
-    {
+    if !std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("docs").exists() {
         println!("skipped: a package has no docs");
         return;
     }
@@ -22,9 +19,7 @@ fn every_command_of_the_documentation_is_understood() {
             let Some(own) = own_arguments(&words) else {
                 continue;
             };
-            let all = ["posescope"]
-                .into_iter()
-                .chain(own.iter().map(String::as_str));
+            let all = ["posescope"].into_iter().chain(own.iter().map(String::as_str));
             if let Err(error) = Arguments::try_parse_from(all) {
                 panic!("{}: {words:?}\n{error}", page.display());
             }

@@ -34,10 +34,7 @@ fn record_instead(setup: &Setup, why: &WindowError, terminal: &Terminal) -> Resu
     let query = setup.query_name();
     let recording = setup.folder.join(format!("{query}.rrd"));
     std::fs::create_dir_all(&setup.folder).map_err(CliError::io(&setup.folder))?;
-    eprintln!(
-        "posescope: {why}; recording {} instead",
-        recording.display()
-    );
+    eprintln!("posescope: {why}; recording {} instead", recording.display());
     let mut arguments = vec!["posescope".to_owned()];
     arguments.extend(setup.arguments());
     arguments.extend(["--save".to_owned(), recording.display().to_string()]);
@@ -80,11 +77,8 @@ fn results_of(folder: &Path, pair: &ScenePair, queries: &dyn Scene) -> Result<Re
 
 fn of_a_scene(args: &ViewArgs) -> Result<Setup, CliError> {
     let named: Vec<String> = args.query.iter().cloned().collect();
-    let OpenedTask {
-        task,
-        scenes,
-        queries: named,
-    } = opened::open(&args.task, &args.scene, &named)?;
+    let OpenedTask { task, scenes, queries: named } =
+        opened::open(&args.task, &args.scene, &named)?;
     let offered = (0..scenes.queries.frames().len()).collect();
     let references = task.protocol.named_references();
     let references = references.map(|name| scenes.references.find(name));
@@ -160,10 +154,7 @@ fn refuse_other_queries(args: &ViewArgs) -> Result<(), CliError> {
 fn of_a_run(args: &ViewArgs, folder: &Path) -> Result<(Setup, KnownResults), CliError> {
     let file = read_run(folder)?;
     let Some(pair) = file.pairs.first() else {
-        return Err(CliError::NoReference(format!(
-            "{}: the run has no scenes",
-            folder.display()
-        )));
+        return Err(CliError::NoReference(format!("{}: the run has no scenes", folder.display())));
     };
     let scene_argument = file.scenes[pair.scene_index].clone();
     refuse_other_queries(args)?;
@@ -184,10 +175,9 @@ fn of_a_run(args: &ViewArgs, folder: &Path) -> Result<(Setup, KnownResults), Cli
         None => Arc::clone(&references),
     };
     let queries = protocol.prepared_queries(queries, references.as_ref())?;
-    let params = file.params().map_err(|source| CliError::Config {
-        path: folder.join("run.toml"),
-        source,
-    })?;
+    let params = file
+        .params()
+        .map_err(|source| CliError::Config { path: folder.join("run.toml"), source })?;
     let params = args.task.config.over(params)?;
     let results_of = |folder: &Path| -> Result<Results, CliError> {
         let mut results = results_of(folder, pair, queries.as_ref())?;
@@ -229,17 +219,9 @@ fn of_a_run(args: &ViewArgs, folder: &Path) -> Result<(Setup, KnownResults), Cli
         breakpoints: args.task.breakpoints.clone(),
         ..Task::of(scene_argument)
     };
-    let scenes = TaskScenes {
-        references,
-        queries,
-    };
-    let setup = Setup {
-        query,
-        ..setup_of(task, scenes, results.keys().copied().collect(), chosen)
-    };
-    let known = KnownResults {
-        now: results,
-        before,
-    };
+    let scenes = TaskScenes { references, queries };
+    let setup =
+        Setup { query, ..setup_of(task, scenes, results.keys().copied().collect(), chosen) };
+    let known = KnownResults { now: results, before };
     Ok((setup, known))
 }

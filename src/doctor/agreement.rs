@@ -49,10 +49,7 @@ pub(super) fn edge_map(photo: &GrayImage) -> EdgeMap {
     for (index, side) in there.chain(back) {
         let (x, y) = (index % width, index / width);
         for (dx, dy) in BEFORE {
-            let beside = (
-                x.checked_add_signed(side * dx),
-                y.checked_add_signed(side * dy),
-            );
+            let beside = (x.checked_add_signed(side * dx), y.checked_add_signed(side * dy));
             if let (Some(nx), Some(ny)) = beside
                 && nx < width
                 && ny < height
@@ -95,10 +92,8 @@ pub(super) struct Seen {
 /// The logarithm of the ratio of image-edge strength at depth edges to that at all points; `None` if too few
 /// points are in view.
 pub(super) fn edge_agreement(map: &EdgeMap, seen: &[Seen]) -> Option<f64> {
-    let inside: Vec<(Seen, f64)> = seen
-        .iter()
-        .filter_map(|seen| Some((*seen, value(map, &seen.pixel)?)))
-        .collect();
+    let inside: Vec<(Seen, f64)> =
+        seen.iter().filter_map(|seen| Some((*seen, value(map, &seen.pixel)?))).collect();
     if inside.len() < FEWEST_POINTS {
         return None;
     }
@@ -183,9 +178,7 @@ pub(super) fn carried_agreement(
         ab += a * b;
     }
     let correlation = ab / (aa * bb).sqrt();
-    correlation
-        .is_finite()
-        .then(|| correlation.clamp(-0.999, 0.999).atanh())
+    correlation.is_finite().then(|| correlation.clamp(-0.999, 0.999).atanh())
 }
 
 /// Projects a point with an additional radial distortion `k1`.
@@ -200,10 +193,7 @@ pub(super) fn project(camera: &Intrinsics, k1: f64, point: &Point3<f64>) -> Opti
     // Beyond the fold of the polynomial, a point would be projected twice.
     let is_folded = 1.0 + 3.0 * k1 * (x * x + y * y) <= 0.0;
     (!is_folded).then(|| Seen {
-        pixel: Point2::new(
-            camera.fx * x * bent + camera.cx,
-            camera.fy * y * bent + camera.cy,
-        ),
+        pixel: Point2::new(camera.fx * x * bent + camera.cx, camera.fy * y * bent + camera.cy),
         depth: point.z,
     })
 }

@@ -43,9 +43,8 @@ pub(super) fn take(scene: &dyn Scene) -> (Inventory, Vec<Remark>) {
     let mut remarks = Vec::new();
     let frames = scene.frames();
     let poses: Vec<Option<Pose>> = (0..frames.len()).map(|frame| scene.pose(frame)).collect();
-    let references: Vec<usize> = (0..frames.len())
-        .filter(|&f| poses[f].is_some() && scene.has_cloud(f))
-        .collect();
+    let references: Vec<usize> =
+        (0..frames.len()).filter(|&f| poses[f].is_some() && scene.has_cloud(f)).collect();
     let count = |has: &dyn Fn(usize) -> bool| (0..frames.len()).filter(|&frame| has(frame)).count();
     let mut inventory = Inventory {
         frames: frames.len(),
@@ -92,10 +91,7 @@ fn cameras(scene: &dyn Scene) -> Vec<String> {
     let mut cameras = Vec::new();
     for frame in 0..scene.frames().len() {
         let camera = scene.intrinsics(frame);
-        let across = 2.0
-            * (f64::from(camera.width) / 2.0 / camera.fx)
-                .atan()
-                .to_degrees();
+        let across = 2.0 * (f64::from(camera.width) / 2.0 / camera.fx).atan().to_degrees();
         let words = format!(
             "{}x{} px, focal length {:.1} px, centre ({:.1}, {:.1}), {across:.0}° across",
             camera.width, camera.height, camera.fx, camera.cx, camera.cy
@@ -135,9 +131,7 @@ fn steps(poses: &[Option<Pose>], inventory: &mut Inventory, remarks: &mut Vec<Re
 }
 
 fn times(scene: &dyn Scene, remarks: &mut Vec<Remark>) {
-    let times: Vec<f64> = (0..scene.frames().len())
-        .filter_map(|f| scene.time_s(f))
-        .collect();
+    let times: Vec<f64> = (0..scene.frames().len()).filter_map(|f| scene.time_s(f)).collect();
     if let Some(back) = times.windows(2).position(|two| two[1] <= two[0]) {
         remarks.push(Remark::Odd(format!(
             "times do not increase: {} s follows {} s",

@@ -140,18 +140,11 @@ impl Change {
 
 /// The readings that need no search.
 pub(super) fn readings() -> Vec<Reading> {
-    let reading = |mistake, remedy: &str, change| Reading {
-        mistake,
-        remedy: remedy.to_owned(),
-        change,
-    };
+    let reading =
+        |mistake, remedy: &str, change| Reading { mistake, remedy: remedy.to_owned(), change };
     use Mistake as M;
     vec![
-        reading(
-            M::InversePose,
-            "invert each pose",
-            Change::Pose(|pose| pose.inverse()),
-        ),
+        reading(M::InversePose, "invert each pose", Change::Pose(|pose| pose.inverse())),
         reading(
             M::PoseAxes,
             "rotate the axes of each pose to right, down, forward",
@@ -201,26 +194,10 @@ pub(super) fn readings() -> Vec<Reading> {
                 with_rotation(&pose.inverse(), |[x, y, z, w]| [w, x, y, z]).inverse()
             }),
         ),
-        reading(
-            M::CloudOfNeighbour,
-            "use the cloud of the previous frame",
-            Change::Neighbour(-1),
-        ),
-        reading(
-            M::CloudOfNeighbour,
-            "use the cloud of the next frame",
-            Change::Neighbour(1),
-        ),
-        reading(
-            M::Degrees,
-            "read the angles as degrees",
-            Change::Poses(angles_in_degrees),
-        ),
-        reading(
-            M::Degrees,
-            "read the angles as radians",
-            Change::Pose(angles_in_radians),
-        ),
+        reading(M::CloudOfNeighbour, "use the cloud of the previous frame", Change::Neighbour(-1)),
+        reading(M::CloudOfNeighbour, "use the cloud of the next frame", Change::Neighbour(1)),
+        reading(M::Degrees, "read the angles as degrees", Change::Poses(angles_in_degrees)),
+        reading(M::Degrees, "read the angles as radians", Change::Pose(angles_in_radians)),
         reading(
             M::MirroredCloud,
             "negate the sideways axis of the clouds",
@@ -235,10 +212,7 @@ pub(super) fn readings() -> Vec<Reading> {
             M::ReversedPoses,
             "reverse the order of the poses",
             Change::Poses(|frame, poses| {
-                poses
-                    .get(poses.len().checked_sub(frame + 1)?)
-                    .copied()
-                    .flatten()
+                poses.get(poses.len().checked_sub(frame + 1)?).copied().flatten()
             }),
         ),
     ]
@@ -248,10 +222,7 @@ pub(super) fn readings() -> Vec<Reading> {
 fn flu_from_rdf() -> Pose {
     let turn = Matrix3::new(0.0, 0.0, 1.0, -1.0, 0.0, 0.0, 0.0, -1.0, 0.0);
     let turn = Rotation3::from_matrix_unchecked(turn);
-    Pose::from_parts(
-        Translation3::identity(),
-        UnitQuaternion::from_rotation_matrix(&turn),
-    )
+    Pose::from_parts(Translation3::identity(), UnitQuaternion::from_rotation_matrix(&turn))
 }
 
 /// The same position, with the quaternion's components reordered.

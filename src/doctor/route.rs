@@ -43,9 +43,9 @@ pub(super) fn below(picture: Option<RgbImage>, poses: &[Pose]) -> Option<RgbImag
         imageops::replace(&mut canvas, picture, 0, 0);
     }
     let first = places[0];
-    let (least, most) = places.iter().fold((first, first), |(least, most), place| {
-        (least.inf(place), most.sup(place))
-    });
+    let (least, most) = places
+        .iter()
+        .fold((first, first), |(least, most), place| (least.inf(place), most.sup(place)));
     let sides = (most - least).map(|side| side.max(1.0));
     let [wide, tall] = [width, height].map(|side| f64::from(side) - 2.0 * MARGIN_PX);
     let scale = (wide / sides.x).min(tall / sides.y);
@@ -88,11 +88,7 @@ mod tests {
         });
         let poses: Vec<Pose> = poses.collect();
         let places = places(&poses).expect("a way");
-        assert!(
-            (places[50] - Point2::new(100.0, 100.0)).norm() < 1e-6,
-            "{}",
-            places[50]
-        );
+        assert!((places[50] - Point2::new(100.0, 100.0)).norm() < 1e-6, "{}", places[50]);
         let map = below(None, &poses).expect("a map");
         assert_eq!(map.dimensions(), (WIDTH, WIDTH / 2));
         let colors: Vec<_> = map.pixels().map(|pixel| pixel.0).collect();

@@ -89,19 +89,12 @@ impl Sample {
     pub(super) fn read(scene: &dyn Scene) -> Result<Self, SceneError> {
         let count = scene.frames().len();
         let poses: Vec<Option<Pose>> = (0..count).map(|frame| scene.pose(frame)).collect();
-        let references: Vec<usize> = (0..count)
-            .filter(|&frame| poses[frame].is_some() && scene.has_cloud(frame))
-            .collect();
+        let references: Vec<usize> =
+            (0..count).filter(|&frame| poses[frame].is_some() && scene.has_cloud(frame)).collect();
         let many = ANCHORS.min(references.len());
-        let anchors: Vec<usize> = (0..many)
-            .map(|at| references[at * references.len() / many])
-            .collect();
-        let mut sample = Self {
-            poses,
-            sights: BTreeMap::new(),
-            clouds: BTreeMap::new(),
-            anchors,
-        };
+        let anchors: Vec<usize> =
+            (0..many).map(|at| references[at * references.len() / many]).collect();
+        let mut sample = Self { poses, sights: BTreeMap::new(), clouds: BTreeMap::new(), anchors };
         for &anchor in &sample.anchors {
             for frame in std::iter::once(anchor).chain(partners(anchor, count)) {
                 if let Entry::Vacant(place) = sample.sights.entry(frame) {
@@ -140,9 +133,7 @@ impl Sample {
     pub(super) fn seen(&self, anchor: usize) -> Option<(&GrayImage, Vec<Seen>)> {
         let sight = self.sights.get(&anchor)?;
         let points = self.clouds.get(&anchor)?;
-        let seen = points
-            .iter()
-            .filter_map(|point| project(&sight.camera, 0.0, point));
+        let seen = points.iter().filter_map(|point| project(&sight.camera, 0.0, point));
         Some((&sight.gray, seen.collect()))
     }
 
@@ -160,15 +151,10 @@ impl Sample {
         };
         let points: Vec<Point3<f64>> = cloud.iter().map(|point| change.point(point)).collect();
         let (camera, k1) = change.camera(&sight.camera);
-        let seen: Vec<Option<Seen>> = points
-            .iter()
-            .map(|point| project(&camera, k1, point))
-            .collect();
+        let seen: Vec<Option<Seen>> =
+            points.iter().map(|point| project(&camera, k1, point)).collect();
         let in_front: Vec<Seen> = seen.iter().flatten().copied().collect();
-        let in_view = in_front
-            .iter()
-            .filter(|seen| camera.contains(&seen.pixel))
-            .count();
+        let in_view = in_front.iter().filter(|seen| camera.contains(&seen.pixel)).count();
         let carried_points: Vec<&Point3<f64>> = points.iter().step_by(CARRIED).collect();
         let seen: Vec<Option<Seen>> = seen.into_iter().step_by(CARRIED).collect();
         // With few points in view, agreement is chance.
@@ -186,10 +172,7 @@ impl Sample {
             // Points that are out of view of the partner do not agree.
             Some(agreement.unwrap_or(0.0))
         });
-        Agreement {
-            edges: edge_agreement(&sight.edges, &in_front),
-            carried: mean(carried),
-        }
+        Agreement { edges: edge_agreement(&sight.edges, &in_front), carried: mean(carried) }
     }
 
     /// The reading that fits better than the scene as stated, if any.
@@ -199,11 +182,7 @@ impl Sample {
         for reading in readings().into_iter().chain(self.searched()) {
             let scores = self.scores(&reading.change);
             let (gain, otherwise) = (gain(&stated, &scores, &reading.change), mean_of(&scores));
-            log::debug!(
-                "{:?} {}: {gain:?} {otherwise:?}",
-                reading.mistake,
-                reading.remedy
-            );
+            log::debug!("{:?} {}: {gain:?} {otherwise:?}", reading.mistake, reading.remedy);
             if let Some(gain) = gain
                 && best.as_ref().is_none_or(|(known, ..)| gain > *known)
             {
@@ -304,9 +283,7 @@ impl Sample {
 }
 
 fn partners(anchor: usize, count: usize) -> impl Iterator<Item = usize> {
-    let frames = PARTNERS
-        .iter()
-        .filter_map(move |&step| anchor.checked_add_signed(step));
+    let frames = PARTNERS.iter().filter_map(move |&step| anchor.checked_add_signed(step));
     frames.filter(move |&frame| frame < count).take(CARRIED_TO)
 }
 
@@ -335,10 +312,7 @@ fn gain(stated: &[Agreement], other: &[Agreement], change: &Change) -> Option<f6
     if gains.len() < FEWEST_FRAMES.min(stated.len()).max(2) || gains.len() * 2 < stated.len() {
         return None;
     }
-    let has_number = matches!(
-        change,
-        Change::Aside(_) | Change::Camera { .. } | Change::Lens(_)
-    );
+    let has_number = matches!(change, Change::Aside(_) | Change::Camera { .. } | Change::Lens(_));
     if has_number && gains.len() < FEWEST_FRAMES {
         return None;
     }

@@ -173,11 +173,7 @@ struct Source<'a> {
 
 impl Source<'_> {
     fn malformed(&self, line: usize, why: &(impl ToString + ?Sized)) -> LessonError {
-        LessonError::Malformed {
-            name: self.name.to_owned(),
-            line,
-            why: why.to_string(),
-        }
+        LessonError::Malformed { name: self.name.to_owned(), line, why: why.to_string() }
     }
 
     /// An error at a byte of a block.
@@ -287,10 +283,9 @@ impl Source<'_> {
     ) -> Result<Question, LessonError> {
         let answer = match (text.place, text.right) {
             (Some(method), None) if text.choices.is_empty() => Answer::Place(method),
-            (None, Some(right)) if (1..=text.choices.len()).contains(&right) => Answer::Choice {
-                choices: text.choices,
-                right: right - 1,
-            },
+            (None, Some(right)) if (1..=text.choices.len()).contains(&right) => {
+                Answer::Choice { choices: text.choices, right: right - 1 }
+            }
             _ => {
                 let why = "either `choices` with `right`, counted from 1, or `place` expected in a question";
                 return Err(self.malformed(line, why));
@@ -356,19 +351,13 @@ variant = "dark"
         let [first, second, third] = lesson.pages.as_slice() else {
             panic!("three pages: {:?}", lesson.pages);
         };
-        assert_eq!(
-            (first.title.as_str(), first.text.as_str()),
-            ("The first", "Some *words*.")
-        );
+        assert_eq!((first.title.as_str(), first.text.as_str()), ("The first", "Some *words*."));
         let question = first.question.as_ref().expect("a question");
         assert!(matches!(&question.answer, Answer::Choice { right: 1, .. }));
         // A page goes on from where the one before has left the run.
         assert_eq!(second.at, question.reveal);
         assert_eq!(second.show, ["images"]);
-        assert_eq!(
-            (third.variant.as_str(), &third.at),
-            ("dark", &Moment::Start)
-        );
+        assert_eq!((third.variant.as_str(), &third.at), ("dark", &Moment::Start));
         let [light, dark] = [FIRST, "dark"].map(|name| {
             let task = lesson.setting(name).task();
             task.expect("a task").protocol
@@ -376,10 +365,7 @@ variant = "dark"
         assert_eq!(dark.query_scene, ["street:night"]);
         assert_eq!(dark.references, light.references);
         let shown = first.markdown(1, 3);
-        assert!(
-            shown.contains("2. that") && !shown.contains("So."),
-            "{shown}"
-        );
+        assert!(shown.contains("2. that") && !shown.contains("So."), "{shown}");
         assert!(first.answered(1, 3).expect("an answer").contains("So."));
     }
 
@@ -390,20 +376,10 @@ variant = "dark"
             ("scene = ", "scenery = ", 6, "scenery"),
             ("[\"street:night\"]", "\"street:night\"", 10, "sequence"),
             ("error < 1\"", "error <\"", 1, "expected"),
-            (
-                "variant = \"dark\"\nholds",
-                "variant = \"rain\"\nholds",
-                1,
-                "rain",
-            ),
+            ("variant = \"dark\"\nholds", "variant = \"rain\"\nholds", 1, "rain"),
             ("after fb.match", "after lunch", 19, "lunch"),
             ("right = 2", "right = 3", 18, "right"),
-            (
-                "```page\nvariant = \"dark\"",
-                "```page\nvariant = \"fog\"",
-                37,
-                "fog",
-            ),
+            ("```page\nvariant = \"dark\"", "```page\nvariant = \"fog\"", 37, "fog"),
             ("+++\ntitle", "title", 1, "header"),
         ] {
             assert!(LESSON.contains(from), "{from}");

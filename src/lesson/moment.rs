@@ -39,10 +39,8 @@ impl FromStr for Moment {
     type Err = MomentError;
 
     fn from_str(text: &str) -> Result<Self, Self::Err> {
-        let refused = |why: &dyn fmt::Display| MomentError {
-            text: text.to_owned(),
-            why: why.to_string(),
-        };
+        let refused =
+            |why: &dyn fmt::Display| MomentError { text: text.to_owned(), why: why.to_string() };
         match text {
             "start" => return Ok(Self::Start),
             "end" => return Ok(Self::End),
@@ -54,10 +52,7 @@ impl FromStr for Moment {
         // The parser of breakpoints knows the stages.
         let breakpoint: Breakpoint = stage.parse().map_err(|why| refused(&why))?;
         match breakpoint.at() {
-            BreakAt::Stage(name) => Ok(Self::After {
-                method: breakpoint.method(),
-                stage: name,
-            }),
+            BreakAt::Stage(name) => Ok(Self::After { method: breakpoint.method(), stage: name }),
             BreakAt::Crossing(_) => Err(refused(&"`after` needs a stage, not a comparison")),
         }
     }
@@ -68,10 +63,7 @@ impl fmt::Display for Moment {
         match self {
             Self::Start => f.write_str("start"),
             Self::End => f.write_str("end"),
-            Self::After {
-                method: Some(method),
-                stage,
-            } => write!(f, "after {method}.{stage}"),
+            Self::After { method: Some(method), stage } => write!(f, "after {method}.{stage}"),
             Self::After { stage, .. } => write!(f, "after {stage}"),
             Self::At(breakpoint) => breakpoint.fmt(f),
         }
@@ -84,9 +76,7 @@ impl Moment {
     /// The record of this moment, if the run has reached it. `None` for [`Self::End`], which is no record.
     pub fn find(&self, run: &Run) -> Option<usize> {
         let mut watch = Watch::new(self.clone());
-        run.records()
-            .iter()
-            .position(|record| watch.is_reached(record))
+        run.records().iter().position(|record| watch.is_reached(record))
     }
 }
 
@@ -104,10 +94,7 @@ impl Watch {
             Moment::At(breakpoint) => Some(breakpoint.clone()),
             _ => None,
         };
-        Self {
-            breakpoints: Breakpoints::new(breakpoint),
-            moment,
-        }
+        Self { breakpoints: Breakpoints::new(breakpoint), moment }
     }
 
     /// Whether this record is the moment. Must be called with every record.
@@ -131,14 +118,7 @@ mod tests {
 
     #[test]
     fn moments_are_read_as_they_are_written() {
-        for text in [
-            "start",
-            "end",
-            "after fb.match",
-            "after mi",
-            "trial >= 5",
-            "mi.color",
-        ] {
+        for text in ["start", "end", "after fb.match", "after mi", "trial >= 5", "mi.color"] {
             let moment: Moment = text.parse().expect(text);
             assert_eq!(moment.to_string(), text);
         }

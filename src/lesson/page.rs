@@ -53,10 +53,7 @@ pub enum Answer {
 impl Page {
     /// The whole page as Markdown: title, text, and the question without its answer.
     pub fn markdown(&self, number: usize, pages: usize) -> String {
-        let mut text = format!(
-            "# {}\n\n*Page {number} of {pages}*\n\n{}\n",
-            self.title, self.text
-        );
+        let mut text = format!("# {}\n\n*Page {number} of {pages}*\n\n{}\n", self.title, self.text);
         if let Some(question) = &self.question {
             text += &format!("\n**{}**\n\n", question.ask);
             if let Answer::Choice { choices, .. } = &question.answer {

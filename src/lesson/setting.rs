@@ -82,9 +82,7 @@ pub fn named_scenes(
 ) -> Vec<(String, Arc<dyn Scene>)> {
     let own = task.query_scene();
     let own = own.map(|name| (name.to_owned(), Arc::clone(queries)));
-    own.into_iter()
-        .chain([(task.scene.clone(), Arc::clone(references))])
-        .collect()
+    own.into_iter().chain([(task.scene.clone(), Arc::clone(references))]).collect()
 }
 
 impl Setting {
@@ -92,12 +90,8 @@ impl Setting {
     pub(super) fn of(fields: &Fields) -> Result<Self, (usize, SettingError)> {
         let mut all = toml::Table::new();
         for (key, value) in fields {
-            let one = Self(toml::Table::from_iter([(
-                key.clone(),
-                value.get_ref().clone(),
-            )]));
-            one.task_of("")
-                .map_err(|error| (value.span().start, error))?;
+            let one = Self(toml::Table::from_iter([(key.clone(), value.get_ref().clone())]));
+            one.task_of("").map_err(|error| (value.span().start, error))?;
             all.extend(one.0);
         }
         Ok(Self(all))
@@ -130,11 +124,7 @@ impl Setting {
         for assignment in assignments.transpose()?.unwrap_or_default() {
             params.assign(&assignment)?;
         }
-        Ok(Task {
-            protocol: Protocol::deserialize(protocol)?,
-            params,
-            ..Task::of(scene)
-        })
+        Ok(Task { protocol: Protocol::deserialize(protocol)?, params, ..Task::of(scene) })
     }
 
     fn text(&self, key: &'static str) -> Result<Option<&str>, SettingError> {

@@ -68,9 +68,8 @@ mod tests {
 
     #[test]
     fn the_share_falls_without_a_jump_as_the_point_goes_away() {
-        let shares: Vec<f64> = (0..400)
-            .map(|k| share_within(10.0, 7.0, 0.05 * f64::from(k)))
-            .collect();
+        let shares: Vec<f64> =
+            (0..400).map(|k| share_within(10.0, 7.0, 0.05 * f64::from(k))).collect();
         let steps = shares.windows(2).map(|pair| pair[0] - pair[1]);
         assert!(steps.clone().all(|step| (-1e-9..0.02).contains(&step)));
     }

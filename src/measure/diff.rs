@@ -63,10 +63,7 @@ pub struct RunComparison {
 
 impl RunComparison {
     /// The default tolerance: smaller changes of a pose's error are ignored.
-    pub const TOLERANCE: Tolerance = Tolerance {
-        translation_m: 0.1,
-        rotation_deg: 0.5,
-    };
+    pub const TOLERANCE: Tolerance = Tolerance { translation_m: 0.1, rotation_deg: 0.5 };
 
     /// Compares two runs. Changes of an error up to the tolerance are ignored.
     pub fn of(before: &[QueryResult], after: &[QueryResult], tolerance: &Tolerance) -> Self {
@@ -110,23 +107,17 @@ impl RunComparison {
     pub fn summary(&self) -> String {
         let counts = [Change::Broken, Change::Fixed, Change::Worse, Change::Better];
         let counts = counts.map(|change| format!("{} {}", self.count(change), change.name()));
-        let mut text = format!(
-            "{}, of {} results in both runs",
-            counts.join(", "),
-            self.common
-        );
+        let mut text = format!("{}, of {} results in both runs", counts.join(", "), self.common);
         if self.only_before + self.only_after > 0 {
             text += &format!(
                 " ({} only in the first, {} only in the second)",
                 self.only_before, self.only_after
             );
         }
-        let moved = self.migrations.iter().map(|one| {
-            format!(
-                "{} {} → {} {}",
-                one.method, one.before, one.after, one.count
-            )
-        });
+        let moved = self
+            .migrations
+            .iter()
+            .map(|one| format!("{} {} → {} {}", one.method, one.before, one.after, one.count));
         let moved: Vec<String> = moved.collect();
         if !moved.is_empty() {
             text += &format!(". Verdicts: {}", moved.join(", "));
@@ -268,11 +259,7 @@ mod tests {
             (Change::Better, "d"),
         ];
         assert_eq!(changes, expected);
-        let counts = (
-            comparison.common,
-            comparison.only_before,
-            comparison.only_after,
-        );
+        let counts = (comparison.common, comparison.only_before, comparison.only_after);
         assert_eq!(counts, (6, 1, 2));
         assert!(comparison.is_regression());
     }

@@ -160,14 +160,11 @@ fn tum(localized: &[Localized<'_>]) -> Result<String, ExportError> {
     let mut text = "# time x y z qx qy qz qw\n".to_owned();
     for Localized { item, pose } in localized {
         let Some(pose) = pose else { continue };
-        let time = item.time_s.ok_or_else(|| ExportError::NoTime {
-            scene: item.pair.query_scene.clone(),
-        })?;
+        let time = item
+            .time_s
+            .ok_or_else(|| ExportError::NoTime { scene: item.pair.query_scene.clone() })?;
         let (t, q) = (pose.translation.vector, pose.rotation.coords);
-        text += &format!(
-            "{time} {} {} {} {} {} {} {}\n",
-            t.x, t.y, t.z, q.x, q.y, q.z, q.w
-        );
+        text += &format!("{time} {} {} {} {} {} {} {}\n", t.x, t.y, t.z, q.x, q.y, q.z, q.w);
     }
     Ok(text)
 }

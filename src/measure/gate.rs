@@ -63,11 +63,7 @@ impl GateResult {
         table.name = "Gates".to_owned();
         for one in gates {
             let passed = if one.passed { "passed" } else { "failed" };
-            table.push([
-                format!("`{}`", one.gate),
-                passed.to_owned(),
-                one.found.clone(),
-            ]);
+            table.push([format!("`{}`", one.gate), passed.to_owned(), one.found.clone()]);
         }
         table
     }
@@ -88,10 +84,7 @@ impl FromStr for Gate {
         let (metric, method) = left.rsplit_once('@').ok_or_else(expected)?;
         let limit: f64 = right.parse().map_err(|_| expected())?;
         let method = Method::called(method).map_err(|_| expected())?;
-        let is_unordered = matches!(
-            relation,
-            Relation::Is | Relation::IsNot | Relation::Contains
-        );
+        let is_unordered = matches!(relation, Relation::Is | Relation::IsNot | Relation::Contains);
         if is_unordered || !limit.is_finite() {
             return Err(expected());
         }
@@ -146,11 +139,7 @@ impl Gate {
     }
 
     fn result(&self, passed: bool, found: String) -> GateResult {
-        GateResult {
-            gate: self.text.clone(),
-            passed,
-            found,
-        }
+        GateResult { gate: self.text.clone(), passed, found }
     }
 
     fn value(&self, measures: &Measures) -> Option<f64> {

@@ -58,12 +58,8 @@ impl KnownFailures {
         let text = std::fs::read_to_string(path).map_err(FolderError::io(path))?;
         let mut lines = Vec::new();
         for (index, line) in text.lines().enumerate() {
-            let words: Vec<&str> = line
-                .split('#')
-                .next()
-                .unwrap_or_default()
-                .split_whitespace()
-                .collect();
+            let words: Vec<&str> =
+                line.split('#').next().unwrap_or_default().split_whitespace().collect();
             let error = |message: String| FolderError::Damaged {
                 path: path.to_owned(),
                 line: index + 1,
@@ -90,10 +86,7 @@ impl KnownFailures {
                 },
             });
         }
-        Ok(Self {
-            path: path.to_owned(),
-            lines,
-        })
+        Ok(Self { path: path.to_owned(), lines })
     }
 
     /// Whether the result is a known failure.
@@ -105,18 +98,11 @@ impl KnownFailures {
     pub fn report(&self, rows: &[QueryResult]) -> KnownReport {
         let fails = |row: &&QueryResult| is_wrong(row);
         let known = |row: &&QueryResult| self.has(row);
-        let mut report = KnownReport {
-            still: rows.iter().filter(known).count(),
-            ..KnownReport::default()
-        };
+        let mut report =
+            KnownReport { still: rows.iter().filter(known).count(), ..KnownReport::default() };
         for line in &self.lines {
             let of_line: Vec<&QueryResult> = rows.iter().filter(|row| line.is_about(row)).collect();
-            let KnownFailure {
-                number,
-                query,
-                method,
-                code,
-            } = line;
+            let KnownFailure { number, query, method, code } = line;
             let place = format!("{}:{number}", self.path.display());
             if !of_line.is_empty() && !of_line.iter().any(&fails) {
                 let was = code.map_or(String::new(), |code| format!(" ({code})"));
@@ -172,10 +158,7 @@ mod tests {
     }
 
     fn with_code(row: QueryResult, code: &str) -> QueryResult {
-        QueryResult {
-            diagnosis: vec![finding(code.parse().expect("a code"))],
-            ..row
-        }
+        QueryResult { diagnosis: vec![finding(code.parse().expect("a code"))], ..row }
     }
 
     #[test]
@@ -194,10 +177,7 @@ mod tests {
     #[test]
     fn what_is_right_now_and_what_fails_otherwise_is_said() {
         let known = read("70 mi D3\n71 fb\n72 fb\n").expect("a list");
-        let rows = [
-            with_code(row("70", "mi", None), "D2"),
-            row("71", "fb", Some(0.1)),
-        ];
+        let rows = [with_code(row("70", "mi", None), "D2"), row("71", "fb", Some(0.1))];
         let report = known.report(&rows);
         assert_eq!(report.still, 0);
         assert!(report.fixed[0].starts_with("71 fb no longer fails; remove "));

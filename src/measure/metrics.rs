@@ -271,9 +271,7 @@ fn measure_group(group: &Group, rows: &[&QueryResult], failure_radius_m: f64) ->
         let confidences = rows.iter().filter_map(|row| row.confidence.as_ref());
         let confidences: Vec<f64> = confidences.map(|one| one.probability).collect();
         // A pose without an error means that the truth is unknown.
-        let has_truth = rows
-            .iter()
-            .all(|row| row.error.is_some() || row.status == Status::Failed);
+        let has_truth = rows.iter().all(|row| row.error.is_some() || row.status == Status::Failed);
         let error = |row: &&QueryResult| match (row.error, success(row)) {
             (Some(error), true) => (error.translation_m, error.rotation_deg),
             _ => (f64::INFINITY, f64::INFINITY),
@@ -343,11 +341,7 @@ pub(super) mod tests {
 
     /// A verdict without its words.
     pub fn finding(code: Code) -> Diagnosis {
-        Diagnosis {
-            code,
-            text: String::new(),
-            evidence: json!({}),
-        }
+        Diagnosis { code, text: String::new(), evidence: json!({}) }
     }
 
     /// The cost of a direct method.
@@ -398,11 +392,8 @@ pub(super) mod tests {
 
     #[test]
     fn minima_on_the_rim_and_queries_without_a_reference_are_counted_apart() {
-        let mut rows = vec![
-            row("a", "mi", Some(1.0)),
-            row("b", "mi", Some(3.0)),
-            row("c", "mi", None),
-        ];
+        let mut rows =
+            vec![row("a", "mi", Some(1.0)), row("b", "mi", Some(3.0)), row("c", "mi", None)];
         rows[1].cost = Some(cost(1.0, None, true));
         rows[2].references.clear();
         let measures = &measure(&rows, 10.0)[0];

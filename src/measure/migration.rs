@@ -80,13 +80,7 @@ mod tests {
             (Method::MI, "ok", "ok", 1, false),
         ];
         let expected = expected.map(|(method, before, after, count, is_change)| {
-            (
-                method,
-                before.to_owned(),
-                after.to_owned(),
-                count,
-                is_change,
-            )
+            (method, before.to_owned(), after.to_owned(), count, is_change)
         });
         assert_eq!(told, expected);
     }

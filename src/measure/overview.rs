@@ -47,10 +47,7 @@ impl Overview {
             let name = label(result);
             let known = bars.iter().position(|bar| bar.name == name);
             let at = known.unwrap_or_else(|| {
-                bars.push(Bar {
-                    name,
-                    counts: [0; Grade::ALL.len()],
-                });
+                bars.push(Bar { name, counts: [0; Grade::ALL.len()] });
                 bars.len() - 1
             });
             let place = Grade::ALL.iter().position(|grade| *grade == result.grade);
@@ -61,11 +58,7 @@ impl Overview {
         }
         // A stable sort: causes that are as frequent stay in the order in which they occur.
         causes.sort_by_key(|(_, times)| std::cmp::Reverse(*times));
-        Self {
-            headline: headline(results, &bars),
-            bars,
-            causes,
-        }
+        Self { headline: headline(results, &bars), bars, causes }
     }
 }
 
@@ -86,15 +79,10 @@ fn count(causes: &mut Vec<(Code, usize)>, result: &QueryResult) {
 }
 
 fn headline(results: &[&QueryResult], bars: &[Bar]) -> String {
-    let is_measured = results
-        .iter()
-        .any(|result| matches!(result.grade, Grade::Right | Grade::Wrong));
+    let is_measured =
+        results.iter().any(|result| matches!(result.grade, Grade::Right | Grade::Wrong));
     let worth = |bar: &Bar| {
-        if is_measured {
-            bar.count(Grade::Right)
-        } else {
-            bar.total() - bar.count(Grade::NoPose)
-        }
+        if is_measured { bar.count(Grade::Right) } else { bar.total() - bar.count(Grade::NoPose) }
     };
     // Of equal ones the first.
     let Some(best) = bars.iter().rev().max_by_key(|bar| worth(bar)) else {
@@ -115,10 +103,8 @@ fn headline(results: &[&QueryResult], bars: &[Bar]) -> String {
     // Where none is right, all failures count.
     let is_counted = |result: &QueryResult| good == 0 || label(result) == *name;
     let whose = if good == 0 { "the" } else { "its" };
-    let failed: Vec<&&QueryResult> = results
-        .iter()
-        .filter(|result| is_counted(result) && result.grade.is_failure())
-        .collect();
+    let failed: Vec<&&QueryResult> =
+        results.iter().filter(|result| is_counted(result) && result.grade.is_failure()).collect();
     let mut causes = Vec::new();
     failed.iter().for_each(|result| count(&mut causes, result));
     if let Some((code, times)) = causes.iter().rev().max_by_key(|(_, times)| *times) {
@@ -129,15 +115,9 @@ fn headline(results: &[&QueryResult], bars: &[Bar]) -> String {
         );
     }
     let mut mends: BTreeMap<String, usize> = BTreeMap::new();
-    let explained = failed
-        .iter()
-        .filter_map(|result| result.explanation.as_ref());
+    let explained = failed.iter().filter_map(|result| result.explanation.as_ref());
     for helped in explained.flat_map(|explanation| &explanation.helped) {
-        let args = helped
-            .args
-            .iter()
-            .map(String::as_str)
-            .filter(|arg| *arg != "--set");
+        let args = helped.args.iter().map(String::as_str).filter(|arg| *arg != "--set");
         *mends.entry(args.collect::<Vec<_>>().join(" ")).or_default() += 1;
     }
     if let Some((args, times)) = mends.iter().rev().max_by_key(|(_, times)| **times) {

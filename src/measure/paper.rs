@@ -44,9 +44,7 @@ pub fn figure(tables: &[u8], group: &Group, method: &str, measure: &str) -> Opti
     tables.iter().find_map(|number| {
         let number = number.to_string();
         let mut figures = ALL.iter().filter(|figure| figure.fields[0] == number);
-        figures
-            .find(|figure| is_its(&figure.fields))
-            .map(|figure| figure.fields[8])
+        figures.find(|figure| is_its(&figure.fields)).map(|figure| figure.fields[8])
     })
 }
 
@@ -56,21 +54,14 @@ pub fn scene(name: &str) -> Option<[&'static str; 3]> {
     let find = |measure| {
         let of_scene = |figure: &&Figure| figure.fields[0] <= "2" && figure.fields[1] == name;
         let mut figures = ALL.iter().filter(of_scene);
-        figures
-            .find(|figure| figure.fields[7] == measure)
-            .map(|figure| figure.fields[8])
+        figures.find(|figure| figure.fields[7] == measure).map(|figure| figure.fields[8])
     };
     Some([find("images")?, find("length_km")?, find("spacing_m")?])
 }
 
 /// The paper's table 1 or 2.
 pub fn scenes(number: u8) -> Table {
-    let header = [
-        "scene",
-        "images",
-        "length (km)",
-        "mean distance between images (m)",
-    ];
+    let header = ["scene", "images", "length (km)", "mean distance between images (m)"];
     let mut table = Table::new(format!("scenes-{number}"), "Scenes of the paper", header);
     let number = number.to_string();
     let of_table = ALL.iter().filter(|figure| figure.fields[0] == number);
@@ -91,10 +82,7 @@ mod tests {
         Group {
             scene: scene.to_owned(),
             query_scene: queries.map(str::to_owned),
-            setting: Some(Setting {
-                radius_m: setting.0,
-                references: setting.1,
-            }),
+            setting: Some(Setting { radius_m: setting.0, references: setting.1 }),
             fusion: fusion.parse().ok(),
         }
     }

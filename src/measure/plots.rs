@@ -57,20 +57,14 @@ impl Plot {
                 let chart = success("Success rate".to_owned(), "scenes", &all, brief_scenes);
                 chart.into_iter().collect()
             }
-            _ => pairs(&run.results)
-                .iter()
-                .flat_map(|pair| self.of_pair(run, pair))
-                .collect(),
+            _ => pairs(&run.results).iter().flat_map(|pair| self.of_pair(run, pair)).collect(),
         }
     }
 
     fn of_pair(self, run: &RunResults, pair: &str) -> Vec<Chart> {
         let measures = run.measures.iter().filter(|one| one.group.scenes() == pair);
         let measures: Vec<&Measures> = measures.collect();
-        let results = run
-            .results
-            .iter()
-            .filter(|one| Group::of(one).scenes() == pair);
+        let results = run.results.iter().filter(|one| Group::of(one).scenes() == pair);
         let results: Vec<&QueryResult> = results.collect();
         let mut methods: Vec<Method> = Vec::new();
         for one in &measures {
@@ -80,9 +74,7 @@ impl Plot {
         }
         let titled = |what: &str| format!("{what}: {pair}");
         let of_costs = |what, axis, value: fn(&CostReport) -> Option<f64>| {
-            lines(titled(what), axis, &methods, |method| {
-                at_least(costs(&results, method, value))
-            })
+            lines(titled(what), axis, &methods, |method| at_least(costs(&results, method, value)))
         };
         match self {
             Self::Errors | Self::Verdicts => Vec::new(),
@@ -99,11 +91,7 @@ impl Plot {
             Self::Causes => {
                 let of_method = methods.iter().filter_map(|&method| {
                     let title = format!("{} over the distance of the reference", method.label());
-                    causes(
-                        titled(&format!("Causes of failures of {title}")),
-                        method,
-                        &results,
-                    )
+                    causes(titled(&format!("Causes of failures of {title}")), method, &results)
                 });
                 of_method.collect()
             }
@@ -133,9 +121,7 @@ fn pairs(results: &[QueryResult]) -> Vec<String> {
 
 fn legend(methods: impl IntoIterator<Item = Method>) -> Vec<(String, palette::Rgb)> {
     let entries = methods.into_iter();
-    entries
-        .map(|method| (method.label(), palette::method(method)))
-        .collect()
+    entries.map(|method| (method.label(), palette::method(method))).collect()
 }
 
 /// One line per method, in per cent of the queries. Methods without points are left out.
@@ -171,24 +157,13 @@ pub(super) fn curves(
     let marks = lines.into_iter().map(|(method, points)| {
         Mark::new(Shape::Line(points), palette::method(method)).titled(method.label())
     });
-    Some(Chart {
-        title,
-        x: Axis::linear(x_axis, least, most),
-        y,
-        marks: marks.collect(),
-        legend,
-    })
+    Some(Chart { title, x: Axis::linear(x_axis, least, most), y, marks: marks.collect(), legend })
 }
 
 /// Steps over the error, for the last group only: the largest radius, or the most references.
 fn recall(method: Method, measures: &[&Measures]) -> Vec<(f64, f64)> {
-    let longest = measures
-        .iter()
-        .filter_map(|one| one.errors.as_ref())
-        .flatten();
-    let finite = longest
-        .map(|error| error.0)
-        .filter(|error| error.is_finite());
+    let longest = measures.iter().filter_map(|one| one.errors.as_ref()).flatten();
+    let finite = longest.map(|error| error.0).filter(|error| error.is_finite());
     let end = finite.fold(0.0, f64::max);
     let last = measures.iter().rfind(|one| one.method == method);
     let Some(errors) = last.and_then(|one| one.errors.as_ref()) else {
@@ -215,9 +190,7 @@ fn costs(
     let of_method = results.iter().filter(|result| result.method == method);
     let costs = of_method.filter_map(|result| result.cost.as_ref());
     let known = costs.filter(|cost| cost.basin_m.is_some());
-    known
-        .map(|cost| value(cost).unwrap_or(f64::NEG_INFINITY))
-        .collect()
+    known.map(|cost| value(cost).unwrap_or(f64::NEG_INFINITY)).collect()
 }
 
 /// The share of the values that are at least x, in steps in ascending order.
@@ -247,13 +220,7 @@ fn setting(one: &Measures) -> String {
 
 /// Short names of the scenes: `night` for `street:night`.
 fn brief_scenes(one: &Measures) -> String {
-    let brief = |scene: &str| {
-        scene
-            .rsplit(['/', ':'])
-            .next()
-            .unwrap_or_default()
-            .to_owned()
-    };
+    let brief = |scene: &str| scene.rsplit(['/', ':']).next().unwrap_or_default().to_owned();
     let scene = brief(&one.group.scene);
     match &one.group.query_scene {
         Some(queries) => format!("{} in {scene}", brief(queries)),
@@ -269,11 +236,7 @@ fn success(
     measures: &[&Measures],
     name: fn(&Measures) -> String,
 ) -> Option<Chart> {
-    let is_shown = |one: &&&Measures| {
-        one.group
-            .fusion
-            .is_none_or(|fusion| fusion.name == "r-wavg")
-    };
+    let is_shown = |one: &&&Measures| one.group.fusion.is_none_or(|fusion| fusion.name == "r-wavg");
     let mut groups: Vec<(String, Vec<&Measures>)> = Vec::new();
     for one in measures.iter().filter(is_shown) {
         let name = name(one);
@@ -321,10 +284,7 @@ struct Bin {
 /// is known or there is no failure.
 fn causes(title: String, method: Method, results: &[&QueryResult]) -> Option<Chart> {
     let (width_m, bins) = binned(method, results)?;
-    let mut codes: Vec<Code> = bins
-        .iter()
-        .flat_map(|bin| bin.verdicts.keys().copied())
-        .collect();
+    let mut codes: Vec<Code> = bins.iter().flat_map(|bin| bin.verdicts.keys().copied()).collect();
     codes.sort_unstable();
     codes.dedup();
     let mut marks = Vec::new();
@@ -344,11 +304,7 @@ fn causes(title: String, method: Method, results: &[&QueryResult]) -> Option<Cha
                 bin.queries,
             ));
             if top - bottom >= LABELLED_FROM {
-                marks.push(Mark::words(
-                    code.name(),
-                    (middle, (bottom + top) / 2.0),
-                    (0.0, 4.0),
-                ));
+                marks.push(Mark::words(code.name(), (middle, (bottom + top) / 2.0), (0.0, 4.0)));
             }
             bottom = top;
         }
@@ -378,10 +334,7 @@ fn verdict(
     queries: usize,
 ) -> Option<Mark> {
     let share = 100.0 * count as f64 / queries.max(1) as f64;
-    let title = format!(
-        "{code} {}: {count} of {queries} queries ({share:.0} %)",
-        code.title()
-    );
+    let title = format!("{code} {}: {count} of {queries} queries ({share:.0} %)", code.title());
     let bar = Mark::new(Shape::Bar { from, to }, palette::verdict(rank));
     (count > 0).then(|| bar.titled(title))
 }
@@ -430,10 +383,7 @@ fn errors(results: &[QueryResult]) -> Option<Chart> {
     methods.sort_unstable();
     methods.dedup();
     let marks = known.iter().map(|(start, error, number, result)| {
-        let dot = Shape::Dot {
-            at: (*start, error.unwrap_or(top)),
-            filled: error.is_some(),
-        };
+        let dot = Shape::Dot { at: (*start, error.unwrap_or(top)), filled: error.is_some() };
         Mark {
             link: Some(format!("#r{number}")),
             ..Mark::new(dot, palette::method(result.method)).titled(result.headline())
@@ -465,11 +415,7 @@ fn verdicts(measures: &[Measures]) -> Option<Chart> {
             let ends = ((from, low + 0.08), (to, low + 0.58));
             marks.extend(verdict(rank, code, ends.0, ends.1, count, one.queries));
             if to - from >= LABELLED_FROM {
-                marks.push(Mark::words(
-                    code.name(),
-                    ((from + to) / 2.0, low + 0.33),
-                    (0.0, 4.0),
-                ));
+                marks.push(Mark::words(code.name(), ((from + to) / 2.0, low + 0.33), (0.0, 4.0)));
             }
             from = to;
         }
@@ -503,14 +449,7 @@ mod tests {
         ];
         let measures = measure(&rows, 10.0);
         let measures: Vec<&Measures> = measures.iter().collect();
-        let fb = [
-            (0.0, 0.0),
-            (1.0, 0.0),
-            (1.0, 25.0),
-            (3.0, 25.0),
-            (3.0, 50.0),
-            (3.0, 50.0),
-        ];
+        let fb = [(0.0, 0.0), (1.0, 0.0), (1.0, 25.0), (3.0, 25.0), (3.0, 50.0), (3.0, 50.0)];
         assert_eq!(recall(Method::FB, &measures), fb);
         let mi = [(0.0, 0.0), (2.0, 0.0), (2.0, 100.0), (3.0, 100.0)];
         assert_eq!(recall(Method::MI, &measures), mi);
@@ -518,14 +457,7 @@ mod tests {
 
     #[test]
     fn a_curve_falls_from_all_that_have_a_value_to_none() {
-        let steps = [
-            (1.0, 75.0),
-            (1.0, 50.0),
-            (2.0, 50.0),
-            (2.0, 25.0),
-            (3.0, 25.0),
-            (3.0, 0.0),
-        ];
+        let steps = [(1.0, 75.0), (1.0, 50.0), (2.0, 50.0), (2.0, 25.0), (3.0, 25.0), (3.0, 0.0)];
         assert_eq!(at_least(vec![3.0, 1.0, f64::NEG_INFINITY, 2.0]), steps);
         assert!(at_least(Vec::new()).is_empty());
     }

@@ -112,11 +112,9 @@ pub fn read_gate_results(folder: &Path) -> Result<Vec<GateResult>, FolderError> 
     let summary: Result<GatesOfSummary, _> = serde_json::from_str(&text);
     match summary {
         Ok(summary) => Ok(summary.gates),
-        Err(error) => Err(FolderError::Damaged {
-            path,
-            line: error.line(),
-            message: json_message(&error),
-        }),
+        Err(error) => {
+            Err(FolderError::Damaged { path, line: error.line(), message: json_message(&error) })
+        }
     }
 }
 
@@ -155,11 +153,7 @@ pub fn write_report(
     let path = folder.join("junit.xml");
     let xml = xml.map_err(|error| FolderError::io(&path)(std::io::Error::other(error)))?;
     write(&path, xml.as_bytes())?;
-    let results = RunResults {
-        results: rows,
-        measures,
-        failure_radius_m: run.failure_radius_m(),
-    };
+    let results = RunResults { results: rows, measures, failure_radius_m: run.failure_radius_m() };
     Ok(Report {
         tables: tables(&results, run.protocol.preset.map(|one| one.name())),
         measures: results.measures,

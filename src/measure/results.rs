@@ -20,11 +20,7 @@ pub struct RunResults {
 impl RunResults {
     /// Measures results.
     pub fn of(results: Vec<QueryResult>, failure_radius_m: f64) -> Self {
-        Self {
-            measures: measure(&results, failure_radius_m),
-            results,
-            failure_radius_m,
-        }
+        Self { measures: measure(&results, failure_radius_m), results, failure_radius_m }
     }
 
     /// Reads and measures the results of a run folder.

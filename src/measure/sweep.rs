@@ -47,12 +47,8 @@ pub fn write_sweep(folder: &Path, sweep: &Sweep, runs: &[SweptRun]) -> Result<Ta
 type Curve = (&'static str, &'static str, fn(&Measures) -> Option<f64>);
 
 const CURVES: [Curve; 2] = [
-    ("success", "success rate (%)", |one| {
-        Some(100.0 * one.success_rate)
-    }),
-    ("median", "median error of successes (m)", |one| {
-        one.of_successes.median_m
-    }),
+    ("success", "success rate (%)", |one| Some(100.0 * one.success_rate)),
+    ("median", "median error of successes (m)", |one| one.of_successes.median_m),
 ];
 
 /// The groups of all runs, in the order of their first figures.

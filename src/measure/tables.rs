@@ -82,9 +82,7 @@ pub fn tables(run: &RunResults, preset: Option<&str>) -> Vec<Table> {
     let mut tables = TableName::Summary.of(run);
     tables.extend(TableName::Verdicts.of(run));
     if preset.is_some() {
-        tables.extend(shaped(&run.measures, |shape| {
-            shape.preset.as_deref() == preset
-        }));
+        tables.extend(shaped(&run.measures, |shape| shape.preset.as_deref() == preset));
     }
     if preset == Some("large") {
         tables.extend(advantage(&run.measures));
@@ -191,15 +189,9 @@ impl Dimension {
             Self::References => group.scene.clone(),
             Self::Queries => group.query_scene.as_ref().unwrap_or(&group.scene).clone(),
             Self::Method => one.method.label(),
-            Self::Radius => group
-                .setting
-                .map_or(String::new(), |one| one.radius_m.to_string()),
-            Self::Count => group
-                .setting
-                .map_or(String::new(), |one| one.references.to_string()),
-            Self::Fusion => group
-                .fusion
-                .map_or(String::new(), |fusion| fusion.to_string()),
+            Self::Radius => group.setting.map_or(String::new(), |one| one.radius_m.to_string()),
+            Self::Count => group.setting.map_or(String::new(), |one| one.references.to_string()),
+            Self::Fusion => group.fusion.map_or(String::new(), |fusion| fusion.to_string()),
         }
     }
 }
@@ -228,11 +220,7 @@ fn shaped(measures: &[Measures], is_wanted: impl Fn(&Shape) -> bool) -> Vec<Tabl
     let all: Vec<&Measures> = measures.iter().collect();
     let mut tables = Vec::new();
     for shape in shapes.table.iter().filter(|shape| is_wanted(shape)) {
-        let pairs = if shape.each {
-            keys(&all, &[Dimension::Pair])
-        } else {
-            vec![Vec::new()]
-        };
+        let pairs = if shape.each { keys(&all, &[Dimension::Pair]) } else { vec![Vec::new()] };
         for pair in pairs {
             let mut of_pair = all.clone();
             of_pair.retain(|one| pair.is_empty() || pair[0] == one.group.scenes());
@@ -256,16 +244,9 @@ fn keys(measures: &[&Measures], dimensions: &[Dimension]) -> Vec<Vec<String>> {
     let mut seen: Vec<Vec<String>> = vec![Vec::new(); dimensions.len()];
     for one in measures {
         let mut rank = Vec::new();
-        let key: Vec<String> = dimensions
-            .iter()
-            .map(|dimension| dimension.of(one))
-            .collect();
+        let key: Vec<String> = dimensions.iter().map(|dimension| dimension.of(one)).collect();
         for (value, seen) in key.iter().zip(&mut seen) {
-            rank.push(
-                seen.iter()
-                    .position(|known| known == value)
-                    .unwrap_or(seen.len()),
-            );
+            rank.push(seen.iter().position(|known| known == value).unwrap_or(seen.len()));
             if rank.last() == Some(&seen.len()) {
                 seen.push(value.clone());
             }
@@ -351,11 +332,7 @@ impl<'a> Filling<'a> {
             label: "paper",
             cells: self.cells(row, figures, Self::papers),
         });
-        let ours = Line {
-            names,
-            label,
-            cells: self.cells(row, figures, Self::ours),
-        };
+        let ours = Line { names, label, cells: self.cells(row, figures, Self::ours) };
         let papers = papers.filter(|line| line.cells.iter().any(Option::is_some));
         [ours].into_iter().chain(papers)
     }
@@ -378,35 +355,22 @@ impl<'a> Filling<'a> {
         }
         let mut header: Vec<String> = down.iter().map(|one| one.head().to_owned()).collect();
         for column in self.columns.iter().map(|column| column.join(" ")) {
-            header.extend(
-                names
-                    .iter()
-                    .map(|name| match (column.as_str(), names.len()) {
-                        ("", _) => self.head(name),
-                        (_, 1) => column.clone(),
-                        _ => format!("{column}: {}", self.head(name)),
-                    }),
-            );
+            header.extend(names.iter().map(|name| match (column.as_str(), names.len()) {
+                ("", _) => self.head(name),
+                (_, 1) => column.clone(),
+                _ => format!("{column}: {}", self.head(name)),
+            }));
         }
         let mut has_papers = lines.iter().any(|line| line.label == "paper");
         if self.shape.beside == Beside::Behind {
-            let has_one = |name: &&String| {
-                self.figures
-                    .get(*name)
-                    .is_some_and(|one| one.paper.is_some())
-            };
+            let has_one =
+                |name: &&String| self.figures.get(*name).is_some_and(|one| one.paper.is_some());
             let known: Vec<String> = names.iter().filter(has_one).cloned().collect();
-            let behind = rows
-                .iter()
-                .map(|row| self.cells(Some(row), &known, Self::papers));
+            let behind = rows.iter().map(|row| self.cells(Some(row), &known, Self::papers));
             let behind: Vec<Vec<Option<String>>> = behind.collect();
             has_papers = behind.iter().flatten().any(Option::is_some);
             if has_papers {
-                header.extend(
-                    known
-                        .iter()
-                        .map(|name| format!("{} (paper)", self.head(name))),
-                );
+                header.extend(known.iter().map(|name| format!("{} (paper)", self.head(name))));
                 for (line, behind) in lines.iter_mut().zip(behind) {
                     line.cells.extend(behind);
                 }
@@ -423,18 +387,11 @@ impl<'a> Filling<'a> {
         }
         let mut table = Table::new(name, caption, header);
         table.shared = down.len() - 1;
-        for Line {
-            mut names,
-            label,
-            cells,
-        } in lines
-        {
+        for Line { mut names, label, cells } in lines {
             if let (Some(last), false) = (names.last_mut(), label.is_empty()) {
                 *last = format!("{last} ({label})").trim_start().to_owned();
             }
-            let cells = cells
-                .into_iter()
-                .map(|cell| cell.unwrap_or(NOTHING.to_owned()));
+            let cells = cells.into_iter().map(|cell| cell.unwrap_or(NOTHING.to_owned()));
             table.push(names.into_iter().chain(cells));
         }
         Some(table)
@@ -448,24 +405,15 @@ fn verdicts(measures: &[Measures]) -> Option<Table> {
     if codes.is_empty() {
         return None;
     }
-    let meanings: Vec<String> = codes
-        .iter()
-        .map(|code| format!("{code} {}", code.title()))
-        .collect();
-    let caption = format!(
-        "Shares of the queries by primary verdict: {}.",
-        meanings.join("; ")
-    );
+    let meanings: Vec<String> =
+        codes.iter().map(|code| format!("{code} {}", code.title())).collect();
+    let caption = format!("Shares of the queries by primary verdict: {}.", meanings.join("; "));
     let head = ["", "method", "queries"].map(str::to_owned);
     let columns = codes.iter().map(|code| format!("{code} (%)"));
     let mut table = Table::new("verdicts", caption, head.into_iter().chain(columns));
     table.shared = 1;
     for one in measures {
-        let head = [
-            one.group.to_string(),
-            one.method.label(),
-            one.queries.to_string(),
-        ];
+        let head = [one.group.to_string(), one.method.label(), one.queries.to_string()];
         let shares = codes.iter().map(|code| {
             let count = one.verdicts.get(code).copied().unwrap_or_default();
             format!("{:.1}", 100.0 * one.share(count))
@@ -481,10 +429,7 @@ fn advantage(measures: &[Measures]) -> Option<Table> {
     let header = ["HY over", "pairs of scenes", "points", "points (paper)"];
     let caption = "The hybrid's lead in success rate, in percentage points, averaged over the pairs of scenes";
     let mut table = Table::new("advantage", caption, header);
-    let hybrids: Vec<&Measures> = measures
-        .iter()
-        .filter(|one| one.method == Method::HY)
-        .collect();
+    let hybrids: Vec<&Measures> = measures.iter().filter(|one| one.method == Method::HY).collect();
     let mut others: Vec<Method> = measures.iter().map(|one| one.method).collect();
     others.sort_unstable();
     others.dedup();
@@ -507,12 +452,7 @@ fn advantage(measures: &[Measures]) -> Option<Table> {
             0 => NOTHING.to_owned(),
             count => format!("{:.1}", points.iter().sum::<f64>() / count as f64),
         };
-        table.push([
-            method.label(),
-            ours.len().to_string(),
-            mean(&ours),
-            mean(&papers),
-        ]);
+        table.push([method.label(), ours.len().to_string(), mean(&ours), mean(&papers)]);
     }
     (!hybrids.is_empty() && !table.rows.is_empty()).then_some(table)
 }
@@ -520,10 +460,7 @@ fn advantage(measures: &[Measures]) -> Option<Table> {
 /// A name that is safe as part of a file name.
 pub(super) fn slug(name: &str) -> String {
     let words = name.split(|c: char| !c.is_ascii_alphanumeric());
-    words
-        .filter(|word| !word.is_empty())
-        .collect::<Vec<_>>()
-        .join("-")
+    words.filter(|word| !word.is_empty()).collect::<Vec<_>>().join("-")
 }
 
 #[cfg(test)]

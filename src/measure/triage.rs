@@ -24,10 +24,7 @@ impl std::str::FromStr for Order {
     /// `error`, or `-error` for the greatest first.
     fn from_str(text: &str) -> Result<Self, UnknownWord> {
         let name = text.strip_prefix('-').unwrap_or(text);
-        Ok(Self {
-            field: Field::find(name)?,
-            descending: name != text,
-        })
+        Ok(Self { field: Field::find(name)?, descending: name != text })
     }
 }
 
@@ -38,14 +35,11 @@ pub fn select(
     order: Option<Order>,
 ) -> Vec<usize> {
     let is_met = |result: &QueryResult| condition.is_none_or(|one| one.is_met(result));
-    let mut chosen: Vec<usize> = (0..results.len())
-        .filter(|&index| is_met(results[index]))
-        .collect();
+    let mut chosen: Vec<usize> =
+        (0..results.len()).filter(|&index| is_met(results[index])).collect();
     if let Some(order) = order {
-        let mut keyed: Vec<(Value, usize)> = chosen
-            .into_iter()
-            .map(|index| (order.field.of(results[index]), index))
-            .collect();
+        let mut keyed: Vec<(Value, usize)> =
+            chosen.into_iter().map(|index| (order.field.of(results[index]), index)).collect();
         keyed.sort_by(|(a, _), (b, _)| a.compare(b, order.descending));
         chosen = keyed.into_iter().map(|(_, index)| index).collect();
     }

@@ -43,20 +43,12 @@ impl Place {
         if panel.is_plain {
             width = width.min(panel.picture.width() as f32);
         }
-        Self {
-            width,
-            height: width / aspect,
-            ..self
-        }
+        Self { width, height: width / aspect, ..self }
     }
 
     /// Without the title above.
     fn below_title(self) -> Self {
-        Self {
-            top: self.top + TITLE,
-            height: (self.height - TITLE).max(1.0),
-            ..self
-        }
+        Self { top: self.top + TITLE, height: (self.height - TITLE).max(1.0), ..self }
     }
 }
 
@@ -78,97 +70,53 @@ impl ProofPicture {
     }
 
     fn better(&self, width: f32, height: f32, worth: impl Fn(&[Place]) -> f32) -> Vec<Place> {
-        let all = Place {
-            left: 0.0,
-            top: 0.0,
-            width,
-            height,
-        };
+        let all = Place { left: 0.0, top: 0.0, width, height };
         let (below, beside) = (self.stacked(all), self.side_by_side(all));
-        if worth(&below) > worth(&beside) {
-            below
-        } else {
-            beside
-        }
+        if worth(&below) > worth(&beside) { below } else { beside }
     }
 
     fn side_by_side(&self, all: Place) -> Vec<Place> {
-        let share = if self.beside.is_empty() {
-            1.0
-        } else {
-            LARGE_SHARE
-        };
-        let left = Place {
-            width: (all.width - GAP) * share,
-            ..all
-        };
-        let strip = self
-            .below
-            .as_ref()
-            .map(|below| left.width / below.aspect() + TITLE + GAP);
+        let share = if self.beside.is_empty() { 1.0 } else { LARGE_SHARE };
+        let left = Place { width: (all.width - GAP) * share, ..all };
+        let strip = self.below.as_ref().map(|below| left.width / below.aspect() + TITLE + GAP);
         let strip = strip.unwrap_or(0.0).min(0.3 * all.height);
-        let large = Place {
-            height: all.height - strip,
-            ..left
-        };
+        let large = Place { height: all.height - strip, ..left };
         let large = large.below_title().fitted(&self.large);
         let mut places = vec![large];
         if let Some(below) = &self.below {
-            let place = Place {
-                top: large.top + large.height + GAP,
-                height: strip,
-                ..left
-            };
+            let place = Place { top: large.top + large.height + GAP, height: strip, ..left };
             places.push(place.below_title().fitted(below));
         }
         let beside_left = left.width + GAP;
-        let column = Place {
-            left: beside_left,
-            width: all.width - beside_left,
-            ..all
-        };
+        let column = Place { left: beside_left, width: all.width - beside_left, ..all };
         places.extend(column_of(&self.beside, column));
         places
     }
 
     fn stacked(&self, all: Place) -> Vec<Place> {
         let rows = self.below.iter().map(Panel::aspect);
-        let below_height: f32 = rows
-            .map(|aspect| (all.width / aspect).min(0.2 * all.height) + TITLE + GAP)
-            .sum();
+        let below_height: f32 =
+            rows.map(|aspect| (all.width / aspect).min(0.2 * all.height) + TITLE + GAP).sum();
         let count = self.beside.len().max(1) as f32;
         let cell = (all.width - GAP * (count - 1.0)) / count;
-        let tallest = self
-            .beside
-            .iter()
-            .map(|panel| cell / panel.aspect() + TITLE);
+        let tallest = self.beside.iter().map(|panel| cell / panel.aspect() + TITLE);
         // No small panel is higher than the large one.
         let half = (all.height - below_height - GAP) / 2.0;
         let row_height = tallest.fold(0.0, f32::max).min(half);
-        let large = Place {
-            height: (all.height - below_height - row_height - GAP).max(1.0),
-            ..all
-        };
+        let large =
+            Place { height: (all.height - below_height - row_height - GAP).max(1.0), ..all };
         let large = large.below_title().fitted(&self.large);
         let mut top = large.top + large.height + GAP;
         let mut places = vec![large];
         if let Some(below) = &self.below {
-            let place = Place {
-                top,
-                height: below_height - GAP,
-                ..all
-            };
+            let place = Place { top, height: below_height - GAP, ..all };
             let place = place.below_title().fitted(below);
             top = place.top + place.height + GAP;
             places.push(place);
         }
         for (at, panel) in self.beside.iter().enumerate() {
-            let place = Place {
-                left: at as f32 * (cell + GAP),
-                top,
-                width: cell,
-                height: row_height,
-            };
+            let place =
+                Place { left: at as f32 * (cell + GAP), top, width: cell, height: row_height };
             places.push(place.below_title().fitted(panel));
         }
         places
@@ -190,19 +138,13 @@ fn bottom(places: &[Place]) -> f32 {
 /// Panels below each other that share a height, each as wide as it may be.
 fn column_of(panels: &[Panel], column: Place) -> Vec<Place> {
     let gaps = GAP * panels.len().saturating_sub(1) as f32;
-    let wanted: f32 = panels
-        .iter()
-        .map(|panel| column.width / panel.aspect() + TITLE)
-        .sum();
+    let wanted: f32 = panels.iter().map(|panel| column.width / panel.aspect() + TITLE).sum();
     let shrink = ((column.height - gaps) / wanted.max(1.0)).min(1.0);
     let mut top = column.top;
     let mut places = Vec::new();
     for panel in panels {
-        let place = Place {
-            top,
-            height: (column.width / panel.aspect() + TITLE) * shrink,
-            ..column
-        };
+        let place =
+            Place { top, height: (column.width / panel.aspect() + TITLE) * shrink, ..column };
         top += place.height + GAP;
         places.push(place.below_title().fitted(panel));
     }
@@ -231,12 +173,8 @@ pub fn label_place(
         width,
         height,
     };
-    let mark = Place {
-        left: at[0] - MARK,
-        top: at[1] - MARK,
-        width: 2.0 * MARK,
-        height: 2.0 * MARK,
-    };
+    let mark =
+        Place { left: at[0] - MARK, top: at[1] - MARK, width: 2.0 * MARK, height: 2.0 * MARK };
     let is_free = |place: &Place| {
         let is_inside = place.top >= panel.top && place.top + height <= panel.top + panel.height;
         is_inside && !place.overlaps(&mark) && !taken.iter().any(|other| place.overlaps(other))

@@ -55,10 +55,7 @@ pub(super) fn cost_map(case: &ProofCase<'_>, overlay: MapOverlay) -> Option<Proo
         _ => {}
     }
     if beside.is_empty() {
-        beside.push(Panel::new(
-            "Query",
-            picture::photo(&case.problem.query.photo).into_rgb8(),
-        ));
+        beside.push(Panel::new("Query", picture::photo(&case.problem.query.photo).into_rgb8()));
     }
     for seen in result.iter().chain(&truth) {
         beside.push(view_panel(query, seen));
@@ -68,20 +65,14 @@ pub(super) fn cost_map(case: &ProofCase<'_>, overlay: MapOverlay) -> Option<Proo
     let below = below.filter(|_| overlay != MapOverlay::Reach || too_far_turned(case).is_none());
     let below = below.and_then(|(result, truth)| curve(case, estimator.as_ref(), result, truth));
     let coarse = case.all::<PhaseSearched>().map(|event| &event.surface);
-    let coarse = coarse
-        .rev()
-        .find(|surface| surface.lattice.phase == Phase::PositionCoarse);
+    let coarse = coarse.rev().find(|surface| surface.lattice.phase == Phase::PositionCoarse);
     let large = match coarse {
         Some(surface) => map(case, surface, overlay, result.as_ref(), truth.as_ref()),
         // Without a grid, the view from the result is what decided.
         None if beside.len() > 1 => beside.remove(1),
         None => return None,
     };
-    Some(ProofPicture {
-        large,
-        below,
-        beside,
-    })
+    Some(ProofPicture { large, below, beside })
 }
 
 /// The true place with the height, pitch and roll of the reference, as the search knows it, against the truth itself;
@@ -117,11 +108,7 @@ pub(super) fn freed_views(case: &ProofCase<'_>) -> Option<ProofPicture> {
         turned.z.to_degrees(),
     );
     let result = seen("result", pose).map(|result| view_panel(query, &result));
-    Some(ProofPicture {
-        large,
-        below: None,
-        beside: [frozen].into_iter().chain(result).collect(),
-    })
+    Some(ProofPicture { large, below: None, beside: [frozen].into_iter().chain(result).collect() })
 }
 
 /// The mean place of the covered pixels \[px\].
@@ -144,10 +131,7 @@ fn cut_out(panel: Panel, [x, y]: [f64; 2]) -> Panel {
     };
     let (left, top) = (corner(x, part[0], width), corner(y, part[1], height));
     let cut = image::imageops::crop_imm(panel.picture.as_ref(), left, top, part[0], part[1]);
-    Panel {
-        picture: std::sync::Arc::new(cut.to_image()),
-        ..panel
-    }
+    Panel { picture: std::sync::Arc::new(cut.to_image()), ..panel }
 }
 
 fn map(
@@ -162,10 +146,7 @@ fn map(
         MapOverlay::Coverage => coverage_map(surface),
         _ => {
             let mut panel = Panel::new(
-                format!(
-                    "Cost of each position, a cell is {} m, ahead is up",
-                    lattice.step
-                ),
+                format!("Cost of each position, a cell is {} m, ahead is up", lattice.step),
                 picture::surface(surface),
             );
             panel.scale = cost_scale(surface);
@@ -258,11 +239,7 @@ fn too_far_turned(case: &ProofCase<'_>) -> Option<f64> {
 fn near_truth(result: &QueryResult) -> Option<Offset> {
     let place = result.diagnosis.first()?.evidence.get("near_truth")?;
     let metres = |key: &str| place.get(key)?.as_f64();
-    Some(Offset {
-        right_m: metres("right_m")?,
-        forward_m: metres("forward_m")?,
-        yaw_rad: 0.0,
-    })
+    Some(Offset { right_m: metres("right_m")?, forward_m: metres("forward_m")?, yaw_rad: 0.0 })
 }
 
 /// Outlines the coarse cell at the truth. What its cost is, and its rank among all that may win.
@@ -295,21 +272,14 @@ fn outline_right_cell(
 fn cost_scale(surface: &ScoredLattice) -> Option<ColorScale> {
     let costs = || (0..surface.scores.len()).filter_map(|cell| surface.eligible_cost(cell));
     let (least, most) = (costs().reduce(f64::min)?, costs().reduce(f64::max)?);
-    Some(ColorScale {
-        dark: number(most),
-        bright: format!("{} (lowest cell)", number(least)),
-    })
+    Some(ColorScale { dark: number(most), bright: format!("{} (lowest cell)", number(least)) })
 }
 
 /// How much of the image each position covers.
 fn coverage_map(surface: &ScoredLattice) -> Panel {
     let lattice = &surface.lattice;
     let covered = |cell: usize| surface.scores[cell].map(|score| score.covered);
-    let most = (0..surface.scores.len())
-        .filter_map(covered)
-        .max()
-        .unwrap_or(1)
-        .max(1);
+    let most = (0..surface.scores.len()).filter_map(covered).max().unwrap_or(1).max(1);
     let cells = RgbImage::from_fn(lattice.columns as u32, lattice.rows as u32, |x, y| {
         let cell = (lattice.rows - 1 - y as usize) * lattice.columns + x as usize;
         Rgb(covered(cell).map_or(palette::NOTHING, |covered| {
@@ -317,16 +287,10 @@ fn coverage_map(surface: &ScoredLattice) -> Panel {
         }))
     });
     let mut panel = Panel::new(
-        format!(
-            "What each position covers, a cell is {} m, ahead is up",
-            lattice.step
-        ),
+        format!("What each position covers, a cell is {} m, ahead is up", lattice.step),
         cells,
     );
-    panel.scale = Some(ColorScale {
-        dark: "nothing".to_owned(),
-        bright: format!("{most} px"),
-    });
+    panel.scale = Some(ColorScale { dark: "nothing".to_owned(), bright: format!("{most} px") });
     panel
 }
 
@@ -370,10 +334,8 @@ fn histogram(seen: Option<&Seen>) -> Option<Panel> {
     let seen = seen?;
     match seen.comparison.explanation.as_ref()? {
         Explanation::JointHistogram(histogram) => {
-            let title = format!(
-                "Grey values at the {}: query upwards, map to the right",
-                seen.label
-            );
+            let title =
+                format!("Grey values at the {}: query upwards, map to the right", seen.label);
             let mut panel = Panel::new(title, picture::joint_histogram(histogram));
             panel.has_cells = true;
             Some(panel)
@@ -393,18 +355,11 @@ fn curve(
     let steps = BETWEEN as isize + 2 * BEYOND as isize;
     let share = |step: isize| (step - BEYOND as isize) as f64 / BETWEEN as f64;
     let poses: Vec<Pose> = (0..=steps)
-        .map(|step| {
-            case.problem
-                .reference_from_query(&between(&from, &to, share(step)))
-        })
+        .map(|step| case.problem.reference_from_query(&between(&from, &to, share(step))))
         .collect();
     let mut costs: Vec<Option<f64>> = Vec::new();
     estimator.with_scorer(case.problem, &mut |scorer| {
-        costs = scorer
-            .score(&poses)
-            .into_iter()
-            .map(|score| score.cost)
-            .collect();
+        costs = scorer.score(&poses).into_iter().map(|score| score.cost).collect();
     });
     let known = || costs.iter().flatten().copied();
     let (least, most) = (known().reduce(f64::min)?, known().reduce(f64::max)?);
@@ -414,9 +369,7 @@ fn curve(
         let share = (cost - least) / (most - least).max(f64::MIN_POSITIVE);
         height - 44.0 - (height - 72.0) * share as f32
     };
-    let length_m = (to.translation.vector - from.translation.vector)
-        .norm()
-        .max(f64::MIN_POSITIVE);
+    let length_m = (to.translation.vector - from.translation.vector).norm().max(f64::MIN_POSITIVE);
     let title =
         format!("Cost on the way from the result to the truth ({length_m:.2} m), lower is better");
     let mut panel = Panel::plain(title, CURVE.0, CURVE.1);
@@ -425,26 +378,15 @@ fn curve(
         let at = at_metres(metres);
         let (top, bottom) = (height - 36.0, height - 30.0);
         panel.line([0x90; 3], 1.0, [[at, top], [at, bottom]]);
-        panel.mark(
-            Thing::Words,
-            [at - 8.0, height - 16.0],
-            format!("{metres} m"),
-        );
+        panel.mark(Thing::Words, [at - 8.0, height - 16.0], format!("{metres} m"));
     }
-    let ends = [
-        (BEYOND, palette::grade(case.result.grade)),
-        (BEYOND + BETWEEN, palette::TRUTH),
-    ];
+    let ends = [(BEYOND, palette::grade(case.result.grade)), (BEYOND + BETWEEN, palette::TRUTH)];
     for (step, color) in ends {
         let at = x(step as f64);
         panel.line(color, 1.0, [[at, 12.0], [at, height - 33.0]]);
     }
     for cost in [least, most] {
-        panel.line(
-            [0x50; 3],
-            1.0,
-            [[x(0.0), y(cost)], [x(steps as f64), y(cost)]],
-        );
+        panel.line([0x50; 3], 1.0, [[x(0.0), y(cost)], [x(steps as f64), y(cost)]]);
         panel.mark(Thing::Words, [6.0, y(cost)], number(cost));
     }
     let mut piece: Vec<[f32; 2]> = Vec::new();
@@ -472,18 +414,15 @@ fn curve(
 
 /// Round distances from 0 up to this one \[m\], at most seven.
 pub(super) fn ticks(most_m: f64) -> Vec<f64> {
-    const STEPS_M: [f64; 15] = [
-        0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0,
-    ];
+    const STEPS_M: [f64; 15] =
+        [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0];
     let Some(step_m) = STEPS_M.into_iter().find(|step| most_m / step <= 6.0) else {
         return Vec::new();
     };
     let count = (most_m / step_m).floor() as u32;
     // In whole centimetres: 3 · 0.1 would read 0.30000000000000004.
     let round = |metres: f64| (metres * 100.0).round() / 100.0;
-    (0..=count)
-        .map(|step| round(f64::from(step) * step_m))
-        .collect()
+    (0..=count).map(|step| round(f64::from(step) * step_m)).collect()
 }
 
 /// A cost with three digits that count.

@@ -72,9 +72,7 @@ impl<'a> Matches<'a> {
         let matched = states.iter().enumerate().filter_map(|(at, &state)| {
             let own = lifted.and_then(|lifted| lifted.iter().find(|one| one.query == at));
             let decided = decisions.get(at).copied().flatten();
-            let other = own
-                .map(|one| one.reference)
-                .or(decided.map(|one| one.reference))?;
+            let other = own.map(|one| one.reference).or(decided.map(|one| one.reference))?;
             let keypoint = query.keypoints.get(at)?;
             let point = own.and_then(|one| one.point);
             let is_true = query_from_reference.zip(point).map(|(pose, point)| {
@@ -90,10 +88,7 @@ impl<'a> Matches<'a> {
                 is_true,
             })
         });
-        Some(Self {
-            states,
-            all: matched.collect(),
-        })
+        Some(Self { states, all: matched.collect() })
     }
 
     fn inliers(&self) -> impl Iterator<Item = &Matched<'a>> {
@@ -131,18 +126,10 @@ pub(super) fn matches(case: &ProofCase<'_>) -> Option<ProofPicture> {
     };
     let mut panel = Panel::new(title, canvas.into_rgb8());
     let kinds: [LineKind; 4] = [
-        (FAINT, 0.5, |one| {
-            one.point.is_some() && !one.is_inlier() && one.is_true != Some(true)
-        }),
-        (palette::TRUTH, 1.0, |one| {
-            one.is_true == Some(true) && !one.is_inlier()
-        }),
-        (palette::ESTIMATE, 1.5, |one| {
-            one.is_true == Some(false) && one.is_inlier()
-        }),
-        (palette::TRUTH, 2.0, |one| {
-            one.is_true != Some(false) && one.is_inlier()
-        }),
+        (FAINT, 0.5, |one| one.point.is_some() && !one.is_inlier() && one.is_true != Some(true)),
+        (palette::TRUTH, 1.0, |one| one.is_true == Some(true) && !one.is_inlier()),
+        (palette::ESTIMATE, 1.5, |one| one.is_true == Some(false) && one.is_inlier()),
+        (palette::TRUTH, 2.0, |one| one.is_true != Some(false) && one.is_inlier()),
     ];
     for (color, width, is_kind) in kinds {
         let of_kind: Vec<&Matched<'_>> = matches.all.iter().filter(|one| is_kind(one)).collect();
@@ -152,11 +139,7 @@ pub(super) fn matches(case: &ProofCase<'_>) -> Option<ProofPicture> {
             panel.line(color, width, [place(one.query), [x, y + top as f32]]);
         }
     }
-    Some(ProofPicture {
-        large: panel,
-        below: Some(funnel(&matches)),
-        beside: Vec::new(),
-    })
+    Some(ProofPicture { large: panel, below: Some(funnel(&matches)), beside: Vec::new() })
 }
 
 /// Both photos with their keypoints, where nothing was matched.
@@ -177,11 +160,7 @@ fn keypoints(case: &ProofCase<'_>) -> Option<ProofPicture> {
     }
     let [query, reference] = [counts[0]?, counts[1].unwrap_or(0)];
     panel.title = format!("Query above reference: {query} and {reference} keypoints");
-    Some(ProofPicture {
-        large: panel,
-        below: None,
-        beside: Vec::new(),
-    })
+    Some(ProofPicture { large: panel, below: None, beside: Vec::new() })
 }
 
 /// How many query features passed each step, side by side; what the truth says of them stands apart, in green.
@@ -213,11 +192,7 @@ fn funnel(matches: &Matches<'_>) -> Panel {
         let left = column * at as f32 + 6.0;
         // By the root: the last steps keep so few that they would have no length.
         let length = LONGEST * (count as f32 / most).sqrt();
-        panel.line(
-            color,
-            5.0,
-            [[left, TOP[2]], [left + length.max(1.0), TOP[2]]],
-        );
+        panel.line(color, 5.0, [[left, TOP[2]], [left + length.max(1.0), TOP[2]]]);
         panel.mark(Thing::Words, [left, TOP[0]], count.to_string());
         panel.mark(Thing::Words, [left, TOP[1]], name);
     }
@@ -252,12 +227,7 @@ pub(super) fn depth_patches(case: &ProofCase<'_>) -> Option<ProofPicture> {
         format!(
             "Depths of the cloud. Matches: {with_depth} {judged}, {missing} without a depth (white)"
         ),
-        cloud_picture(
-            &reference.photo,
-            &reference.intrinsics,
-            case,
-            &Pose::identity(),
-        ),
+        cloud_picture(&reference.photo, &reference.intrinsics, case, &Pose::identity()),
     );
     for one in &doubtful {
         let color = match one.point {
@@ -276,11 +246,7 @@ pub(super) fn depth_patches(case: &ProofCase<'_>) -> Option<ProofPicture> {
         };
         depth_patch(&large.picture, one, title)
     });
-    Some(ProofPicture {
-        beside: beside.collect(),
-        large,
-        below: Some(depth_legend()),
-    })
+    Some(ProofPicture { beside: beside.collect(), large, below: Some(depth_legend()) })
 }
 
 /// Where the reference's photo shows the points of its cloud \[px\].
@@ -306,9 +272,7 @@ impl ScanPixels {
 fn depth_patch(photo: &RgbImage, one: &Matched<'_>, title: String) -> Panel {
     let [x, y] = place(one.reference);
     let corner = |at: f32, length: u32| {
-        (at as u32)
-            .saturating_sub(PATCH / 2)
-            .min(length.saturating_sub(PATCH))
+        (at as u32).saturating_sub(PATCH / 2).min(length.saturating_sub(PATCH))
     };
     let (left, top) = (corner(x, photo.width()), corner(y, photo.height()));
     let patch = image::imageops::crop_imm(photo, left, top, PATCH, PATCH).to_image();
@@ -340,11 +304,7 @@ pub(super) fn inlier_spread(case: &ProofCase<'_>) -> Option<ProofPicture> {
         large.mark(Thing::Dot(palette::TRUTH), place(one.query), "");
     }
     let points: Vec<Point3<f64>> = matches.inliers().filter_map(|one| one.point).collect();
-    Some(ProofPicture {
-        large,
-        below: None,
-        beside: vec![from_above(case, &points)],
-    })
+    Some(ProofPicture { large, below: None, beside: vec![from_above(case, &points)] })
 }
 
 /// What the truth explains beside what the result explains.
@@ -353,38 +313,20 @@ pub(super) fn rival_inliers(case: &ProofCase<'_>) -> Option<ProofPicture> {
     let panel = |title: String, ones: &mut dyn Iterator<Item = &Matched<'_>>| {
         let mut panel = Panel::new(title, picture::photo(&case.problem.query.photo).into_rgb8());
         for one in ones {
-            let color = if one.is_true == Some(true) {
-                palette::TRUTH
-            } else {
-                palette::ESTIMATE
-            };
+            let color = if one.is_true == Some(true) { palette::TRUTH } else { palette::ESTIMATE };
             panel.mark(Thing::Dot(color), place(one.query), "");
         }
         panel
     };
     let (of_truth, of_result) = (matches.true_ones().count(), matches.inliers().count());
     let both = matches.inliers().filter(|one| one.is_true == Some(true));
-    let large = panel(
-        format!("The truth explains {of_truth} matches"),
-        &mut matches.true_ones(),
-    );
-    let what = if case.pose().is_some() {
-        "result"
-    } else {
-        "refused pose"
-    };
+    let large = panel(format!("The truth explains {of_truth} matches"), &mut matches.true_ones());
+    let what = if case.pose().is_some() { "result" } else { "refused pose" };
     let result = panel(
-        format!(
-            "The {what} explains {of_result} matches, {} of them true (green)",
-            both.count()
-        ),
+        format!("The {what} explains {of_result} matches, {} of them true (green)", both.count()),
         &mut matches.inliers(),
     );
-    Some(ProofPicture {
-        large,
-        below: None,
-        beside: vec![result],
-    })
+    Some(ProofPicture { large, below: None, beside: vec![result] })
 }
 
 /// The cloud on the reference's photo, and on the query's where its pose is known.
@@ -395,12 +337,7 @@ pub(super) fn cloud_on_photo(case: &ProofCase<'_>) -> Option<ProofPicture> {
     let (query, reference) = (&case.problem.query, &case.problem.reference);
     let large = Panel::new(
         "The cloud on the reference photo, coloured by depth",
-        cloud_picture(
-            &reference.photo,
-            &reference.intrinsics,
-            case,
-            &Pose::identity(),
-        ),
+        cloud_picture(&reference.photo, &reference.intrinsics, case, &Pose::identity()),
     );
     let on_query = |what: &str, query_from_reference: &Pose| {
         Panel::new(
@@ -408,12 +345,8 @@ pub(super) fn cloud_on_photo(case: &ProofCase<'_>) -> Option<ProofPicture> {
             cloud_picture(&query.photo, &query.intrinsics, case, query_from_reference),
         )
     };
-    let truth = case
-        .query_from_reference()
-        .map(|pose| on_query("truth", &pose));
-    let found = case
-        .pose()
-        .map(|pose| case.problem.reference_from_query(&pose).inverse());
+    let truth = case.query_from_reference().map(|pose| on_query("truth", &pose));
+    let found = case.pose().map(|pose| case.problem.reference_from_query(&pose).inverse());
     let result = found.map(|pose| on_query("result", &pose));
     Some(ProofPicture {
         large,

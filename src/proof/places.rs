@@ -49,10 +49,7 @@ impl Map {
     fn draw_grid(&mut self) -> f64 {
         let shown_m = f64::from(SIDE) / self.px_per_m;
         let steps = [0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0];
-        let step_m = steps
-            .into_iter()
-            .find(|step| shown_m / step <= 12.0)
-            .unwrap_or(1000.0);
+        let step_m = steps.into_iter().find(|step| shown_m / step <= 12.0).unwrap_or(1000.0);
         let count = (shown_m / step_m).ceil() as i32 + 1;
         let side = SIDE as f32;
         let first =
@@ -79,10 +76,7 @@ impl Map {
         let at = self.place(ground(reference_from_camera));
         let ahead = reference_from_camera.rotation * nalgebra::Vector3::z();
         let length = 26.0;
-        let tip = [
-            at[0] + length * ahead.x as f32,
-            at[1] - length * ahead.z as f32,
-        ];
+        let tip = [at[0] + length * ahead.x as f32, at[1] - length * ahead.z as f32];
         self.panel.line(thing.color(), 2.0, [at, tip]);
         self.panel.mark(thing, at, label);
     }
@@ -97,11 +91,7 @@ impl Map {
     ) {
         let origin = self.place([0.0, 0.0]);
         let is_same = truth.is_some_and(|pose| is_near(self.place(ground(pose)), origin, SAME_PX));
-        let of_truth = if is_same {
-            "truth, at the reference"
-        } else {
-            "truth"
-        };
+        let of_truth = if is_same { "truth, at the reference" } else { "truth" };
         let of_reference = if is_same { "" } else { name };
         self.camera(Thing::Reference, &Pose::identity(), of_reference);
         let grade = palette::grade(case.result.grade);
@@ -137,14 +127,9 @@ pub(super) fn pose_map(case: &ProofCase<'_>) -> ProofPicture {
     let result = case.pose().as_ref().map(in_reference);
     let fused = case.latest::<ReferencesFused>();
     let shares = fused.map_or(&[][..], |fused| &fused.shares);
-    let each = shares
-        .iter()
-        .filter_map(|share| Some((share, in_reference(share.pose.as_ref()?))));
+    let each = shares.iter().filter_map(|share| Some((share, in_reference(share.pose.as_ref()?))));
     let each: Vec<_> = each.collect();
-    let poses = truth
-        .iter()
-        .chain(&result)
-        .chain(each.iter().map(|(_, pose)| pose));
+    let poses = truth.iter().chain(&result).chain(each.iter().map(|(_, pose)| pose));
     let mut places: Vec<[f64; 2]> = poses.map(ground).collect();
     let radius_m = problem.believed_within_m();
     let is_alone = shares.is_empty();
@@ -178,12 +163,8 @@ pub(super) fn pose_map(case: &ProofCase<'_>) -> ProofPicture {
 /// Points with the cameras, from above.
 pub(super) fn from_above(case: &ProofCase<'_>, points: &[Point3<f64>]) -> Panel {
     let mut places: Vec<[f64; 2]> = points.iter().map(|point| [point.x, point.z]).collect();
-    let truth = case
-        .truth
-        .map(|pose| case.problem.reference_from_query(pose));
-    let result = case
-        .pose()
-        .map(|pose| case.problem.reference_from_query(&pose));
+    let truth = case.truth.map(|pose| case.problem.reference_from_query(pose));
+    let result = case.pose().map(|pose| case.problem.reference_from_query(&pose));
     places.extend(truth.iter().chain(&result).map(ground));
     let mut map = Map::around("The points of the inliers from above", &places);
     for point in points {
@@ -199,42 +180,27 @@ pub(super) fn ranking(case: &ProofCase<'_>) -> Option<ProofPicture> {
     let event = case.latest::<ReferencesRanked>()?;
     let ranking = &event.ranking;
     let mut beside = Vec::new();
-    for (rank, (frame, photo)) in ranking
-        .pictured()
-        .iter()
-        .zip(event.photos.iter())
-        .enumerate()
-        .take(RANKED)
+    for (rank, (frame, photo)) in
+        ranking.pictured().iter().zip(event.photos.iter()).enumerate().take(RANKED)
     {
         let Some(photo) = photo else { continue };
         let away_m = case
             .truth
             .zip(frame.world_from_camera)
             .map(|(truth, pose)| (pose.translation.vector - truth.translation.vector).norm());
-        let away = away_m.map_or(String::new(), |away_m| {
-            format!(", {away_m:.1} m from the truth")
-        });
+        let away = away_m.map_or(String::new(), |away_m| format!(", {away_m:.1} m from the truth"));
         let is_taken = if rank < ranking.chosen { ", taken" } else { "" };
         let title = format!("{}. {}{away}{is_taken}", rank + 1, frame.name);
         let mut panel = Panel::new(title, picture::photo(photo).into_rgb8());
         if away_m.is_some_and(|away_m| away_m <= case.problem.uncertainty_radius_m) {
             let (width, height) = (panel.picture.width() as f32, panel.picture.height() as f32);
-            let corners = [
-                [0.0, 0.0],
-                [width, 0.0],
-                [width, height],
-                [0.0, height],
-                [0.0, 0.0],
-            ];
+            let corners = [[0.0, 0.0], [width, 0.0], [width, height], [0.0, height], [0.0, 0.0]];
             panel.line(palette::TRUTH, 6.0, corners);
         }
         beside.push(panel);
     }
     Some(ProofPicture {
-        large: Panel::new(
-            "Query",
-            picture::photo(&case.problem.query.photo).into_rgb8(),
-        ),
+        large: Panel::new("Query", picture::photo(&case.problem.query.photo).into_rgb8()),
         below: None,
         beside,
     })

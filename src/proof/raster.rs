@@ -49,10 +49,7 @@ impl ProofPicture {
             paste(&mut canvas, panel, place);
         }
         // The same on every processor.
-        let settings = RenderSettings {
-            level: Level::baseline(),
-            num_threads: 0,
-        };
+        let settings = RenderSettings { level: Level::baseline(), num_threads: 0 };
         let mut painter = Painter {
             context: RenderContext::new_with(width as u16, height as u16, settings),
             resources: Resources::new(),
@@ -73,18 +70,9 @@ impl ProofPicture {
 /// Puts the panel's picture into its place.
 fn paste(canvas: &mut RgbImage, panel: &Panel, place: &Place) {
     let size = [place.width, place.height].map(|length| (length.round() as u32).max(1));
-    let filter = if panel.has_cells {
-        FilterType::Nearest
-    } else {
-        FilterType::Triangle
-    };
+    let filter = if panel.has_cells { FilterType::Nearest } else { FilterType::Triangle };
     let picture = imageops::resize(panel.picture.as_ref(), size[0], size[1], filter);
-    imageops::replace(
-        canvas,
-        &picture,
-        place.left.round() as i64,
-        place.top.round() as i64,
-    );
+    imageops::replace(canvas, &picture, place.left.round() as i64, place.top.round() as i64);
 }
 
 struct Painter {
@@ -125,20 +113,11 @@ impl Painter {
         }
         let scale_corner = panel.scale.as_ref().map(|scale| {
             let size = [scale_width(scale), SCALE_HEIGHT];
-            free_corner(
-                place,
-                size,
-                panel.marks.iter().map(|mark| on_canvas(mark.at)),
-            )
+            free_corner(place, size, panel.marks.iter().map(|mark| on_canvas(mark.at)))
         });
         let mut taken: Vec<Place> = Vec::new();
         if let (Some(scale), Some([left, top])) = (&panel.scale, scale_corner) {
-            taken.push(Place {
-                left,
-                top,
-                width: scale_width(scale),
-                height: SCALE_HEIGHT,
-            });
+            taken.push(Place { left, top, width: scale_width(scale), height: SCALE_HEIGHT });
         }
         for mark in &panel.marks {
             self.mark(mark, on_canvas(mark.at));
@@ -163,18 +142,12 @@ impl Painter {
         let size = f64::from(MARK);
         let shape = match mark.thing {
             Thing::Reference => Circle::new((x, y), size).to_path(0.1),
-            Thing::Truth => path(&[
-                &[(x - size, y), (x + size, y)],
-                &[(x, y - size), (x, y + size)],
-            ]),
+            Thing::Truth => {
+                path(&[&[(x - size, y), (x + size, y)], &[(x, y - size), (x, y + size)]])
+            }
             Thing::Result(_) => {
-                let corners = [
-                    (x, y - size),
-                    (x + size, y),
-                    (x, y + size),
-                    (x - size, y),
-                    (x, y - size),
-                ];
+                let corners =
+                    [(x, y - size), (x + size, y), (x, y + size), (x - size, y), (x, y - size)];
                 path(&[&corners])
             }
             Thing::Dot(_) => Circle::new((x, y), 3.0).to_path(0.1),
@@ -199,8 +172,7 @@ impl Painter {
 
     fn stroke(&mut self, path: &BezPath, color: Color, width: f64) {
         let [red, green, blue] = color;
-        self.context
-            .set_paint(AlphaColor::from_rgba8(red, green, blue, 255));
+        self.context.set_paint(AlphaColor::from_rgba8(red, green, blue, 255));
         self.context.set_stroke(Stroke::new(width));
         self.context.stroke_path(path);
     }
@@ -209,13 +181,10 @@ impl Painter {
     fn words(&mut self, words: &str, at: [f32; 2], color: Color) {
         let words = elided(words, self.width - at[0]);
         let [red, green, blue] = color;
-        self.context
-            .set_paint(AlphaColor::from_rgba8(red, green, blue, 255));
+        self.context.set_paint(AlphaColor::from_rgba8(red, green, blue, 255));
         let glyphs = glyphs(&words, at);
         let run = self.context.glyph_run(&mut self.resources, &FONT);
-        run.font_size(FONT_PX)
-            .hint(false)
-            .fill_glyphs(glyphs.into_iter());
+        run.font_size(FONT_PX).hint(false).fill_glyphs(glyphs.into_iter());
     }
 
     /// A bar of colours with the numbers at its ends.
@@ -235,12 +204,10 @@ impl Painter {
         let start = left + width_of(&scale.dark) + 6.0;
         for step in 0..STEPS {
             let [red, green, blue] = palette::viridis((f64::from(step) + 0.5) / f64::from(STEPS));
-            self.context
-                .set_paint(AlphaColor::from_rgba8(red, green, blue, 255));
+            self.context.set_paint(AlphaColor::from_rgba8(red, green, blue, 255));
             let x = f64::from(start + bar * step as f32 / STEPS as f32);
             let width = f64::from(bar) / f64::from(STEPS) + 0.5;
-            self.context
-                .fill_rect(&Rect::new(x, top.into(), x + width, f64::from(top) + 14.0));
+            self.context.fill_rect(&Rect::new(x, top.into(), x + width, f64::from(top) + 14.0));
         }
         self.words(&scale.bright, [start + bar + 6.0, top + 12.0], WORDS);
     }
@@ -285,18 +252,12 @@ fn glyphs(words: &str, at: [f32; 2]) -> Vec<Glyph> {
     let Ok(font) = FontRef::new(epaint_default_fonts::UBUNTU_LIGHT) else {
         return Vec::new();
     };
-    let (map, metrics) = (
-        font.charmap(),
-        font.glyph_metrics(Size::new(FONT_PX), LocationRef::default()),
-    );
+    let (map, metrics) =
+        (font.charmap(), font.glyph_metrics(Size::new(FONT_PX), LocationRef::default()));
     let mut x = at[0];
     let glyph = |letter: char| {
         let id = map.map(letter).unwrap_or_default();
-        let glyph = Glyph {
-            id: id.to_u32(),
-            x,
-            y: at[1],
-        };
+        let glyph = Glyph { id: id.to_u32(), x, y: at[1] };
         x += metrics.advance_width(id).unwrap_or_default();
         glyph
     };

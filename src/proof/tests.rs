@@ -99,10 +99,7 @@ fn the_map_of_a_search_that_missed_agrees_with_its_sentence() {
     let apart = f64::from((truth[0] - found[0]).hypot(truth[1] - found[1]));
     let step_m = Params::default().grid.coarse_step_m;
     let error_m = result.error.expect("the truth is known").translation_m;
-    assert!(
-        (apart * step_m - error_m).abs() < 0.5,
-        "{apart} cells, {error_m} m"
-    );
+    assert!((apart * step_m - error_m).abs() < 0.5, "{apart} cells, {error_m} m");
 }
 
 /// Every kind of proof that a method's run has something to show for.
@@ -167,18 +164,12 @@ fn every_verdict_has_a_picture_without_overlap() {
             assert_eq!(places.len(), picture.panels().count());
             for (at, one) in places.iter().enumerate() {
                 let ends = [one.left + one.width, one.top + one.height];
-                assert!(
-                    one.left >= 0.0 && one.top >= 0.0,
-                    "{method} {code}: {one:?}"
-                );
+                assert!(one.left >= 0.0 && one.top >= 0.0, "{method} {code}: {one:?}");
                 assert!(
                     ends[0] <= width + 0.5 && ends[1] <= height + 0.5,
                     "{method} {code}: {one:?} in {height}"
                 );
-                assert!(
-                    one.width >= 60.0 && one.height >= 30.0,
-                    "{method} {code}: {one:?}"
-                );
+                assert!(one.width >= 60.0 && one.height >= 30.0, "{method} {code}: {one:?}");
                 for other in &places[..at] {
                     let is_apart = ends[0] <= other.left
                         || other.left + other.width <= one.left
@@ -204,12 +195,7 @@ fn a_proof_is_painted_the_same_twice() {
 /// The scale moves away from a mark, and back to its usual corner where every corner has one.
 #[test]
 fn the_scale_covers_no_mark() {
-    let panel = Place {
-        left: 10.0,
-        top: 20.0,
-        width: 400.0,
-        height: 300.0,
-    };
+    let panel = Place { left: 10.0, top: 20.0, width: 400.0, height: 300.0 };
     let corner =
         |marks: &[[f32; 2]]| layout::free_corner(&panel, [150.0, 24.0], marks.iter().copied());
     let (lower_left, lower_right) = ([14.0, 292.0], [256.0, 292.0]);
@@ -222,12 +208,7 @@ fn the_scale_covers_no_mark() {
 /// A label that fits at neither side of its mark stands above or below it, and not on another label.
 #[test]
 fn a_label_covers_neither_its_mark_nor_another_label() {
-    let panel = Place {
-        left: 0.0,
-        top: 0.0,
-        width: 100.0,
-        height: 200.0,
-    };
+    let panel = Place { left: 0.0, top: 0.0, width: 100.0, height: 200.0 };
     let mut taken = Vec::new();
     let mut place = |at, width| layout::label_place(at, [width, 16.0], &panel, &mut taken);
     let beside = place([20.0, 50.0], 40.0);
@@ -236,15 +217,9 @@ fn a_label_covers_neither_its_mark_nor_another_label() {
     assert_eq!([left.left, left.top], [30.0, 12.0]);
     let wide = place([50.0, 80.0], 90.0);
     assert_eq!(wide.left, 0.0);
-    assert!(
-        wide.top >= 80.0 + MARK || wide.top + 16.0 <= 80.0 - MARK,
-        "{wide:?}"
-    );
+    assert!(wide.top >= 80.0 + MARK || wide.top + 16.0 <= 80.0 - MARK, "{wide:?}");
     let second = place([20.0, 50.0], 40.0);
-    assert!(
-        second.top >= 58.0 || second.top + 16.0 <= 42.0,
-        "{second:?}"
-    );
+    assert!(second.top >= 58.0 || second.top + 16.0 <= 42.0, "{second:?}");
 }
 
 #[test]
@@ -259,10 +234,7 @@ fn distances_below_a_curve_are_round() {
 fn the_picture_of_depths_counts_its_marks() {
     let (kept, result) = neighbours(Method::FB);
     let drawn = pictures(&kept, &result);
-    let (_, picture) = drawn
-        .iter()
-        .find(|(code, _)| *code == "R4")
-        .expect("a picture");
+    let (_, picture) = drawn.iter().find(|(code, _)| *code == "R4").expect("a picture");
     let count = |color: Rgb| {
         let marks = picture.large.marks.iter();
         marks.filter(|mark| mark.thing == Thing::Dot(color)).count()
@@ -270,11 +242,7 @@ fn the_picture_of_depths_counts_its_marks() {
     let (without, wrong) = (count([0xFF; 3]), count(palette::ESTIMATE));
     assert!(without > 0 && wrong > 0);
     let says = format!("Matches: {wrong} false (orange), {without} without a depth (white)");
-    assert!(
-        picture.large.title.ends_with(&says),
-        "{}",
-        picture.large.title
-    );
+    assert!(picture.large.title.ends_with(&says), "{}", picture.large.title);
 }
 
 /// A camera that is turned further than the search turns: the title says both angles.
@@ -289,10 +257,7 @@ fn a_heading_outside_the_search_is_in_the_title() {
     let range_deg = Params::default().grid.yaw_range_deg;
     let turned = format!("±{range_deg}° (white); truth turned by ");
     let within = title(&kept);
-    assert_eq!(
-        within,
-        format!("Searched within 5 m, ±{range_deg}° (white)")
-    );
+    assert_eq!(within, format!("Searched within 5 m, ±{range_deg}° (white)"));
     let turn = crate::geometry::yaw(90_f64.to_radians());
     kept.truth = kept.truth.map(|truth| truth * turn);
     let outside = title(&kept);
@@ -304,11 +269,7 @@ fn a_heading_outside_the_search_is_in_the_title() {
 fn a_suspect_camera_is_drawn_beside_the_better_one() {
     let (kept, mut result) = neighbours(Method::FB);
     let stated = kept.problems[0].query.intrinsics;
-    let other = crate::camera::Intrinsics {
-        fx: 0.8 * stated.fx,
-        fy: 0.8 * stated.fy,
-        ..stated
-    };
+    let other = crate::camera::Intrinsics { fx: 0.8 * stated.fx, fy: 0.8 * stated.fy, ..stated };
     result.diagnosis = vec![crate::diagnosis::Diagnosis {
         code: crate::diagnosis::Code::X1,
         text: String::new(),
@@ -342,19 +303,14 @@ fn a_suspect_camera_is_drawn_beside_the_better_one() {
 fn reference_and_truth_at_one_place_share_a_label() {
     let (kept, result) = localized(["street"; 2], ["000001"; 2], 5.0, Method::MI);
     for (code, picture) in pictures(&kept, &result) {
-        let panels = picture.panels().filter(|panel| {
-            panel
-                .marks
-                .iter()
-                .any(|mark| mark.thing == Thing::Reference)
-        });
+        let panels = picture
+            .panels()
+            .filter(|panel| panel.marks.iter().any(|mark| mark.thing == Thing::Reference));
         for panel in panels {
             let labels: Vec<&str> = panel.marks.iter().map(|mark| mark.label.as_str()).collect();
             assert!(!labels.contains(&"reference"), "{code}: {labels:?}");
             assert!(
-                labels
-                    .iter()
-                    .any(|label| label.ends_with("at the reference")),
+                labels.iter().any(|label| label.ends_with("at the reference")),
                 "{code}: {labels:?}"
             );
         }

@@ -97,9 +97,7 @@ fn title(run: &RunFile) -> String {
 /// One CSS class per query photo, shared by its results. Our own data URIs contain no markup.
 fn thumbnails(report: &RunReport) -> String {
     let photos = report.thumbnails.iter();
-    photos
-        .map(|(query, uri)| format!(".q{query}{{background-image:url({uri})}}\n"))
-        .collect()
+    photos.map(|(query, uri)| format!(".q{query}{{background-image:url({uri})}}\n")).collect()
 }
 
 fn gates(report: &RunReport) -> Markup {

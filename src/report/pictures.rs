@@ -30,11 +30,8 @@ fn jpeg(picture: &DynamicImage, width: u32, quality: u8) -> Option<String> {
     if picture.width() == 0 || picture.height() == 0 {
         return None;
     }
-    let small = if picture.width() > width {
-        picture.thumbnail(width, u32::MAX)
-    } else {
-        picture.clone()
-    };
+    let small =
+        if picture.width() > width { picture.thumbnail(width, u32::MAX) } else { picture.clone() };
     let mut bytes = Vec::new();
     let encoder = JpegEncoder::new_with_quality(&mut bytes, quality);
     small.into_rgb8().write_with_encoder(encoder).ok()?;
@@ -90,9 +87,6 @@ impl Witness {
         })?;
         let titles: Vec<&str> = picture.panels().map(|panel| panel.title.as_str()).collect();
         let raster = DynamicImage::ImageRgb8(picture.raster(PROOF_WIDTH, ""));
-        Some(DrawnProof {
-            picture: jpeg(&raster, PROOF_WIDTH, 75)?,
-            words: titles.join("; "),
-        })
+        Some(DrawnProof { picture: jpeg(&raster, PROOF_WIDTH, 75)?, words: titles.join("; ") })
     }
 }

@@ -106,13 +106,10 @@ impl Draw<'_> {
 
     /// The drawn frames in the order of the scene. The seed and the scene's name determine them.
     fn frames(&self, scene: &dyn Scene) -> Result<Vec<usize>, DrawError> {
-        let mut frames: Vec<usize> = (0..scene.frames().len())
-            .filter(|&frame| scene.pose(frame).is_some())
-            .collect();
+        let mut frames: Vec<usize> =
+            (0..scene.frames().len()).filter(|&frame| scene.pose(frame).is_some()).collect();
         if frames.is_empty() {
-            return Err(DrawError::NoPose {
-                scene: scene.name().to_owned(),
-            });
+            return Err(DrawError::NoPose { scene: scene.name().to_owned() });
         }
         let count = match self.limit {
             None => frames.len(),

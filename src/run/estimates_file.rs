@@ -54,13 +54,7 @@ mod tests {
         assert_eq!(file.method.name(), "superglue");
         assert_eq!(file.path, PathBuf::from("a=b.txt"));
         assert_eq!(file.to_string().parse(), Ok(file));
-        for wrong in [
-            "superglue",
-            "superglue=",
-            "=a.txt",
-            "mi=a.txt",
-            "Super Glue=a.txt",
-        ] {
+        for wrong in ["superglue", "superglue=", "=a.txt", "mi=a.txt", "Super Glue=a.txt"] {
             assert!(wrong.parse::<EstimatesFile>().is_err(), "{wrong}");
         }
     }

@@ -40,14 +40,9 @@ impl Scenes {
     ) -> Result<Self, SceneError> {
         let open_all = |arguments: &[String]| -> Result<Vec<Arc<dyn Scene>>, SceneError> {
             let scenes = arguments.iter();
-            scenes
-                .map(|argument| scene::open(argument, format).map(Arc::from))
-                .collect()
+            scenes.map(|argument| scene::open(argument, format).map(Arc::from)).collect()
         };
-        Ok(Self {
-            references: open_all(references)?,
-            queries: open_all(queries)?,
-        })
+        Ok(Self { references: open_all(references)?, queries: open_all(queries)? })
     }
 
     /// The same scenes with the protocol's rough positions and degradations of the queries. Latitudes and
@@ -56,32 +51,19 @@ impl Scenes {
     /// # Errors
     /// The errors of [`Protocol::prepared_queries`].
     pub fn with_protocol(self, protocol: &Protocol) -> Result<Self, SceneError> {
-        let Self {
-            mut references,
-            mut queries,
-        } = self;
+        let Self { mut references, mut queries } = self;
         let Some(first) = references.first().map(Arc::clone) else {
-            return Ok(Self {
-                references,
-                queries,
-            });
+            return Ok(Self { references, queries });
         };
         if queries.is_empty() && !protocol.degrade.is_none() {
             // The photos of references are never degraded.
             queries.clone_from(&references);
         }
-        let of_queries = if queries.is_empty() {
-            &mut references
-        } else {
-            &mut queries
-        };
+        let of_queries = if queries.is_empty() { &mut references } else { &mut queries };
         for scene in of_queries {
             *scene = protocol.prepared_queries(Arc::clone(scene), first.as_ref())?;
         }
-        Ok(Self {
-            references,
-            queries,
-        })
+        Ok(Self { references, queries })
     }
 
     /// The scene of a pair's queries.
@@ -207,10 +189,7 @@ impl Execution<'_> {
         if pair.scene != pair.query_scene {
             return Ok(BTreeSet::new());
         }
-        pair.drawn
-            .iter()
-            .map(|name| references.find(name))
-            .collect()
+        pair.drawn.iter().map(|name| references.find(name)).collect()
     }
 
     fn results(
@@ -302,22 +281,14 @@ impl Execution<'_> {
             let Some(request) = failed else {
                 continue;
             };
-            observer.failed(&FailedQuery {
-                localizer,
-                item: *item,
-                frame,
-                method,
-                request,
-            })?;
+            observer.failed(&FailedQuery { localizer, item: *item, frame, method, request })?;
         }
         Ok(())
     }
 
     /// The results of a query whose localisation panicked.
     fn broken(&self, item: &RunItem<'_>, message: &str) -> Vec<(QueryResult, StageTimes)> {
-        let failure = Failure::Internal {
-            message: message.to_owned(),
-        };
+        let failure = Failure::Internal { message: message.to_owned() };
         let pair = item.pair;
         let protocol = &self.run.protocol;
         let fusions: Vec<Option<Fusion>> = match protocol.fusions.as_slice() {

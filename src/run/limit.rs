@@ -22,11 +22,7 @@ impl FromStr for Limit {
                 .ok()
                 .filter(|percent: &f64| *percent > 0.0 && *percent <= 100.0)
                 .map(Self::Percent),
-            None => text
-                .parse()
-                .ok()
-                .filter(|count| *count > 0)
-                .map(Self::Count),
+            None => text.parse().ok().filter(|count| *count > 0).map(Self::Count),
         };
         limit.ok_or_else(|| "a number of queries or a percentage such as 10% expected".to_owned())
     }

@@ -48,32 +48,16 @@ pub(super) struct ByDataSet {
 impl ByDataSet {
     /// The number for a scene of this name.
     pub fn of_scene(self, name: &str) -> f64 {
-        if name.starts_with("robotcar") {
-            self.robotcar
-        } else {
-            self.kitti
-        }
+        if name.starts_with("robotcar") { self.robotcar } else { self.kitti }
     }
 }
 
 impl Preset {
     /// All presets with their names and files.
     const ALL: [(Self, &'static str, &'static str); 3] = [
-        (
-            Self::Single,
-            "single",
-            include_str!("../../assets/presets/single.toml"),
-        ),
-        (
-            Self::Multi,
-            "multi",
-            include_str!("../../assets/presets/multi.toml"),
-        ),
-        (
-            Self::Large,
-            "large",
-            include_str!("../../assets/presets/large.toml"),
-        ),
+        (Self::Single, "single", include_str!("../../assets/presets/single.toml")),
+        (Self::Multi, "multi", include_str!("../../assets/presets/multi.toml")),
+        (Self::Large, "large", include_str!("../../assets/presets/large.toml")),
     ];
 
     /// The name on the command line and in files.
@@ -107,9 +91,6 @@ posescope_core::serde_as_text!(Preset);
 
 /// The translation error from which a pose counts as a failure \[m\], by the references' scene.
 pub fn default_failure_radius_m(scene: &str) -> f64 {
-    let radius = ByDataSet {
-        kitti: 10.0,
-        robotcar: 20.0,
-    };
+    let radius = ByDataSet { kitti: 10.0, robotcar: 20.0 };
     radius.of_scene(scene)
 }

@@ -349,9 +349,7 @@ impl Protocol {
     /// The options that differ from the defaults, each with its value.
     pub fn options(&self) -> Vec<(String, String)> {
         let (own, default) = (table(self), table(&Self::default()));
-        let changed = own
-            .into_iter()
-            .filter(|(key, value)| default.get(key) != Some(value));
+        let changed = own.into_iter().filter(|(key, value)| default.get(key) != Some(value));
         changed
             .flat_map(|(key, value)| {
                 let values = match value {
@@ -489,26 +487,16 @@ mod tests {
         let protocol = Protocol {
             methods: vec![Method::FB, Method::MI],
             radii_m: vec![12.5],
-            references: ["62", "64"]
-                .map(|name| Reference::Frame(name.to_owned()))
-                .into(),
+            references: ["62", "64"].map(|name| Reference::Frame(name.to_owned())).into(),
             min_confidence: Some(0.5),
             ..Protocol::default()
         };
         let options = protocol.options();
-        let options: Vec<String> = options
-            .iter()
-            .map(|(key, value)| format!("{key} {value}"))
-            .collect();
+        let options: Vec<String> =
+            options.iter().map(|(key, value)| format!("{key} {value}")).collect();
         assert_eq!(
             options,
-            [
-                "method fb,mi",
-                "min-confidence 0.5",
-                "radius 12.5",
-                "reference 62",
-                "reference 64"
-            ]
+            ["method fb,mi", "min-confidence 0.5", "radius 12.5", "reference 62", "reference 64"]
         );
         assert_eq!(Protocol::default().options(), []);
     }

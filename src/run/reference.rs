@@ -23,11 +23,7 @@ impl FromStr for Reference {
             let is_word = !how.is_empty() && how.chars().all(|c| c.is_ascii_lowercase());
             is_word && (Selection::is_name(how) || count.parse::<usize>().is_ok())
         });
-        if is_choice {
-            text.parse().map(Self::Chosen)
-        } else {
-            Ok(Self::Frame(text.to_owned()))
-        }
+        if is_choice { text.parse().map(Self::Chosen) } else { Ok(Self::Frame(text.to_owned())) }
     }
 }
 
@@ -49,16 +45,9 @@ mod tests {
     #[test]
     fn a_way_of_choosing_is_told_from_a_frame() {
         let read = |text: &str| text.parse::<Reference>();
-        assert_eq!(
-            read("matches:3"),
-            Ok(Reference::Chosen(Selection::Matched(3)))
-        );
+        assert_eq!(read("matches:3"), Ok(Reference::Chosen(Selection::Matched(3))));
         for frame in ["000062", "a/b.jpg", "12:30:00", "random"] {
-            assert_eq!(
-                read(frame),
-                Ok(Reference::Frame(frame.to_owned())),
-                "{frame}"
-            );
+            assert_eq!(read(frame), Ok(Reference::Frame(frame.to_owned())), "{frame}");
         }
         assert!(read("random:0").is_err());
         assert!(read("nearest:many").is_err());

@@ -114,11 +114,7 @@ impl Places {
             return Some((self.schema.span().start, message));
         }
         let protocol = &run.protocol;
-        let at_methods = self
-            .protocol
-            .method
-            .as_ref()
-            .map_or(0, |at| at.span().start);
+        let at_methods = self.protocol.method.as_ref().map_or(0, |at| at.span().start);
         if protocol.methods.is_empty() {
             return Some((at_methods, "at least one method expected".to_owned()));
         }
@@ -128,11 +124,7 @@ impl Places {
         }
         let is_length = |radius: &f64| *radius > 0.0 && radius.is_finite();
         if protocol.radii_m.is_empty() || !protocol.radii_m.iter().all(is_length) {
-            let at = self
-                .protocol
-                .radius
-                .as_ref()
-                .map_or(0, |at| at.span().start);
+            let at = self.protocol.radius.as_ref().map_or(0, |at| at.span().start);
             return Some((at, "at least one radius above 0 expected".to_owned()));
         }
         let scenes = run.scenes.len();
@@ -168,21 +160,18 @@ impl RunFile {
             let queries = pair.queries.iter().enumerate();
             queries.map(move |(at, query)| (pair, at, query))
         });
-        queries
-            .enumerate()
-            .map(|(index, (pair, at, query))| RunItem {
-                index,
-                pair,
-                query,
-                camera: pair.cameras.get(at).copied().unwrap_or(pair.camera),
-                time_s: pair.times_s.get(at).copied(),
-            })
+        queries.enumerate().map(|(index, (pair, at, query))| RunItem {
+            index,
+            pair,
+            query,
+            camera: pair.cameras.get(at).copied().unwrap_or(pair.camera),
+            time_s: pair.times_s.get(at).copied(),
+        })
     }
 
     /// The items of this shard.
     pub fn items(&self) -> impl Iterator<Item = RunItem<'_>> {
-        self.plan()
-            .filter(|item| self.shard.is_none_or(|shard| shard.has(item.index)))
+        self.plan().filter(|item| self.shard.is_none_or(|shard| shard.has(item.index)))
     }
 
     /// The settings that every query is localised with: by radius, then by number of references.
@@ -195,10 +184,7 @@ impl RunFile {
         let radii = self.protocol.radii_m.iter();
         radii
             .flat_map(|&radius_m| {
-                counts.clone().map(move |references| Setting {
-                    radius_m,
-                    references,
-                })
+                counts.clone().map(move |references| Setting { radius_m, references })
             })
             .collect()
     }
@@ -214,9 +200,7 @@ impl RunFile {
     /// The translation error from which the paper counts a pose as a failure \[m\].
     pub fn failure_radius_m(&self) -> f64 {
         let scene = self.pairs.first().map_or("", |pair| pair.scene.as_str());
-        self.protocol
-            .failure_radius_m
-            .unwrap_or_else(|| default_failure_radius_m(scene))
+        self.protocol.failure_radius_m.unwrap_or_else(|| default_failure_radius_m(scene))
     }
 
     /// The pair of scenes of a result.
@@ -231,10 +215,7 @@ impl RunFile {
         let count = setting.references.min(chosen.frames.len());
         Request {
             radius_m: setting.radius_m,
-            references: References {
-                frames: chosen.frames[..count].to_vec(),
-                ..chosen.clone()
-            },
+            references: References { frames: chosen.frames[..count].to_vec(), ..chosen.clone() },
             fusions: self.protocol.fusions.clone(),
             setting: Some(setting),
         }
@@ -266,10 +247,7 @@ impl RunFile {
 
     /// The description of the same run without shards.
     pub fn whole(&self) -> Self {
-        Self {
-            shard: None,
-            ..self.clone()
-        }
+        Self { shard: None, ..self.clone() }
     }
 }
 
@@ -279,9 +257,8 @@ mod tests {
 
     #[test]
     fn shards_are_read_and_share_the_items_out() {
-        let shards: Vec<Shard> = ["1/3", "2/3", "3/3"]
-            .map(|text| text.parse().expect("a shard"))
-            .into();
+        let shards: Vec<Shard> =
+            ["1/3", "2/3", "3/3"].map(|text| text.parse().expect("a shard")).into();
         for item in 0..20 {
             assert_eq!(shards.iter().filter(|shard| shard.has(item)).count(), 1);
         }
@@ -309,10 +286,7 @@ mod tests {
         };
         let text = toml::to_string(&run).expect("TOML");
         assert_eq!(RunFile::read(&text).expect("our own"), run);
-        let at = 1 + text
-            .lines()
-            .position(|line| line.starts_with("seed = "))
-            .expect("is there");
+        let at = 1 + text.lines().position(|line| line.starts_with("seed = ")).expect("is there");
         let error = RunFile::read(&text.replacen("seed = ", "sed = ", 1)).expect_err("unknown");
         assert_eq!(error.line, at);
         assert!(error.message.contains("`sed`"), "{}", error.message);

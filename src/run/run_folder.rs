@@ -38,11 +38,7 @@ pub fn recording_name(
         format!("{query}-{method}")
     };
     let plain = |c: char| {
-        if c.is_alphanumeric() || "-_.".contains(c) {
-            c
-        } else {
-            '-'
-        }
+        if c.is_alphanumeric() || "-_.".contains(c) { c } else { '-' }
     };
     name.chars().map(plain).collect()
 }
@@ -173,10 +169,7 @@ impl RunFolder {
         }
         let file = path.join(RUN);
         if !file.exists() {
-            return Err(FolderError::NotEmpty {
-                path: path.to_owned(),
-                is_run: false,
-            });
+            return Err(FolderError::NotEmpty { path: path.to_owned(), is_run: false });
         }
         same_run(path, &toml_of(&read_run(path)?), &toml_of(run))?;
         sweep(path).map_err(FolderError::io(path))?;
@@ -187,10 +180,7 @@ impl RunFolder {
         let whole = |prefix: &Prefix| prefix.ends.len() / results_per_item;
         folder.done = whole(&results).min(whole(&timings));
         let lines = folder.done * results_per_item;
-        for (file, prefix) in [
-            (&mut folder.results, results),
-            (&mut folder.timings, timings),
-        ] {
+        for (file, prefix) in [(&mut folder.results, results), (&mut folder.timings, timings)] {
             let end = lines.checked_sub(1).map_or(0, |last| prefix.ends[last]);
             let cut = file.set_len(end);
             cut.and_then(|()| file.seek(SeekFrom::End(0)).map(drop))
@@ -202,26 +192,15 @@ impl RunFolder {
     fn open(path: &Path) -> Result<Self, FolderError> {
         let open = |name: &str| {
             let file = path.join(name);
-            let options = OpenOptions::new()
-                .create(true)
-                .read(true)
-                .append(true)
-                .open(&file);
+            let options = OpenOptions::new().create(true).read(true).append(true).open(&file);
             options.map_err(FolderError::io(file))
         };
         let results = open(RESULTS)?;
         // A file system without locks returns another error, which is ignored.
         if matches!(results.try_lock(), Err(TryLockError::WouldBlock)) {
-            return Err(FolderError::InUse {
-                path: path.to_owned(),
-            });
+            return Err(FolderError::InUse { path: path.to_owned() });
         }
-        Ok(Self {
-            path: path.to_owned(),
-            results,
-            timings: open(TIMINGS)?,
-            done: 0,
-        })
+        Ok(Self { path: path.to_owned(), results, timings: open(TIMINGS)?, done: 0 })
     }
 
     /// The path of the folder.
@@ -242,11 +221,7 @@ impl RunFolder {
         let (mut lines, mut times) = (Vec::new(), Vec::new());
         for (result, stages) in results {
             push_line(&mut lines, result).map_err(FolderError::io(&self.path))?;
-            let timing = Timing {
-                query: &result.query,
-                method: result.method,
-                stages,
-            };
+            let timing = Timing { query: &result.query, method: result.method, stages };
             push_line(&mut times, &timing).map_err(FolderError::io(&self.path))?;
         }
         // Results last: a query with results is complete.
@@ -265,9 +240,7 @@ impl RunFolder {
         let (mut line, mut end) = (Vec::new(), 0);
         loop {
             line.clear();
-            let length = reader
-                .read_until(b'\n', &mut line)
-                .map_err(FolderError::io(&path))?;
+            let length = reader.read_until(b'\n', &mut line).map_err(FolderError::io(&path))?;
             let head = serde_json::from_slice::<Head>(&line);
             match head {
                 Ok(head) if line.ends_with(b"\n") => {
@@ -331,17 +304,10 @@ fn same_run(path: &Path, there: &str, here: &str) -> Result<(), FolderError> {
     if there == here {
         return Ok(());
     }
-    let different = there
-        .lines()
-        .zip(here.lines())
-        .find(|(there, here)| there != here);
+    let different = there.lines().zip(here.lines()).find(|(there, here)| there != here);
     let (there, here) = different.unwrap_or(("a shorter file", "a longer one"));
     let short = |line: &str| line.chars().take(120).collect();
-    Err(FolderError::OtherRun {
-        path: path.to_owned(),
-        there: short(there),
-        here: short(here),
-    })
+    Err(FolderError::OtherRun { path: path.to_owned(), there: short(there), here: short(here) })
 }
 
 /// Whether the folder contains anything but unfinished temporary files.
@@ -379,18 +345,12 @@ pub fn read_run(folder: &Path) -> Result<RunFile, FolderError> {
     let path = folder.join(RUN);
     let text = match fs::read_to_string(&path) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => {
-            return Err(FolderError::NoRun {
-                path: folder.to_owned(),
-            });
+            return Err(FolderError::NoRun { path: folder.to_owned() });
         }
         read => read.map_err(FolderError::io(&path))?,
     };
-    let mut run =
-        RunFile::read(&text).map_err(|RunFileError { line, message }| FolderError::Damaged {
-            path,
-            line,
-            message,
-        })?;
+    let mut run = RunFile::read(&text)
+        .map_err(|RunFileError { line, message }| FolderError::Damaged { path, line, message })?;
     run.params = completed(run.params);
     Ok(run)
 }
@@ -455,9 +415,7 @@ pub fn merge(shards: &[PathBuf], target: &Path) -> Result<RunFile, FolderError> 
         runs.push((path, read_run(path)?));
     }
     let Some((first_path, first)) = runs.first() else {
-        return Err(FolderError::NoRun {
-            path: target.to_owned(),
-        });
+        return Err(FolderError::NoRun { path: target.to_owned() });
     };
     let whole = first.whole();
     for (path, run) in &runs {
@@ -470,19 +428,14 @@ pub fn merge(shards: &[PathBuf], target: &Path) -> Result<RunFile, FolderError> 
         let complete = lines_of(path, RESULTS)?.count() / per_item;
         let items = run.items().count();
         if complete != items {
-            return Err(FolderError::Incomplete {
-                path: (*path).clone(),
-                done: complete,
-                items,
-            });
+            return Err(FolderError::Incomplete { path: (*path).clone(), done: complete, items });
         }
         sources.push((run.shard, lines));
     }
     let mut folder = RunFolder::create(target, &whole)?;
     for item in whole.plan() {
-        let mut owners = sources
-            .iter_mut()
-            .filter(|(shard, _)| shard.is_none_or(|shard| shard.has(item.index)));
+        let mut owners =
+            sources.iter_mut().filter(|(shard, _)| shard.is_none_or(|shard| shard.has(item.index)));
         let problem = |message: &str| FolderError::Damaged {
             path: first_path.join(RUN),
             line: 1,

@@ -48,9 +48,8 @@ impl ScenePair {
     /// The pair with some of its queries only.
     #[must_use]
     pub fn only(&self, is_wanted: impl Fn(&str) -> bool) -> Self {
-        let kept: Vec<usize> = (0..self.queries.len())
-            .filter(|&at| is_wanted(&self.queries[at]))
-            .collect();
+        let kept: Vec<usize> =
+            (0..self.queries.len()).filter(|&at| is_wanted(&self.queries[at])).collect();
         fn those<T: Clone>(kept: &[usize], all: &[T]) -> Vec<T> {
             kept.iter().filter_map(|&at| all.get(at).cloned()).collect()
         }

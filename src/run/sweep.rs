@@ -118,10 +118,8 @@ impl FromStr for Sweep {
         let decimals = |text: &str| text.split_once('.').map_or(0, |(_, digits)| digits.len());
         let digits = decimals(from).max(decimals(step));
         let value = |at: usize| format!("{:.digits$}", first + at as f64 * width);
-        let sweep = Self {
-            key: key.trim().to_owned(),
-            values: (0..=steps as usize).map(value).collect(),
-        };
+        let sweep =
+            Self { key: key.trim().to_owned(), values: (0..=steps as usize).map(value).collect() };
         sweep.check()?;
         Ok(sweep)
     }
@@ -134,10 +132,7 @@ mod tests {
     #[test]
     fn values_are_those_that_a_person_would_write() {
         let values = |text: &str| text.parse::<Sweep>().expect(text).values().join(" ");
-        assert_eq!(
-            values("gamma=0.2:1:0.1"),
-            "0.2 0.3 0.4 0.5 0.6 0.7 0.8 0.9 1.0"
-        );
+        assert_eq!(values("gamma=0.2:1:0.1"), "0.2 0.3 0.4 0.5 0.6 0.7 0.8 0.9 1.0");
         assert_eq!(values("fb.ratio=0.5:0.6:0.05"), "0.50 0.55 0.60");
         assert_eq!(values("noise=0:40:16"), "0 16 32");
         assert_eq!(values("grid.rounds = 1:3:1"), "1 2 3");
@@ -161,10 +156,7 @@ mod tests {
         ] {
             assert!(said(wrong).contains("KEY=FROM:TO:STEP expected"), "{wrong}");
         }
-        assert_eq!(
-            said("fb.ratio=0.5:1.2:0.1"),
-            "`fb.ratio` takes 0.1 … 1, not `1.1`"
-        );
+        assert_eq!(said("fb.ratio=0.5:1.2:0.1"), "`fb.ratio` takes 0.1 … 1, not `1.1`");
         assert!(said("gama=0.2:1:0.1").contains("`gama` is not a degradation"));
         assert!(said("fb.ratoi=0.2:1:0.1").contains("did you mean `fb.ratio`"));
         assert!(said("invert=0:1:1").contains("true | false"));

@@ -41,9 +41,7 @@ impl MapCloud {
             self.origin = point.map(f64::round);
         }
         if self.points.len() == MOST_POINTS {
-            return Err(format!(
-                "at most {MOST_POINTS} points expected; split or thin the cloud"
-            ));
+            return Err(format!("at most {MOST_POINTS} points expected; split or thin the cloud"));
         }
         self.points.push(Point3::from(point - self.origin).cast());
         Ok(())
@@ -62,10 +60,7 @@ pub(super) fn read(path: &Path) -> Result<MapCloud, SceneError> {
     let mut start = Vec::new();
     let file = File::open(path).map_err(io)?;
     let size = file.metadata().map_err(io)?.len();
-    BufReader::new(file)
-        .take(4096)
-        .read_to_end(&mut start)
-        .map_err(io)?;
+    BufReader::new(file).take(4096).read_to_end(&mut start).map_err(io)?;
     let read = if start.starts_with(b"ply\n") || start.starts_with(b"ply\r") {
         ply::read
     } else if start.starts_with(b"LASF") {
@@ -73,10 +68,7 @@ pub(super) fn read(path: &Path) -> Result<MapCloud, SceneError> {
     } else if pcd::is_pcd(&start) {
         pcd::read
     } else if start.contains(&0) {
-        return Err(content(
-            path,
-            "a cloud in PLY, PCD, LAS, LAZ or XYZ text format expected",
-        ));
+        return Err(content(path, "a cloud in PLY, PCD, LAS, LAZ or XYZ text format expected"));
     } else {
         return xyz::read(path);
     };

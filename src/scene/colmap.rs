@@ -104,11 +104,7 @@ fn open(folder: &Path) -> Result<Box<dyn Scene>, SceneError> {
     }
     let scene = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
     let name = format!("colmap/{}", scene_name(&scene, &photos));
-    let clouds = ObservedPoints {
-        points: model.points,
-        observed,
-        listed_in,
-    };
+    let clouds = ObservedPoints { points: model.points, observed, listed_in };
     Ok(Box::new(FileScene::new(name, frames, clouds)))
 }
 
@@ -141,11 +137,8 @@ fn frame_names(images: &[ModelImage]) -> Result<Vec<String>, String> {
         _ => name.to_owned(),
     };
     let file = |name: &str| name.rsplit(['/', '\\']).next().unwrap_or(name).to_owned();
-    let briefest_first: [&dyn Fn(&str) -> String; 3] = [
-        &|name| without_extension(&file(name)),
-        &|name| without_extension(&flat(name)),
-        &flat,
-    ];
+    let briefest_first: [&dyn Fn(&str) -> String; 3] =
+        [&|name| without_extension(&file(name)), &|name| without_extension(&flat(name)), &flat];
     let ways = briefest_first.into_iter();
     ways.map(|brief| images.iter().map(|image| brief(&image.name)).collect())
         .find(|names: &Vec<String>| names.iter().collect::<BTreeSet<_>>().len() == names.len())
@@ -179,9 +172,7 @@ impl Clouds for ObservedPoints {
             let in_camera = camera_from_world * nalgebra::Point3::from(self.points[point as usize]);
             in_camera.cast()
         });
-        Ok(Cloud {
-            points: points.collect(),
-        })
+        Ok(Cloud { points: points.collect() })
     }
 }
 
@@ -203,18 +194,9 @@ mod tests {
     #[test]
     fn frames_are_called_as_briefly_as_tells_them_apart() {
         let names = |names: &[&str]| frame_names(&images(names));
-        assert_eq!(
-            names(&["a/1.jpg", "a/2.5.jpg"]),
-            Ok(vec!["1".to_owned(), "2.5".to_owned()])
-        );
-        assert_eq!(
-            names(&["a/1.jpg", "b/1.jpg"]),
-            Ok(vec!["a-1".to_owned(), "b-1".to_owned()])
-        );
-        assert_eq!(
-            names(&["1.jpg", "1.png"]),
-            Ok(vec!["1.jpg".to_owned(), "1.png".to_owned()])
-        );
+        assert_eq!(names(&["a/1.jpg", "a/2.5.jpg"]), Ok(vec!["1".to_owned(), "2.5".to_owned()]));
+        assert_eq!(names(&["a/1.jpg", "b/1.jpg"]), Ok(vec!["a-1".to_owned(), "b-1".to_owned()]));
+        assert_eq!(names(&["1.jpg", "1.png"]), Ok(vec!["1.jpg".to_owned(), "1.png".to_owned()]));
         assert!(names(&["a/1.jpg", "b/1.jpg", "a-1.jpg"]).is_err());
     }
 }

@@ -83,10 +83,7 @@ fn read_depth(path: &Path) -> Result<DepthImage, SceneError> {
         DynamicImage::ImageLuma16(depth) => Ok(depth),
         other => Err(SceneError::expected(
             path,
-            format!(
-                "a depth image of 16-bit grey values expected, {:?} found",
-                other.color()
-            ),
+            format!("a depth image of 16-bit grey values expected, {:?} found", other.color()),
         )),
     }
 }
@@ -100,10 +97,7 @@ mod tests {
         for size in [(640, 480), (1280, 720), (1920, 1080), (8000, 8000)] {
             let step = step(size);
             let points = (size.0 / step) * (size.1 / step);
-            assert!(
-                (10_000..=MOST_POINTS).contains(&points),
-                "{size:?}: {points}"
-            );
+            assert!((10_000..=MOST_POINTS).contains(&points), "{size:?}: {points}");
         }
         assert_eq!(step((100, 100)), 1);
     }

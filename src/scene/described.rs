@@ -170,10 +170,7 @@ impl Source {
 }
 
 fn open(path: &Path) -> Result<Box<dyn Scene>, SceneError> {
-    let source = Source {
-        path: path.to_owned(),
-        text: lines::read_text(path)?,
-    };
+    let source = Source { path: path.to_owned(), text: lines::read_text(path)? };
     let description: Description = toml::from_str(&source.text).map_err(|error| {
         let at = error.span().map_or(0, |span| span.start);
         source.error_at(at, error.message())
@@ -219,12 +216,7 @@ fn camera(
     let numbers = [camera.fx, camera.fy, camera.cx, camera.cy];
     let error = |why: String| source.error(described, &why);
     let taken = pinhole(numbers, photo_file::dimensions(first)?).map_err(error)?;
-    let distortion = Distortion {
-        k1: camera.k1,
-        k2: camera.k2,
-        p1: camera.p1,
-        p2: camera.p2,
-    };
+    let distortion = Distortion { k1: camera.k1, k2: camera.k2, p1: camera.p1, p2: camera.p2 };
     developed_camera(taken, distortion).map_err(error)
 }
 
@@ -339,9 +331,7 @@ impl Clouds for DescribedClouds {
                 };
                 let cloud = cloud_file::read(path)?;
                 let in_camera = |point: Point3<f64>| (camera_from_cloud * point).cast();
-                Ok(Cloud {
-                    points: cloud.positions().map(in_camera).collect(),
-                })
+                Ok(Cloud { points: cloud.positions().map(in_camera).collect() })
             }
         }
     }

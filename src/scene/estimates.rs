@@ -41,9 +41,8 @@ fn by_time(
         let time: Option<f64> = scene.time_s(frame).or_else(named);
         time.filter(|time| time.is_finite())
     };
-    let mut timed: Vec<(f64, usize)> = (0..frames.len())
-        .filter_map(|frame| Some((time(frame)?, frame)))
-        .collect();
+    let mut timed: Vec<(f64, usize)> =
+        (0..frames.len()).filter_map(|frame| Some((time(frame)?, frame))).collect();
     timed.sort_by(|a, b| a.0.total_cmp(&b.0));
     let times: Vec<f64> = timed.iter().map(|(time, _)| *time).collect();
     let moments: Vec<f64> = samples.iter().map(|(time, _)| *time).collect();
@@ -98,21 +97,16 @@ fn by_name(
 ) -> Result<Estimates, SceneError> {
     let mut estimates = Estimates::new();
     let mut stranger = None;
-    for NamedPose {
-        line,
-        name,
-        world_from_camera,
-    } in poses
-    {
+    for NamedPose { line, name, world_from_camera } in poses {
         let Some(frame) = names.find(&name) else {
             stranger = stranger.or(Some(name));
             continue;
         };
         let frame = &scene.frames()[frame];
         if estimates.insert(frame.clone(), world_from_camera).is_some() {
-            return Err(line.error(format!(
-                "one pose per frame expected, frame {frame} has one already"
-            )));
+            return Err(
+                line.error(format!("one pose per frame expected, frame {frame} has one already"))
+            );
         }
     }
     if estimates.is_empty() {

@@ -24,9 +24,7 @@ pub(super) fn numbered<N: FromStr + Ord>(
 ) -> Result<BTreeMap<N, PathBuf>, SceneError> {
     let files = entries(folder)?.into_iter().filter_map(|path| {
         let number = stem(&path).parse().ok()?;
-        path.extension()
-            .is_some_and(|found| found == extension)
-            .then_some((number, path))
+        path.extension().is_some_and(|found| found == extension).then_some((number, path))
     });
     Ok(files.collect())
 }
@@ -72,10 +70,7 @@ mod tests {
     #[test]
     fn no_name_leads_out_of_the_folder() {
         let folder = Path::new("scene");
-        assert_eq!(
-            within(folder, "./rgb/1.png"),
-            Ok(folder.join("./rgb/1.png"))
-        );
+        assert_eq!(within(folder, "./rgb/1.png"), Ok(folder.join("./rgb/1.png")));
         for name in ["../other.png", "rgb/../../other.png", "/etc/passwd", ""] {
             assert!(within(folder, name).is_err(), "{name}");
         }

@@ -62,10 +62,7 @@ pub fn located(
         let called = rows.first().map_or("", |row| row.name);
         return Err(file.error(names.none_found("positions of the queries", called)));
     }
-    Ok(Arc::new(Located {
-        scene: queries,
-        positions,
-    }))
+    Ok(Arc::new(Located { scene: queries, positions }))
 }
 
 /// The meaning of a line's numbers.
@@ -160,10 +157,8 @@ impl Tie {
             };
             names.iter().find_map(of_scene)
         };
-        let ties: Vec<([f64; 3], Vector3<f64>)> = rows
-            .iter()
-            .filter_map(|row| Some((row.place, pose(row)?)))
-            .collect();
+        let ties: Vec<([f64; 3], Vector3<f64>)> =
+            rows.iter().filter_map(|row| Some((row.place, pose(row)?))).collect();
         let [(origin, _), _, _, ..] = ties[..] else {
             return Err(file.error(format!(
                 "at least 3 frames with a known pose expected, to convert latitudes and longitudes to the \
@@ -171,10 +166,8 @@ impl Tie {
                 ties.len()
             )));
         };
-        let pairs: Vec<(Vector3<f64>, Vector3<f64>)> = ties
-            .iter()
-            .map(|(place, world)| (local(*place, origin).coords, *world))
-            .collect();
+        let pairs: Vec<(Vector3<f64>, Vector3<f64>)> =
+            ties.iter().map(|(place, world)| (local(*place, origin).coords, *world)).collect();
         let world_from_local = similarity(&pairs).ok_or_else(|| {
             file.error("frames with a known pose at different places expected, to convert latitudes and longitudes")
         })?;
@@ -188,10 +181,7 @@ impl Tie {
             pairs.len(),
             world_from_local.scaling()
         );
-        Ok(Self {
-            origin,
-            world_from_local,
-        })
+        Ok(Self { origin, world_from_local })
     }
 }
 

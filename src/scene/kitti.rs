@@ -85,10 +85,8 @@ fn moved(camera0_from_velodyne: &Matrix3x4<f64>, camera_from_camera0: &Pose) -> 
 
 /// Poses by frame number; `None` if the sequence has no pose file.
 fn read_poses(folder: &Path, sequence: &str, last: usize) -> Result<Option<PoseLines>, SceneError> {
-    let candidates = [
-        folder.join("poses.txt"),
-        folder.join("../../poses").join(format!("{sequence}.txt")),
-    ];
+    let candidates =
+        [folder.join("poses.txt"), folder.join("../../poses").join(format!("{sequence}.txt"))];
     let Some(path) = candidates.into_iter().find(|path| path.is_file()) else {
         warn_without_poses(folder, "pose file");
         return Ok(None);
@@ -105,10 +103,7 @@ fn read_times(path: &Path, last: usize) -> Result<Vec<f64>, SceneError> {
         return Ok(Vec::new());
     }
     let file = TextFile::read(path)?;
-    let times = file
-        .lines()
-        .map(|line| line.number(line.text))
-        .collect::<Result<Vec<_>, _>>()?;
+    let times = file.lines().map(|line| line.number(line.text)).collect::<Result<Vec<_>, _>>()?;
     expect_rows(&file, "times", times.len(), last)?;
     Ok(times)
 }
@@ -151,8 +146,6 @@ impl Clouds for Scans {
 
     fn read(&self, index: usize, _frame: &Frame) -> Result<Cloud, SceneError> {
         let matrix = self.camera_from_velodyne.unwrap_or_else(Matrix3x4::zeros);
-        read_scan(&self.paths[index], |point| {
-            Point3::from(matrix * point.to_homogeneous())
-        })
+        read_scan(&self.paths[index], |point| Point3::from(matrix * point.to_homogeneous()))
     }
 }

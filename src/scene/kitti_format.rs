@@ -29,11 +29,7 @@ impl<'a> Camera<'a> {
             (Some(drive), Some(camera)) => (drive, Some(camera)),
             _ => (path, None),
         };
-        Self {
-            folder,
-            wanted,
-            known,
-        }
+        Self { folder, wanted, known }
     }
 
     /// The camera's folder: the one in the path, or the first that exists.
@@ -122,7 +118,5 @@ pub(super) fn read_scan(
         Ok(camera_from_velodyne(Point3::new(x, y, z)).cast())
     };
     let points = records.iter().enumerate().map(point);
-    Ok(Cloud {
-        points: points.collect::<Result<_, _>>()?,
-    })
+    Ok(Cloud { points: points.collect::<Result<_, _>>()? })
 }

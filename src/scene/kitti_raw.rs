@@ -124,11 +124,8 @@ fn scans<'a>(
     correct: bool,
 ) -> Result<Vec<Option<Scan>>, SceneError> {
     let data = folder.join("data");
-    let files: BTreeMap<usize, PathBuf> = if data.is_dir() {
-        numbered(&data, "bin")?
-    } else {
-        BTreeMap::new()
-    };
+    let files: BTreeMap<usize, PathBuf> =
+        if data.is_dir() { numbered(&data, "bin")? } else { BTreeMap::new() };
     let starts = timestamps::read(&folder.join("timestamps_start.txt"))?;
     let ends = timestamps::read(&folder.join("timestamps_end.txt"))?;
     let scan = |number: &usize| {

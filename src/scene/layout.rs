@@ -129,11 +129,7 @@ fn write_depth(
         ImageBuffer::from_fn(camera.width, camera.height, |x, y| {
             let depth_m = depth(Point2::new(f64::from(x), f64::from(y)));
             let value = depth_m.map_or(0.0, |depth_m| (depth_m / unit_m).round());
-            Luma([if value < f64::from(u16::MAX) {
-                value as u16
-            } else {
-                0
-            }])
+            Luma([if value < f64::from(u16::MAX) { value as u16 } else { 0 }])
         });
     write_image(path, &image)
 }

@@ -64,18 +64,12 @@ impl Lens {
         let with_zoom = |zoom: f64| Self {
             source,
             distortion,
-            pinhole: Intrinsics {
-                fx: source.fx * zoom,
-                fy: source.fy * zoom,
-                ..source
-            },
+            pinhole: Intrinsics { fx: source.fx * zoom, fy: source.fy * zoom, ..source },
         };
         let (mut blank, mut full) = (1.0, Self::MOST_ZOOM);
         let widest = with_zoom(full);
         if !widest.has_no_blank() {
-            return Err(format!(
-                "a distortion that can be removed expected, {distortion:?} found"
-            ));
+            return Err(format!("a distortion that can be removed expected, {distortion:?} found"));
         }
         if with_zoom(blank).has_no_blank() {
             return Ok(with_zoom(blank));
@@ -97,10 +91,7 @@ impl Lens {
         let direction = self.pinhole.unproject(&pixel, 1.0);
         let seen = self.distortion.distorted(direction.xy());
         let source = &self.source;
-        Point2::new(
-            source.fx * seen.x + source.cx,
-            source.fy * seen.y + source.cy,
-        )
+        Point2::new(source.fx * seen.x + source.cx, source.fy * seen.y + source.cy)
     }
 
     /// Whether every pixel of the undistorted photo is inside the original photo. Testing the border is enough.
@@ -171,14 +162,7 @@ pub(super) fn pinhole(
             "positive focal lengths fx, fy and a centre cx, cy expected, {fx} {fy} {cx} {cy} found"
         ));
     }
-    Ok(Intrinsics {
-        fx,
-        fy,
-        cx,
-        cy,
-        width,
-        height,
-    })
+    Ok(Intrinsics { fx, fy, cx, cy, width, height })
 }
 
 /// The camera of undistorted photos, and what undistorts them; `None` without distortion.
@@ -199,14 +183,8 @@ mod tests {
     use image::{Luma, Rgb};
     use nalgebra::Point3;
 
-    const CAMERA: Intrinsics = Intrinsics {
-        fx: 200.0,
-        fy: 210.0,
-        cx: 158.0,
-        cy: 121.5,
-        width: 320,
-        height: 240,
-    };
+    const CAMERA: Intrinsics =
+        Intrinsics { fx: 200.0, fy: 210.0, cx: 158.0, cy: 121.5, width: 320, height: 240 };
 
     fn distortion(k1: f64, k2: f64, p1: f64, p2: f64) -> Distortion {
         Distortion { k1, k2, p1, p2 }
@@ -215,9 +193,7 @@ mod tests {
     /// A photo with distortion of a plane at depth 1 whose grey value is a smooth function.
     fn taken(lens: &Lens, value: impl Fn(Point2<f64>) -> f64) -> GrayImage {
         GrayImage::from_fn(CAMERA.width, CAMERA.height, |x, y| {
-            let seen = CAMERA
-                .unproject(&Point2::new(f64::from(x), f64::from(y)), 1.0)
-                .xy();
+            let seen = CAMERA.unproject(&Point2::new(f64::from(x), f64::from(y)), 1.0).xy();
             // The direction that is seen there, by fixed-point iteration.
             let mut at = seen;
             for _ in 0..50 {
@@ -230,10 +206,9 @@ mod tests {
     #[test]
     fn an_undistorted_photo_is_what_the_pinhole_sees() {
         let value = |at: Point2<f64>| 128.0 + 60.0 * (9.0 * at.x).sin() + 50.0 * (7.0 * at.y).cos();
-        for coefficients in [
-            distortion(-0.2, 0.03, 0.0, 0.0),
-            distortion(0.15, 0.02, 0.001, -0.002),
-        ] {
+        for coefficients in
+            [distortion(-0.2, 0.03, 0.0, 0.0), distortion(0.15, 0.02, 0.001, -0.002)]
+        {
             let lens = Lens::new(CAMERA, coefficients).expect("can be undistorted");
             let photo = lens.developed(Photo::from_gray(taken(&lens, value)));
             let pinhole = lens.pinhole;
@@ -241,10 +216,7 @@ mod tests {
                 let at = pinhole.unproject(&Point2::new(f64::from(x), f64::from(y)), 1.0);
                 let expected = value(at.xy());
                 let found = f64::from(gray.0[0]);
-                assert!(
-                    (found - expected).abs() < 3.0,
-                    "{x} {y}: {found} {expected}"
-                );
+                assert!((found - expected).abs() < 3.0, "{x} {y}: {found} {expected}");
             }
         }
     }

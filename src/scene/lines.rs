@@ -24,18 +24,12 @@ pub(super) struct Line<'a> {
 
 impl TextFile {
     pub fn read(path: &Path) -> Result<Self, SceneError> {
-        Ok(Self {
-            path: path.to_owned(),
-            text: read_text(path)?,
-        })
+        Ok(Self { path: path.to_owned(), text: read_text(path)? })
     }
 
     /// A text that is not from a file; errors use `name` in place of the file.
     pub fn from_text(name: &str, text: &str) -> Self {
-        Self {
-            path: name.into(),
-            text: text.to_owned(),
-        }
+        Self { path: name.into(), text: text.to_owned() }
     }
 
     /// The lines that are neither empty nor comments (`#`).
@@ -46,11 +40,7 @@ impl TextFile {
     /// All lines, including empty ones and comments.
     pub fn all_lines(&self) -> impl Iterator<Item = Line<'_>> {
         let lines = self.text.lines().enumerate();
-        lines.map(|(index, text)| Line {
-            path: &self.path,
-            number: index + 1,
-            text: text.trim(),
-        })
+        lines.map(|(index, text)| Line { path: &self.path, number: index + 1, text: text.trim() })
     }
 
     /// An error about the file as a whole.
@@ -66,9 +56,7 @@ impl TextFile {
         let mut lines = self.lines();
         for (found, row) in rows.iter_mut().enumerate() {
             let line = lines.next().ok_or_else(|| {
-                self.error(format!(
-                    "{ROWS} lines of {COLUMNS} numbers expected, {found} found"
-                ))
+                self.error(format!("{ROWS} lines of {COLUMNS} numbers expected, {found} found"))
             })?;
             *row = line.numbers()?;
         }
@@ -131,15 +119,11 @@ pub(super) fn pose(position: [f64; 3], quaternion: [f64; 4]) -> Result<Pose, Str
             "a quaternion of length 1 expected, {x} {y} {z} {w} (x y z w) has length {length:.3}"
         ));
     }
-    Ok(Pose::from_parts(
-        Translation3::from(position),
-        UnitQuaternion::from_quaternion(quaternion),
-    ))
+    Ok(Pose::from_parts(Translation3::from(position), UnitQuaternion::from_quaternion(quaternion)))
 }
 
 fn words(text: &str) -> impl Iterator<Item = &str> {
-    text.split(|c: char| c.is_whitespace() || c == ',')
-        .filter(|word| !word.is_empty())
+    text.split(|c: char| c.is_whitespace() || c == ',').filter(|word| !word.is_empty())
 }
 
 /// As many finite numbers as are asked for, and nothing else.
@@ -160,9 +144,8 @@ pub(super) fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
 }
 
 fn number(word: &str) -> Result<f64, String> {
-    let number: f64 = word
-        .parse()
-        .map_err(|_| format!("a number expected, `{}` found", excerpt(word)))?;
+    let number: f64 =
+        word.parse().map_err(|_| format!("a number expected, `{}` found", excerpt(word)))?;
     if !number.is_finite() {
         return Err(format!("finite numbers expected, `{word}` found"));
     }
@@ -178,11 +161,7 @@ pub(super) fn excerpt(word: &str) -> String {
 pub(super) fn excerpt_of(text: &str, most: usize) -> String {
     let printable = |c: char| if c.is_control() { '\u{fffd}' } else { c };
     let short: String = text.chars().take(most).map(printable).collect();
-    if text.chars().nth(most).is_some() {
-        short + "…"
-    } else {
-        short
-    }
+    if text.chars().nth(most).is_some() { short + "…" } else { short }
 }
 
 pub(super) fn read_text(path: &Path) -> Result<String, SceneError> {
@@ -194,10 +173,7 @@ mod tests {
     use super::*;
 
     fn file(text: &str) -> TextFile {
-        TextFile {
-            path: "a.txt".into(),
-            text: text.to_owned(),
-        }
+        TextFile { path: "a.txt".into(), text: text.to_owned() }
     }
 
     fn said<T>(result: Result<T, SceneError>) -> Result<T, String> {

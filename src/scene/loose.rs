@@ -42,9 +42,7 @@ impl LoosePhotos {
     /// The file of the photo with this name.
     pub fn path_of(&self, name: &str) -> Option<&Path> {
         let mut paths = self.paths.iter();
-        paths
-            .find(|path| Self::name(path) == name)
-            .map(PathBuf::as_path)
+        paths.find(|path| Self::name(path) == name).map(PathBuf::as_path)
     }
 
     /// Opens the photos as a scene without poses and clouds.
@@ -53,11 +51,7 @@ impl LoosePhotos {
     /// A file that is not an image, a camera for another image size, a missing camera, or two files with the same name.
     pub fn open(&self) -> Result<Arc<dyn Scene>, SceneError> {
         let mut names = BTreeSet::new();
-        if let Some(twice) = self
-            .paths
-            .iter()
-            .find(|path| !names.insert(Self::name(path)))
-        {
+        if let Some(twice) = self.paths.iter().find(|path| !names.insert(Self::name(path))) {
             let name = Self::name(twice);
             let expected = format!("photos with different names expected, two are called {name}");
             return Err(SceneError::expected(twice, expected));
@@ -105,10 +99,7 @@ impl LoosePhotos {
         let camera = camera.of_photo(path, stored)?;
         let (intrinsics, develop) =
             developed_camera(camera.intrinsics, camera.distortion).map_err(error)?;
-        Ok(Frame {
-            develop,
-            ..Frame::new(path.to_owned(), intrinsics)
-        })
+        Ok(Frame { develop, ..Frame::new(path.to_owned(), intrinsics) })
     }
 }
 

@@ -62,11 +62,7 @@ impl MapBlocks {
             });
             start += chunk.len();
         }
-        Self {
-            origin,
-            points,
-            blocks,
-        }
+        Self { origin, points, blocks }
     }
 
     /// The points of all blocks that may be in a camera's view, in its frame \[m\].
@@ -119,19 +115,10 @@ mod tests {
             Point3::new(along(200.0), along(200.0), along(20.0))
         };
         let points: Vec<_> = (0..50_000).map(|_| point()).collect();
-        let map = MapCloud {
-            origin,
-            points: points.clone(),
-        };
+        let map = MapCloud { origin, points: points.clone() };
         let blocks = MapBlocks::new(map);
-        let camera = Intrinsics {
-            fx: 300.0,
-            fy: 320.0,
-            cx: 300.0,
-            cy: 250.0,
-            width: 640,
-            height: 480,
-        };
+        let camera =
+            Intrinsics { fx: 300.0, fy: 320.0, cx: 300.0, cy: 250.0, width: 640, height: 480 };
         let turn = nalgebra::UnitQuaternion::from_euler_angles(0.3, -1.1, 0.2);
         let at = nalgebra::Translation3::from(origin + Vector3::new(20.0, -30.0, 1.0));
         let world_from_camera = Pose::from_parts(at, turn);

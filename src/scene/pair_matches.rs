@@ -74,11 +74,7 @@ impl RawMatches {
 
     /// The matches from the query to the reference.
     fn of_query(self, order: Order) -> FoundMatches {
-        let Self {
-            first,
-            second,
-            partners,
-        } = self;
+        let Self { first, second, partners } = self;
         match order {
             Order::QueryFirst => FoundMatches::new(&first, &second, &partners),
             Order::ReferenceFirst => {
@@ -127,22 +123,14 @@ impl MatchFolder {
             [] => None,
             files => Some(HlocFiles::open(folder, files)?),
         };
-        Ok(Self {
-            folder: folder.to_owned(),
-            hloc,
-        })
+        Ok(Self { folder: folder.to_owned(), hloc })
     }
 
     fn of_pair(&self, query: &str, reference: &str) -> Result<Option<FoundMatches>, SceneError> {
-        let orders = [
-            (Order::QueryFirst, query, reference),
-            (Order::ReferenceFirst, reference, query),
-        ];
+        let orders =
+            [(Order::QueryFirst, query, reference), (Order::ReferenceFirst, reference, query)];
         for (order, first, second) in orders {
-            let file = |ending: &str| {
-                self.folder
-                    .join(format!("{}.{ending}", pair(first, second)))
-            };
+            let file = |ending: &str| self.folder.join(format!("{}.{ending}", pair(first, second)));
             let (text, npz) = (file("txt"), file("npz"));
             let found = if text.is_file() {
                 Some(text::read(&text)?.checked(&text)?)
@@ -212,18 +200,9 @@ mod tests {
     fn partners_that_are_not_there_are_refused() {
         let path = Path::new("a.npz");
         assert!(raw().checked(path).is_ok());
-        let beyond = RawMatches {
-            partners: vec![Some(2), None, None],
-            ..raw()
-        };
-        let short = RawMatches {
-            partners: vec![None],
-            ..raw()
-        };
-        let infinite = RawMatches {
-            second: vec![[f32::INFINITY, 0.0]; 2],
-            ..raw()
-        };
+        let beyond = RawMatches { partners: vec![Some(2), None, None], ..raw() };
+        let short = RawMatches { partners: vec![None], ..raw() };
+        let infinite = RawMatches { second: vec![[f32::INFINITY, 0.0]; 2], ..raw() };
         for wrong in [beyond, short, infinite] {
             assert!(wrong.checked(path).is_err());
         }

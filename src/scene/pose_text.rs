@@ -131,9 +131,7 @@ mod tests {
 
     #[test]
     fn lines_are_in_the_order_of_the_frames_or_by_the_number_of_a_name() {
-        let text: String = (0..3)
-            .map(|z| format!("1 0 0 0 0 1 0 0 0 0 1 {z}\n"))
-            .collect();
+        let text: String = (0..3).map(|z| format!("1 0 0 0 0 1 0 0 0 0 1 {z}\n")).collect();
         let poses = by_line(&TextFile::from_text("poses.txt", &text)).expect("three poses");
         let way_m = |pose: Option<Pose>| pose.map(|pose| pose.translation.vector.z);
         assert_eq!(way_m(poses.of_frame(0, 3, "img2")), Some(0.0));

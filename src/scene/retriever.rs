@@ -136,11 +136,7 @@ impl Retriever {
         // Any vocabulary will do, but the features must be the same.
         let features = recipe(params, &["features"]);
         index.check(scene.name(), scene.fingerprint(), &features)?;
-        Ok(Self {
-            index,
-            surf: params.surf,
-            params: params.retrieval,
-        })
+        Ok(Self { index, surf: params.surf, params: params.retrieval })
     }
 
     /// Opens the index of the scene `argument`: the given file, or that of [`Self::default_path`].
@@ -154,15 +150,10 @@ impl Retriever {
         params: &Params,
     ) -> Result<Self, NoIndex> {
         let path = given.map(Path::to_owned);
-        let path = path
-            .or_else(|| Self::default_path(scene, argument))
-            .ok_or(NoIndex::NoFolder)?;
+        let path = path.or_else(|| Self::default_path(scene, argument)).ok_or(NoIndex::NoFolder)?;
         Self::open(&path, scene, params).map_err(|source| {
             let output = given.map_or(String::new(), |path| format!(" --out {}", path.display()));
-            NoIndex::Unusable {
-                source,
-                command: format!("posescope index {argument}{output}"),
-            }
+            NoIndex::Unusable { source, command: format!("posescope index {argument}{output}") }
         })
     }
 

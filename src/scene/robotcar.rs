@@ -36,9 +36,7 @@ pub(super) const ENTRY: Entry = Entry {
     recognizes: |argument| {
         let (path, _) = split_word(argument, &[ALL]);
         let (traversal, _) = split_camera(path);
-        CAMERAS
-            .iter()
-            .any(|camera| traversal.join(camera.folder).is_dir())
+        CAMERAS.iter().any(|camera| traversal.join(camera.folder).is_dir())
             && Sdk::find(&traversal).is_some()
     },
     open: |argument| {
@@ -64,22 +62,14 @@ struct CameraKind {
 /// The cameras in the order of preference. The SDK files the stereo rig's centre camera as the left one of the
 /// narrow pair.
 const CAMERAS: [CameraKind; 4] = [
-    CameraKind {
-        folder: "stereo/centre",
-        model: "stereo_narrow_left",
-        pattern: Pattern::Gbrg,
-    },
+    CameraKind { folder: "stereo/centre", model: "stereo_narrow_left", pattern: Pattern::Gbrg },
     mono("mono_rear"),
     mono("mono_left"),
     mono("mono_right"),
 ];
 
 const fn mono(name: &'static str) -> CameraKind {
-    CameraKind {
-        folder: name,
-        model: name,
-        pattern: Pattern::Rggb,
-    }
+    CameraKind { folder: name, model: name, pattern: Pattern::Rggb }
 }
 
 impl CameraKind {
@@ -104,9 +94,7 @@ fn split_camera(path: &Path) -> (PathBuf, Option<&'static CameraKind>) {
 
 fn open(path: &Path, keeps_all: bool) -> Result<Box<dyn Scene>, SceneError> {
     let (traversal, wanted) = split_camera(path);
-    let there = CAMERAS
-        .iter()
-        .find(|camera| traversal.join(camera.folder).is_dir());
+    let there = CAMERAS.iter().find(|camera| traversal.join(camera.folder).is_dir());
     let camera = wanted.or(there).ok_or_else(|| {
         SceneError::expected(
             &traversal,
@@ -134,11 +122,7 @@ fn open(path: &Path, keeps_all: bool) -> Result<Box<dyn Scene>, SceneError> {
         file if file.is_file() => read_odometry(&file)?,
         _ => ins.clone(),
     };
-    let driven = if motion.samples().is_empty() {
-        &ins
-    } else {
-        &motion
-    };
+    let driven = if motion.samples().is_empty() { &ins } else { &motion };
     let photos = photos(&traversal, camera, driven, keeps_all)?;
     let Some((_, first)) = photos.first() else {
         return Err(SceneError::expected(
@@ -151,10 +135,7 @@ fn open(path: &Path, keeps_all: bool) -> Result<Box<dyn Scene>, SceneError> {
     let camera_from_vehicle = sdk.extrinsics(camera.rig())?;
     let vehicle_from_image = camera_from_vehicle.inverse() * model.camera_from_image;
     let intrinsics = model.intrinsics;
-    let develop: Arc<dyn Develop> = Arc::new(Sensor {
-        pattern: camera.pattern,
-        model,
-    });
+    let develop: Arc<dyn Develop> = Arc::new(Sensor { pattern: camera.pattern, model });
     let scans = Scans {
         files: scan_files(&traversal, &sdk)?,
         motion,
@@ -195,9 +176,7 @@ fn photos(
     } else {
         times.into_iter().filter(is_moving).step_by(KEPT).collect()
     };
-    let photos = kept
-        .into_iter()
-        .map(|time| (time, folder.join(format!("{time}.png"))));
+    let photos = kept.into_iter().map(|time| (time, folder.join(format!("{time}.png"))));
     Ok(photos.filter(|(_, photo)| photo.is_file()).collect())
 }
 

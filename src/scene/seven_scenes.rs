@@ -39,20 +39,10 @@ const SPLITS: [&str; 2] = ["train", "test"];
 
 /// The depth of a value of 1 \[m\].
 const UNIT_M: f64 = 0.001;
-const COLOR: Intrinsics = Intrinsics {
-    fx: 525.0,
-    fy: 525.0,
-    cx: 320.0,
-    cy: 240.0,
-    width: 640,
-    height: 480,
-};
+const COLOR: Intrinsics =
+    Intrinsics { fx: 525.0, fy: 525.0, cx: 320.0, cy: 240.0, width: 640, height: 480 };
 /// The depth camera, as documented; both cameras have its principal point.
-const DEPTH: Intrinsics = Intrinsics {
-    fx: 585.0,
-    fy: 585.0,
-    ..COLOR
-};
+const DEPTH: Intrinsics = Intrinsics { fx: 585.0, fy: 585.0, ..COLOR };
 
 /// The colour camera of a Kinect from its depth camera, rotation and translation \[m\]: the LIRIS calibration.
 const COLOR_FROM_DEPTH: (Matrix3<f64>, [f64; 3]) = (
@@ -150,10 +140,7 @@ fn read_split(folder: &Path, split: &str) -> Result<Vec<u32>, SceneError> {
         .lines()
         .map(|line| {
             let number = line.text.strip_prefix("sequence").unwrap_or(line.text);
-            number
-                .trim()
-                .parse()
-                .map_err(|_| line.error("a line such as `sequence3` expected"))
+            number.trim().parse().map_err(|_| line.error("a line such as `sequence3` expected"))
         })
         .collect()
 }
@@ -214,8 +201,7 @@ fn read_pose(path: &Path) -> Result<Option<Pose>, SceneError> {
     let rows = file.rows::<4, 4>()?;
     let matrix = Matrix4::from_fn(|row, column| rows[row][column]);
     let pose = pose_from_matrix(&matrix.fixed_rows::<3>(0).into_owned());
-    pose.map(Some)
-        .map_err(|error| file.error(error.to_string()))
+    pose.map(Some).map_err(|error| file.error(error.to_string()))
 }
 
 struct Cameras {

@@ -31,11 +31,7 @@ impl Trajectory {
     pub fn new(mut samples: Vec<(f64, Pose)>, interpolated: f64, same_moment: f64) -> Self {
         samples.sort_by(|a, b| a.0.total_cmp(&b.0));
         samples.dedup_by_key(|(time, _)| *time);
-        Self {
-            samples,
-            interpolated,
-            same_moment,
-        }
+        Self { samples, interpolated, same_moment }
     }
 
     /// The pose at a time: interpolated between two close samples, otherwise that of the same moment, if any.
@@ -80,10 +76,8 @@ impl Trajectory {
 fn between(from: &Pose, to: &Pose, share: f64) -> Pose {
     let position = from.translation.vector.lerp(&to.translation.vector, share);
     // Opposite rotations have no shortest path; either will do.
-    let rotation: UnitQuaternion<f64> = from
-        .rotation
-        .try_slerp(&to.rotation, share, 1e-9)
-        .unwrap_or(from.rotation);
+    let rotation: UnitQuaternion<f64> =
+        from.rotation.try_slerp(&to.rotation, share, 1e-9).unwrap_or(from.rotation);
     Pose::from_parts(Translation3::from(position), rotation)
 }
 
@@ -94,9 +88,8 @@ pub(super) fn associated(times: &[f64], others: &[f64]) -> Vec<Option<usize>> {
     for (index, time) in times.iter().enumerate() {
         let first = others.partition_point(|other| *other < time - SAME_MOMENT_S);
         let near = others[first..].iter().enumerate();
-        let near = near
-            .take_while(|(_, other)| **other <= time + SAME_MOMENT_S)
-            .take(MOST_CANDIDATES);
+        let near =
+            near.take_while(|(_, other)| **other <= time + SAME_MOMENT_S).take(MOST_CANDIDATES);
         pairs.extend(near.map(|(other, at)| ((at - time).abs(), index, first + other)));
     }
     pairs.sort_by(|a, b| a.0.total_cmp(&b.0).then((a.1, a.2).cmp(&(b.1, b.2))));
@@ -118,10 +111,7 @@ mod tests {
     fn trajectory(times: &[f64]) -> Trajectory {
         let sample = |&time: &f64| {
             let turn = UnitQuaternion::from_euler_angles(0.0, 0.0, time);
-            (
-                time,
-                Pose::from_parts(Translation3::new(10.0 * time, 0.0, 1.0), turn),
-            )
+            (time, Pose::from_parts(Translation3::new(10.0 * time, 0.0, 1.0), turn))
         };
         Trajectory::in_seconds(times.iter().map(sample).collect())
     }

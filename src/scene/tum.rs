@@ -22,9 +22,7 @@ pub(super) const ENTRY: Entry = Entry {
     about: "TUM RGB-D: a folder with rgb.txt, depth.txt and groundtruth.txt",
     recognizes: |argument| {
         let folder = Path::new(argument);
-        ["rgb.txt", "depth.txt"]
-            .iter()
-            .all(|list| folder.join(list).is_file())
+        ["rgb.txt", "depth.txt"].iter().all(|list| folder.join(list).is_file())
     },
     open: |argument| open(Path::new(argument)),
 };
@@ -77,12 +75,8 @@ fn open(folder: &Path) -> Result<Box<dyn Scene>, SceneError> {
         ));
     }
     let name = format!("tum/{}", folder_name(folder));
-    let clouds = DepthImages {
-        images,
-        listed_in: folder.join("depth.txt"),
-        beside: None,
-        unit_m: UNIT_M,
-    };
+    let clouds =
+        DepthImages { images, listed_in: folder.join("depth.txt"), beside: None, unit_m: UNIT_M };
     Ok(Box::new(FileScene::new(name, frames, clouds)))
 }
 

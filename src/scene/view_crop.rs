@@ -26,10 +26,7 @@ pub(super) fn in_view(points: impl Iterator<Item = Point3<f64>>, camera: &Intrin
     let rows = camera.height.div_ceil(side) as usize;
     let mut nearest: Vec<Option<Point3<f32>>> = vec![None; columns * rows];
     for point in points {
-        let Some(pixel) = camera
-            .project(&point)
-            .filter(|pixel| camera.contains(pixel))
-        else {
+        let Some(pixel) = camera.project(&point).filter(|pixel| camera.contains(pixel)) else {
             continue;
         };
         if point.z < NEAREST_M {
@@ -47,9 +44,7 @@ pub(super) fn in_view(points: impl Iterator<Item = Point3<f64>>, camera: &Intrin
         let point = (*point)?;
         (!is_hidden(&nearest, columns, at, point.z)).then_some(point)
     });
-    Cloud {
-        points: visible.collect(),
-    }
+    Cloud { points: visible.collect() }
 }
 
 /// Whether nearer points surround a cell.
@@ -86,14 +81,8 @@ fn direction(dx: isize, dy: isize) -> Option<u32> {
 mod tests {
     use super::*;
 
-    const CAMERA: Intrinsics = Intrinsics {
-        fx: 300.0,
-        fy: 300.0,
-        cx: 319.5,
-        cy: 239.5,
-        width: 640,
-        height: 480,
-    };
+    const CAMERA: Intrinsics =
+        Intrinsics { fx: 300.0, fy: 300.0, cx: 319.5, cy: 239.5, width: 640, height: 480 };
 
     fn wall(depth: f64, step_px: f64) -> impl Iterator<Item = Point3<f64>> {
         let (columns, rows) = ((640.0 / step_px) as usize, (480.0 / step_px) as usize);

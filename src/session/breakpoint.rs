@@ -137,9 +137,7 @@ impl Breakpoint {
 
     /// The numbers that a breakpoint can watch: name and description.
     pub fn quantities() -> impl Iterator<Item = (&'static str, &'static str)> {
-        QUANTITIES
-            .iter()
-            .map(|quantity| (quantity.name, quantity.about))
+        QUANTITIES.iter().map(|quantity| (quantity.name, quantity.about))
     }
 
     /// The estimator of the stage or number; `None` means any.
@@ -164,17 +162,13 @@ impl FromStr for Breakpoint {
 
     fn from_str(text: &str) -> Result<Self, Self::Err> {
         let text = text.trim();
-        let refuse = |expected: String| BreakpointError {
-            text: text.to_owned(),
-            expected,
-        };
+        let refuse = |expected: String| BreakpointError { text: text.to_owned(), expected };
         let comparison = Relation::split(text);
         let scoped = comparison.map_or(text, |(name, ..)| name);
         let (method, name) = match scoped.split_once('.') {
             Some((method, name)) => {
-                let known = method
-                    .parse()
-                    .map_err(|error: UnknownWord| refuse(error.to_string()))?;
+                let known =
+                    method.parse().map_err(|error: UnknownWord| refuse(error.to_string()))?;
                 (Some(known), name)
             }
             None => (None, scoped),
@@ -182,9 +176,7 @@ impl FromStr for Breakpoint {
         let at = match comparison {
             Some((_, relation, bound)) => {
                 if relation == Relation::Contains {
-                    return Err(refuse(
-                        "numbers are compared with = != < <= > >=".to_owned(),
-                    ));
+                    return Err(refuse("numbers are compared with = != < <= > >=".to_owned()));
                 }
                 let quantity = QUANTITIES
                     .iter()
@@ -198,11 +190,7 @@ impl FromStr for Breakpoint {
                     .ok()
                     .filter(|bound: &f64| bound.is_finite())
                     .ok_or_else(|| refuse(format!("`{bound}` is not a number")))?;
-                BreakAt::Crossing(Crossing {
-                    quantity,
-                    relation,
-                    bound,
-                })
+                BreakAt::Crossing(Crossing { quantity, relation, bound })
             }
             None if method.is_some() && Self::OUTSIDE.contains(&name) => {
                 return Err(refuse(format!("the stage `{name}` belongs to no method")));
@@ -215,11 +203,7 @@ impl FromStr for Breakpoint {
                 })?)
             }
         };
-        Ok(Self {
-            text: text.to_owned(),
-            method,
-            at,
-        })
+        Ok(Self { text: text.to_owned(), method, at })
     }
 }
 
@@ -241,22 +225,16 @@ struct Watched {
 impl Breakpoints {
     /// Breakpoints that have not been reached yet.
     pub fn new(breakpoints: impl IntoIterator<Item = Breakpoint>) -> Self {
-        let watched = breakpoints.into_iter().map(|breakpoint| Watched {
-            breakpoint,
-            was_true: false,
-        });
-        Self {
-            watched: watched.collect(),
-        }
+        let watched =
+            breakpoints.into_iter().map(|breakpoint| Watched { breakpoint, was_true: false });
+        Self { watched: watched.collect() }
     }
 
     /// Replaces the breakpoints in the middle of a run. Those that stay keep their state.
     pub(super) fn replace(&mut self, other: Self) {
         let old = std::mem::replace(&mut self.watched, other.watched);
         for new in &mut self.watched {
-            new.was_true = old
-                .iter()
-                .any(|old| old.breakpoint == new.breakpoint && old.was_true);
+            new.was_true = old.iter().any(|old| old.breakpoint == new.breakpoint && old.was_true);
         }
     }
 
@@ -311,10 +289,7 @@ pub struct StopAtBreakpoint {
 impl StopAtBreakpoint {
     /// Stops at the first of these breakpoints.
     pub fn new(breakpoints: Breakpoints) -> Self {
-        Self {
-            breakpoints,
-            reached: None,
-        }
+        Self { breakpoints, reached: None }
     }
 
     /// The text of the breakpoint that ended the run.
@@ -347,12 +322,7 @@ mod tests {
     use crate::trace::Trace;
 
     fn record(event: impl Into<Event>) -> Record {
-        Record {
-            index: 0,
-            depth: 1,
-            methods: Default::default(),
-            event: event.into(),
-        }
+        Record { index: 0, depth: 1, methods: Default::default(), event: event.into() }
     }
 
     fn inliers(inliers: usize) -> Record {
@@ -367,10 +337,7 @@ mod tests {
     fn reached(breakpoints: &[&str], records: &[Record]) -> Vec<Option<String>> {
         let breakpoints = breakpoints.iter().map(|b| b.parse().expect("a breakpoint"));
         let mut breakpoints = Breakpoints::new(breakpoints);
-        records
-            .iter()
-            .map(|record| breakpoints.reached(record))
-            .collect()
+        records.iter().map(|record| breakpoints.reached(record)).collect()
     }
 
     #[test]
@@ -383,9 +350,7 @@ mod tests {
         let mut history = History::default();
         let mut trace = Trace::to(&mut history);
         feature_based(&mut trace).expect("not cancelled");
-        trace
-            .stage(Stage::Estimator(Method::HY), feature_based)
-            .expect("not cancelled");
+        trace.stage(Stage::Estimator(Method::HY), feature_based).expect("not cancelled");
         let run = history.records();
         let at = |text| -> Vec<usize> {
             let reached = reached(&[text], run);
@@ -401,15 +366,10 @@ mod tests {
     #[test]
     fn a_comparison_is_reached_when_it_becomes_true() {
         let run = [inliers(20), inliers(9), inliers(8), inliers(10), inliers(3)];
-        let hits: Vec<bool> = reached(&["inliers < 10"], &run)
-            .iter()
-            .map(Option::is_some)
-            .collect();
+        let hits: Vec<bool> =
+            reached(&["inliers < 10"], &run).iter().map(Option::is_some).collect();
         assert_eq!(hits, [false, true, false, false, true]);
-        let other = record(ProjectedCloud {
-            points: 3,
-            in_view: 2,
-        });
+        let other = record(ProjectedCloud { points: 3, in_view: 2 });
         assert_eq!(reached(&["inliers < 10"], &[other]), [None]);
     }
 
@@ -426,23 +386,12 @@ mod tests {
         };
         let run = [assessed(Some(0.81)), assessed(None), assessed(Some(0.9))];
         let hits = reached(&["margin<0.02", "margin >= 0.05"], &run);
-        assert_eq!(
-            hits,
-            [
-                Some("margin<0.02".to_owned()),
-                None,
-                Some("margin >= 0.05".to_owned())
-            ]
-        );
+        assert_eq!(hits, [Some("margin<0.02".to_owned()), None, Some("margin >= 0.05".to_owned())]);
     }
 
     #[test]
     fn nonsense_is_refused_with_what_there_is() {
-        let message = |text: &str| {
-            text.parse::<Breakpoint>()
-                .expect_err("nonsense")
-                .to_string()
-        };
+        let message = |text: &str| text.parse::<Breakpoint>().expect_err("nonsense").to_string();
         assert!(message("fb.ransack").contains("ransac"));
         assert!(message("xy.ransac").contains("`xy` is no method"));
         assert!(message("inlers < 10").contains("inliers"));

@@ -33,11 +33,7 @@ impl std::fmt::Debug for Opened {
 impl IndexFile {
     /// The index of the scene `argument`: this file, or the default one.
     pub fn new(argument: impl Into<String>, file: Option<PathBuf>) -> Self {
-        Self {
-            argument: argument.into(),
-            file,
-            opened: Mutex::default(),
-        }
+        Self { argument: argument.into(), file, opened: Mutex::default() }
     }
 
     /// The index of a task.

@@ -84,29 +84,25 @@ impl JobError {
 /// cancel.
 pub(super) fn spawn(job: Job, mut observer: PausingObserver, outbox: Outbox) {
     let worker = outbox.clone();
-    let started = thread::Builder::new()
-        .name("estimator".to_owned())
-        .spawn(move || {
-            let on_choice = |chosen: &References| {
-                let chosen = chosen.clone();
-                // If the session is gone, the next event fails.
-                let _ = worker.change(|run| {
-                    run.ranking = None;
-                    run.chosen = Some(chosen);
-                });
-            };
-            let outcome = catch_unwind(AssertUnwindSafe(|| job.work(0, &mut observer, on_choice)));
-            let last = match outcome {
-                Ok(Ok(_)) => RunState::Finished,
-                Ok(Err(error)) if error.is_cancelled() => RunState::Cancelled,
-                Ok(Err(error)) => RunState::Broken(error.to_string()),
-                Err(panic) => {
-                    RunState::Broken(format!("internal error: {}", words_of(panic.as_ref())))
-                }
-            };
-            // Fails only if the session was dropped.
-            let _ = worker.state(last);
-        });
+    let started = thread::Builder::new().name("estimator".to_owned()).spawn(move || {
+        let on_choice = |chosen: &References| {
+            let chosen = chosen.clone();
+            // If the session is gone, the next event fails.
+            let _ = worker.change(|run| {
+                run.ranking = None;
+                run.chosen = Some(chosen);
+            });
+        };
+        let outcome = catch_unwind(AssertUnwindSafe(|| job.work(0, &mut observer, on_choice)));
+        let last = match outcome {
+            Ok(Ok(_)) => RunState::Finished,
+            Ok(Err(error)) if error.is_cancelled() => RunState::Cancelled,
+            Ok(Err(error)) => RunState::Broken(error.to_string()),
+            Err(panic) => RunState::Broken(format!("internal error: {}", words_of(panic.as_ref()))),
+        };
+        // Fails only if the session was dropped.
+        let _ = worker.state(last);
+    });
     if let Err(error) = started {
         let broken = RunState::Broken(format!("no thread could be started: {error}"));
         let _ = outbox.state(broken);
@@ -128,15 +124,9 @@ impl Job {
         on_choice: impl FnOnce(&References),
     ) -> Result<Vec<QueryResult>, JobError> {
         let (task, protocol) = (&self.task, &self.task.protocol);
-        let scenes = (
-            self.frames.of(&self.references),
-            self.frames.of(&self.queries),
-        );
-        let localizer = protocol.configured(Localizer::with_cached_scenes(
-            scenes,
-            &task.params,
-            protocol.seed,
-        ));
+        let scenes = (self.frames.of(&self.references), self.frames.of(&self.queries));
+        let localizer =
+            protocol.configured(Localizer::with_cached_scenes(scenes, &task.params, protocol.seed));
         let localizer = localizer.with_foreign(protocol.foreign(self.queries.as_ref())?);
         let chosen = self.choose(&localizer, observer)?;
         on_choice(&chosen);
@@ -151,14 +141,7 @@ impl Job {
             results.push(result);
             Ok::<(), LocalizeError>(())
         };
-        localizer.localize(
-            number,
-            self.query,
-            &[request],
-            &protocol.methods,
-            observer,
-            keep,
-        )?;
+        localizer.localize(number, self.query, &[request], &protocol.methods, observer, keep)?;
         Ok(results)
     }
 
@@ -191,10 +174,7 @@ impl Job {
         };
         let chosen = chooser.choose(self.query, &|_| false, observer)?;
         if chosen.frames.is_empty() {
-            return Err(JobError::NoneNear {
-                query: query(),
-                radius_m: task.reach_m(),
-            });
+            return Err(JobError::NoneNear { query: query(), radius_m: task.reach_m() });
         }
         Ok(chosen)
     }

@@ -26,9 +26,7 @@ impl Outbox {
         &self,
         change: impl FnOnce(&mut Run) + Send + 'static,
     ) -> Result<(), Cancelled> {
-        self.messages
-            .send(Box::new(change))
-            .map_err(|_| Cancelled)?;
+        self.messages.send(Box::new(change)).map_err(|_| Cancelled)?;
         (self.wake)();
         Ok(())
     }

@@ -98,10 +98,7 @@ impl Steps {
             Event::StageEnded(_) => (PauseAt::NextEvent, depth.saturating_sub(1)),
             _ => (PauseAt::NextEvent, depth),
         };
-        Self {
-            over,
-            out: PauseAt::EndOfStage(out),
-        }
+        Self { over, out: PauseAt::EndOfStage(out) }
     }
 }
 
@@ -131,10 +128,7 @@ impl PausingObserver {
     pub(super) fn new(mode: RunMode, breakpoints: Breakpoints, outbox: Outbox) -> (Control, Self) {
         let (sender, commands) = channel();
         let attention = Arc::<AtomicBool>::default();
-        let control = Control {
-            commands: sender,
-            attention: Arc::clone(&attention),
-        };
+        let control = Control { commands: sender, attention: Arc::clone(&attention) };
         let observer = Self {
             commands,
             attention,
@@ -171,11 +165,7 @@ impl PausingObserver {
         while let Ok(command) = self.commands.try_recv() {
             self.obey(command);
         }
-        if self.is_cancelled {
-            Err(Cancelled)
-        } else {
-            Ok(())
-        }
+        if self.is_cancelled { Err(Cancelled) } else { Ok(()) }
     }
 
     /// Waits for a command to continue.
@@ -198,10 +188,7 @@ impl PausingObserver {
 
 impl LocalizeObserver for PausingObserver {
     fn begin_query(&mut self, _index: usize, problems: &[Problem], truth: Option<&Pose>) {
-        let loaded = Arc::new(Loaded {
-            problems: problems.to_vec(),
-            truth: truth.copied(),
-        });
+        let loaded = Arc::new(Loaded { problems: problems.to_vec(), truth: truth.copied() });
         self.change(|run| {
             run.loaded = Some(loaded);
             run.state = RunState::Running;

@@ -123,18 +123,10 @@ pub struct Explaining {
 /// Such as `MI: what would have helped? 3 of 12 tried, 2 s, 6 s to go`.
 impl fmt::Display for Explaining {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self {
-            method,
-            tried,
-            remedies,
-            since,
-        } = self;
+        let Self { method, tried, remedies, since } = self;
         let seconds = since.elapsed().as_secs_f64();
         let name = method.name().to_uppercase();
-        write!(
-            f,
-            "{name}: what would have helped? {tried} of {remedies} tried, {seconds:.0} s"
-        )?;
+        write!(f, "{name}: what would have helped? {tried} of {remedies} tried, {seconds:.0} s")?;
         if *tried > 0 {
             let left = seconds / *tried as f64 * remedies.saturating_sub(*tried) as f64;
             write!(f, ", {left:.0} s to go")?;
@@ -197,12 +189,7 @@ impl Run {
     pub(super) fn begin(&mut self, part: Part) {
         let start = self.len();
         self.open.clear();
-        self.spans.push(Span {
-            part,
-            records: start..start,
-            result: None,
-            times: None,
-        });
+        self.spans.push(Span { part, records: start..start, result: None, times: None });
     }
 
     pub(super) fn push(&mut self, record: Record, worked: Duration) {
@@ -263,10 +250,7 @@ impl Run {
                 && result.fusion == explained.fusion
                 && result.references == explained.references
         };
-        let results = self
-            .spans
-            .iter_mut()
-            .filter_map(|span| span.result.as_mut());
+        let results = self.spans.iter_mut().filter_map(|span| span.result.as_mut());
         for result in results.filter(|result| is_same(result)) {
             *result = explained.clone();
         }
@@ -313,9 +297,7 @@ impl Run {
 
     /// The part of the record at `cursor`.
     pub fn span_at(&self, cursor: usize) -> Option<&Span> {
-        self.spans
-            .iter()
-            .find(|span| span.records.contains(&cursor))
+        self.spans.iter().find(|span| span.records.contains(&cursor))
     }
 
     /// The results so far, in order.
@@ -325,9 +307,7 @@ impl Run {
 
     /// The stages around the record at `cursor`, outermost first.
     pub fn stages_at(&self, cursor: usize) -> impl Iterator<Item = &StageBar> {
-        self.stages
-            .iter()
-            .filter(move |bar| bar.records.contains(&cursor))
+        self.stages.iter().filter(move |bar| bar.records.contains(&cursor))
     }
 
     /// The latest records of a part.
@@ -357,10 +337,7 @@ impl Run {
 
     /// The latest event of a type in a span, at or before `cursor`.
     pub fn latest_in<E: DebugEvent + 'static>(&self, span: &Span, cursor: usize) -> Option<&E> {
-        self.until(span, cursor)
-            .iter()
-            .rev()
-            .find_map(|record| E::from_event(&record.event))
+        self.until(span, cursor).iter().rev().find_map(|record| E::from_event(&record.event))
     }
 
     /// All events of a type up to `cursor` in the part there, with their positions.

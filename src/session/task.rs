@@ -83,9 +83,7 @@ impl Task {
             (None, None) => Arc::clone(&references),
         };
         Ok(TaskScenes {
-            queries: self
-                .protocol
-                .prepared_queries(queries, references.as_ref())?,
+            queries: self.protocol.prepared_queries(queries, references.as_ref())?,
             references,
         })
     }
@@ -123,13 +121,8 @@ impl Task {
         for breakpoint in &self.breakpoints {
             option("break", breakpoint);
         }
-        let options = options
-            .into_iter()
-            .flat_map(|(name, value)| [format!("--{name}"), value]);
-        ["run".to_owned(), self.scene.clone()]
-            .into_iter()
-            .chain(options)
-            .collect()
+        let options = options.into_iter().flat_map(|(name, value)| [format!("--{name}"), value]);
+        ["run".to_owned(), self.scene.clone()].into_iter().chain(options).collect()
     }
 
     /// The command line of [`Self::arguments`], for a POSIX shell.
@@ -175,9 +168,7 @@ mod tests {
                 index: vec!["my index".into()],
                 estimates: vec!["other=my poses.txt".parse().expect("a file")],
                 methods: vec![Method::FB, Method::MI, Method::named("other")],
-                fusions: ["avg", "r-wavg"]
-                    .map(|name| name.parse().expect("a fusion"))
-                    .to_vec(),
+                fusions: ["avg", "r-wavg"].map(|name| name.parse().expect("a fusion")).to_vec(),
                 matches: Some("hloc".into()),
                 preset: Some("single".parse().expect("a preset")),
                 seed: 9,

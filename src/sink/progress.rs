@@ -15,11 +15,7 @@ pub struct Progress {
 impl Progress {
     /// Shows stages on `bar` after `task`, the name of the query.
     pub fn new(bar: ProgressBar, task: String) -> Self {
-        Self {
-            bar,
-            task,
-            stages: Vec::new(),
-        }
+        Self { bar, task, stages: Vec::new() }
     }
 }
 

@@ -80,10 +80,7 @@ pub fn run(options: &Options) -> Result<(), Failure> {
     let mut sums = [const { Counts(BTreeMap::new()) }; 3];
     for of_place in counted {
         for (sum, counts) in sums.iter_mut().zip(of_place) {
-            counts
-                .0
-                .into_iter()
-                .for_each(|(key, tally)| sum.add_tally(key, tally));
+            counts.0.into_iter().for_each(|(key, tally)| sum.add_tally(key, tally));
         }
     }
     let [unknowable, one, two] = &sums;
@@ -99,9 +96,7 @@ fn unknowable(place: &Place<'_>) -> Result<Counts, Failure> {
     let mut rng = Pcg64::seed_from_u64(place.number as u64);
     let (width, height) = own.dimensions();
     let mut noise = RgbImage::new(width, height);
-    noise
-        .pixels_mut()
-        .for_each(|pixel| *pixel = Rgb([rng.random(); 3]));
+    noise.pixels_mut().for_each(|pixel| *pixel = Rgb([rng.random(); 3]));
     let photos = [
         ("grey", RgbImage::from_pixel(width, height, Rgb([128; 3]))),
         ("noise", noise),
@@ -139,35 +134,23 @@ fn between(place: &Place<'_>, street: &StreetPlace<'_>, drives: [&Traversal; 2])
 /// Counts the verdicts and the confidence of a right pose, and of a wrong one.
 fn grade(case: &Case, counts: &mut Counts) -> Result<(), Failure> {
     let is_alarm = |result: &QueryResult| result.diagnosis.iter().any(|d| d.code.is_failure());
-    let (known, withheld) = (
-        case.results(&METHODS, true)?,
-        case.results(&METHODS, false)?,
-    );
+    let (known, withheld) = (case.results(&METHODS, true)?, case.results(&METHODS, false)?);
     for (known, withheld) in known.iter().zip(&withheld) {
         let p = probability(withheld);
         let word = withheld.confidence_word();
         let verdicts: &[(&str, bool)] = match known.grade {
-            Grade::Wrong => &[
-                ("wrong, from 0.95 on", p >= 0.95),
-                ("wrong, from 0.98 on", p >= 0.98),
-            ],
+            Grade::Wrong => {
+                &[("wrong, from 0.95 on", p >= 0.95), ("wrong, from 0.98 on", p >= 0.98)]
+            }
             Grade::Right => &[
-                (
-                    "right, with a failure verdict, truth known",
-                    is_alarm(known),
-                ),
-                (
-                    "right, with a failure verdict, truth withheld",
-                    is_alarm(withheld),
-                ),
+                ("right, with a failure verdict, truth known", is_alarm(known)),
+                ("right, with a failure verdict, truth withheld", is_alarm(withheld)),
                 ("right, low confidence", word == Some(Confidence::Low)),
                 ("right, not trusted", word != Some(Confidence::Trusted)),
             ],
             _ => &[],
         };
-        verdicts
-            .iter()
-            .for_each(|&(kind, is_bad)| counts.add(kind, withheld, is_bad));
+        verdicts.iter().for_each(|&(kind, is_bad)| counts.add(kind, withheld, is_bad));
     }
     Ok(())
 }

@@ -169,10 +169,8 @@ fn collect(options: &Options) -> Result<Vec<Sample>, Failure> {
         let drives = all_conditions();
         at_places(options.places, |place| {
             let trials = at(&drives, place, options.seed)?;
-            let samples: Result<Vec<_>, _> = trials
-                .iter()
-                .map(|trial| trial.samples(&options.methods))
-                .collect();
+            let samples: Result<Vec<_>, _> =
+                trials.iter().map(|trial| trial.samples(&options.methods)).collect();
             Ok(samples?.concat())
         })?
     };
@@ -216,11 +214,7 @@ fn at(drives: &[Traversal; 5], place: usize, seed: u64) -> Result<Vec<Trial>, Fa
     }
     let (query, truth, reference) = &sides[0];
     // Every other place of queries that do not show it is for fitting.
-    let kind = if place.is_multiple_of(2) {
-        UNKNOWABLE
-    } else {
-        "unknowable, set aside"
-    };
+    let kind = if place.is_multiple_of(2) { UNKNOWABLE } else { "unknowable, set aside" };
     let mut unknowable = |query: &Arc<Query>, reference: &Arc<ReferenceTuple>| {
         trials.push(Trial {
             query: Arc::clone(query),
@@ -229,11 +223,7 @@ fn at(drives: &[Traversal; 5], place: usize, seed: u64) -> Result<Vec<Trial>, Fa
             conditions: [kind; 2],
         });
     };
-    let color = query
-        .photo
-        .color
-        .as_ref()
-        .ok_or("a photo in colour expected")?;
+    let color = query.photo.color.as_ref().ok_or("a photo in colour expected")?;
     let elsewhere = Traversal::new(WORLD_SEED + 1, Condition::Overcast, Size::Full);
     let of_another_town = elsewhere.image(7 * place % elsewhere.frame_count());
     for photo in [image::imageops::flip_horizontal(color), of_another_town] {
@@ -247,10 +237,7 @@ fn at(drives: &[Traversal; 5], place: usize, seed: u64) -> Result<Vec<Trial>, Fa
     let others: Vec<usize> = (0..frames).filter(is_other_street).collect();
     for _ in 0..OTHER_STREETS {
         if let Some(&frame) = others.get(rng.random_range(0..others.len().max(1))) {
-            unknowable(
-                query,
-                &Frame::of(day, frame).reference(&format!("{frame:06}"))?,
-            );
+            unknowable(query, &Frame::of(day, frame).reference(&format!("{frame:06}"))?);
         }
     }
     Ok(trials)
@@ -260,11 +247,7 @@ impl Trial {
     /// A sample of every method that gives a pose.
     fn samples(&self, methods: &[Method]) -> Result<Vec<Sample>, Failure> {
         let params = Params::default();
-        let problem = Problem::new(
-            Arc::clone(&self.query),
-            Arc::clone(&self.reference),
-            RADIUS_M,
-        )?;
+        let problem = Problem::new(Arc::clone(&self.query), Arc::clone(&self.reference), RADIUS_M)?;
         let is_fitted = |name: &&str| {
             *name == UNKNOWABLE || FITTED_ON.iter().any(|condition| condition.name() == *name)
         };
@@ -303,9 +286,7 @@ fn fitted(samples: &[&Sample]) -> Option<Vec<f64>> {
     let columns = samples.first()?.values.len();
     let count = samples.len() as f64;
     let column = |k: usize| samples.iter().map(move |s| s.values[k]);
-    let means: Vec<f64> = (0..columns)
-        .map(|k| column(k).sum::<f64>() / count)
-        .collect();
+    let means: Vec<f64> = (0..columns).map(|k| column(k).sum::<f64>() / count).collect();
     let deviations: Vec<f64> = (0..columns)
         .map(|k| {
             let squared: f64 = column(k).map(|v| (v - means[k]).powi(2)).sum();
@@ -316,22 +297,15 @@ fn fitted(samples: &[&Sample]) -> Option<Vec<f64>> {
         0 => 1.0,
         _ => (samples[row].values[k - 1] - means[k - 1]) / deviations[k - 1],
     });
-    let labels = DVector::from_fn(samples.len(), |row, _| {
-        f64::from(u8::from(samples[row].is_near))
-    });
+    let labels =
+        DVector::from_fn(samples.len(), |row, _| f64::from(u8::from(samples[row].is_near)));
     let counts = DVector::from_fn(samples.len(), |row, _| {
-        if samples[row].shows_place {
-            1.0
-        } else {
-            UNKNOWABLE_COUNTS
-        }
+        if samples[row].shows_place { 1.0 } else { UNKNOWABLE_COUNTS }
     });
     let mut weights = DVector::zeros(columns + 1);
     for _ in 0..50 {
         let predicted = (&design * &weights).map(|x: f64| 1.0 / (1.0 + (-x).exp()));
-        let spread = predicted
-            .map(|p| (p * (1.0 - p)).max(1e-6))
-            .component_mul(&counts);
+        let spread = predicted.map(|p| (p * (1.0 - p)).max(1e-6)).component_mul(&counts);
         let mut hessian = design.transpose() * DMatrix::from_diagonal(&spread) * &design;
         let mut gradient = design.transpose() * (&labels - &predicted).component_mul(&counts);
         for k in 1..=columns {
@@ -344,9 +318,7 @@ fn fitted(samples: &[&Sample]) -> Option<Vec<f64>> {
             break;
         }
     }
-    let slopes: Vec<f64> = (0..columns)
-        .map(|k| weights[k + 1] / deviations[k])
-        .collect();
+    let slopes: Vec<f64> = (0..columns).map(|k| weights[k + 1] / deviations[k]).collect();
     let constant = weights[0] - slopes.iter().zip(&means).map(|(s, m)| s * m).sum::<f64>();
     Some(std::iter::once(constant).chain(slopes).collect())
 }
@@ -360,9 +332,7 @@ fn scored(samples: &[Sample], method: &str, is_for_fitting: bool) -> Vec<Scored>
         .iter()
         .filter(|s| s.is_for_fitting == is_for_fitting)
         .filter(|s| method == "all" || s.method == method);
-    let mut scored: Vec<Scored> = own
-        .filter_map(|s| Some((s.probability?, s.is_near)))
-        .collect();
+    let mut scored: Vec<Scored> = own.filter_map(|s| Some((s.probability?, s.is_near))).collect();
     scored.sort_by(|a, b| a.0.total_cmp(&b.0));
     scored
 }

@@ -117,9 +117,8 @@ impl Plan {
         let wanted_m = self.radius_m * (start as f64 + 0.5) / starts as f64;
         let is_same = references.name() == queries.name();
         let place = truth.translation.vector.into();
-        let within = frames_within(references, &place, self.radius_m, &|other| {
-            is_same && other == frame
-        });
+        let within =
+            frames_within(references, &place, self.radius_m, &|other| is_same && other == frame);
         let apart = |other: &usize| apart_m(references, *other, &truth);
         let off = |other: &usize| (apart(other) - wanted_m).abs();
         let Some(chosen) = within.into_iter().min_by(|a, b| off(a).total_cmp(&off(b))) else {
@@ -129,16 +128,9 @@ impl Plan {
         let from = width * (apart(&chosen) / width).floor();
         let row = format!("{from:4.1} to {:.1} m", from + width);
         let mut frames = Remembered::default();
-        let (query, reference) = (
-            frames.query(queries, frame)?,
-            frames.reference(references, chosen)?,
-        );
-        Ok(vec![self.case(
-            vec![row, "all".to_owned()],
-            query,
-            reference,
-            truth,
-        )])
+        let (query, reference) =
+            (frames.query(queries, frame)?, frames.reference(references, chosen)?);
+        Ok(vec![self.case(vec![row, "all".to_owned()], query, reference, truth)])
     }
 
     /// A frame of a scene as a query against every frame with a cloud that is as far apart as planned.
@@ -158,10 +150,7 @@ impl Plan {
             let (query, reference) = (frames.query(scene, at)?, frames.reference(scene, other)?);
             Ok(self.case(rows, query, reference, truth))
         };
-        (0..scene.frames().len())
-            .filter(is_paired)
-            .map(case)
-            .collect()
+        (0..scene.frames().len()).filter(is_paired).map(case).collect()
     }
 
     fn case(
@@ -179,11 +168,7 @@ impl Plan {
             matches: None,
             seed: self.seed,
         };
-        Case {
-            rows,
-            problem,
-            truth,
-        }
+        Case { rows, problem, truth }
     }
 }
 
@@ -211,15 +196,13 @@ impl Remembered {
         scene: &dyn Scene,
         frame: usize,
     ) -> Result<Arc<ReferenceTuple>, SceneError> {
-        Ok(
-            match self.references.entry((scene.name().to_owned(), frame)) {
-                Entry::Occupied(known) => Arc::clone(known.get()),
-                Entry::Vacant(place) => {
-                    let mut reference = scene.reference(frame)?;
-                    Arc::make_mut(&mut reference).memo = Memo::of(REMEMBERED);
-                    Arc::clone(place.insert(reference))
-                }
-            },
-        )
+        Ok(match self.references.entry((scene.name().to_owned(), frame)) {
+            Entry::Occupied(known) => Arc::clone(known.get()),
+            Entry::Vacant(place) => {
+                let mut reference = scene.reference(frame)?;
+                Arc::make_mut(&mut reference).memo = Memo::of(REMEMBERED);
+                Arc::clone(place.insert(reference))
+            }
+        })
     }
 }

@@ -35,32 +35,18 @@ pub const ALL: &[Fault] = &[
     ("moved_truth", moved_truth),
     ("millimetres", |place| points(place, |point| point * 1000.0)),
     ("poses_in_millimetres", |place| poses(place, in_millimetres)),
-    ("late_cloud", |place| {
-        points(place, |point| point + Vector3::new(0.0, 0.0, 0.6))
-    }),
-    ("mirrored_cloud", |place| {
-        points(place, |point| Point3::new(-point.x, point.y, point.z))
-    }),
+    ("late_cloud", |place| points(place, |point| point + Vector3::new(0.0, 0.0, 0.6))),
+    ("mirrored_cloud", |place| points(place, |point| Point3::new(-point.x, point.y, point.z))),
     ("cloud_of_another_frame", cloud_of_another_frame),
     ("sparse_cloud", sparse_cloud),
     ("cloud_behind", cloud_behind),
     ("bleeding_depths", bleeding_depths),
-    ("textureless_query", |place| {
-        pixels(place, |_| Rgb([128; 3]))
-    }),
-    ("few_keypoints", |place| {
-        params(place, |p| p.surf.threshold *= 60.0)
-    }),
+    ("textureless_query", |place| pixels(place, |_| Rgb([128; 3]))),
+    ("few_keypoints", |place| params(place, |p| p.surf.threshold *= 60.0)),
     ("noise_query", noise_query),
-    ("mirrored_query", |place| {
-        photo(place, image::imageops::flip_horizontal_in_place)
-    }),
-    ("foreign_query", |place| {
-        photo(place, |own| *own = place.foreign_photo())
-    }),
-    ("gamma", |place| {
-        pixels(place, |pixel| Rgb(pixel.0.map(darkened)))
-    }),
+    ("mirrored_query", |place| photo(place, image::imageops::flip_horizontal_in_place)),
+    ("foreign_query", |place| photo(place, |own| *own = place.foreign_photo())),
+    ("gamma", |place| pixels(place, |pixel| Rgb(pixel.0.map(darkened)))),
     ("night", night),
     ("occluder", occluder),
     ("moved_scenery", moved_scenery),
@@ -104,10 +90,7 @@ fn poses(place: &Place<'_>, change: impl Fn(&Pose) -> Pose) -> Option<Case> {
 }
 
 fn in_millimetres(pose: &Pose) -> Pose {
-    Pose::from_parts(
-        Translation3::from(pose.translation.vector * 1000.0),
-        pose.rotation,
-    )
+    Pose::from_parts(Translation3::from(pose.translation.vector * 1000.0), pose.rotation)
 }
 
 fn moved_truth(place: &Place<'_>) -> Option<Case> {
@@ -123,9 +106,7 @@ fn cloud(
 ) -> Option<Case> {
     let mut case = place.case();
     let cloud = &mut case.references[0].cloud;
-    *cloud = Cloud {
-        points: change(&cloud.points),
-    };
+    *cloud = Cloud { points: change(&cloud.points) };
     Some(case)
 }
 
@@ -147,10 +128,7 @@ fn sparse_cloud(place: &Place<'_>) -> Option<Case> {
     const LEFT: usize = 30;
     let camera = place.case().references[0].intrinsics;
     cloud(place, |points| {
-        let seen = points
-            .iter()
-            .filter(|point| in_view(&camera, point))
-            .copied();
+        let seen = points.iter().filter(|point| in_view(&camera, point)).copied();
         let seen: Vec<_> = seen.collect();
         let stride = (seen.len() / LEFT).max(1);
         seen.into_iter().step_by(stride).take(LEFT).collect()
@@ -158,13 +136,7 @@ fn sparse_cloud(place: &Place<'_>) -> Option<Case> {
 }
 
 fn cloud_behind(place: &Place<'_>) -> Option<Case> {
-    cloud(place, |points| {
-        points
-            .iter()
-            .filter(|point| point.z < 0.0)
-            .copied()
-            .collect()
-    })
+    cloud(place, |points| points.iter().filter(|point| point.z < 0.0).copied().collect())
 }
 
 fn bleeding_depths(place: &Place<'_>) -> Option<Case> {
@@ -173,9 +145,7 @@ fn bleeding_depths(place: &Place<'_>) -> Option<Case> {
     let (camera, index) = (case.references[0].intrinsics, &case.references[0].cloud);
     let index = ProjectedCloudIndex::new(index, &camera);
     let bled = |point: &Point3<f32>| {
-        let pixel = camera
-            .project(&point.cast())
-            .filter(|pixel| camera.contains(pixel))?;
+        let pixel = camera.project(&point.cast()).filter(|pixel| camera.contains(pixel))?;
         let mut beside = pixel;
         beside.x += BESIDE_PX;
         let depths = index.read(&beside, 3.0).within?;
@@ -297,10 +267,7 @@ fn turned_query(place: &Place<'_>, left_deg: f64) -> Option<Case> {
 
 fn raised_camera(place: &Place<'_>) -> Option<Case> {
     let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), -5_f64.to_radians());
-    moved_query(
-        place,
-        Pose::from_parts(Translation3::new(0.0, -1.5, 0.0), down),
-    )
+    moved_query(place, Pose::from_parts(Translation3::new(0.0, -1.5, 0.0), down))
 }
 
 fn outside_disc(place: &Place<'_>) -> Option<Case> {
@@ -339,9 +306,7 @@ fn bad_reference(place: &Place<'_>) -> Option<Case> {
     let mut case = place.case();
     let [behind, mut bad] =
         [-4, 4].map(|metres| street.frame(street.frame_at(street.query, metres)));
-    bad.pose = bad
-        .pose
-        .map(|pose| pose * Pose::translation(0.0, 0.0, 15.0));
+    bad.pose = bad.pose.map(|pose| pose * Pose::translation(0.0, 0.0, 15.0));
     case.references.extend([behind, bad]);
     case.chosen = vec![0, 1, 2].into();
     case.fusion = Fusion::all().find(|fusion| fusion.name == "avg");
@@ -353,19 +318,11 @@ fn duplicate_place(place: &Place<'_>) -> Option<Case> {
     let mut case = place.case();
     let far = street.frame(street.frame_at(street.query, 150));
     case.references.insert(0, far);
-    let ranked = case
-        .references
-        .iter()
-        .enumerate()
-        .map(|(frame, reference)| RankedReference {
-            name: format!("reference {frame}"),
-            world_from_camera: reference.pose,
-            ranked: Ranked {
-                frame,
-                score: 0.9 - 0.1 * frame as f32,
-                geometry: Geometry::Unchecked,
-            },
-        });
+    let ranked = case.references.iter().enumerate().map(|(frame, reference)| RankedReference {
+        name: format!("reference {frame}"),
+        world_from_camera: reference.pose,
+        ranked: Ranked { frame, score: 0.9 - 0.1 * frame as f32, geometry: Geometry::Unchecked },
+    });
     case.chosen = References {
         frames: vec![0],
         ranking: Some(Arc::new(ReferenceRanking {

@@ -35,9 +35,7 @@ impl Frame {
             photo: drive.image_from(frame, world_from_camera),
             intrinsics: drive.intrinsics(),
             pose: Some(*world_from_camera),
-            cloud: Cloud {
-                points: points.collect(),
-            },
+            cloud: Cloud { points: points.collect() },
         }
     }
 
@@ -77,11 +75,7 @@ impl Frames {
     /// A scene whose frames are called as it is, with their number.
     pub fn new(name: &'static str, frames: Vec<Frame>) -> Self {
         let names = (0..frames.len()).map(|number| format!("{name} {number}"));
-        Self {
-            name,
-            names: names.collect(),
-            frames,
-        }
+        Self { name, names: names.collect(), frames }
     }
 }
 

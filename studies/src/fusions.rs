@@ -55,15 +55,9 @@ pub struct Options {
 
 pub fn run(options: &Options) -> Result<(), Failure> {
     let mut params = Params::default();
-    options
-        .set
-        .iter()
-        .try_for_each(|assignment| params.assign(assignment))?;
+    options.set.iter().try_for_each(|assignment| params.assign(assignment))?;
     let references = open(&options.scene, options)?;
-    let queries = open(
-        options.query_scene.as_ref().unwrap_or(&options.scene),
-        options,
-    )?;
+    let queries = open(options.query_scene.as_ref().unwrap_or(&options.scene), options)?;
     let fusions = match options.fusion.as_slice() {
         [] => Fusion::all().collect(),
         named => named.to_vec(),
@@ -97,9 +91,7 @@ pub fn run(options: &Options) -> Result<(), Failure> {
     let mut rows = Vec::new();
     for method in &options.method {
         for fusion in &fusions {
-            let own = results
-                .iter()
-                .filter(|r| r.method == *method && r.fusion == Some(*fusion));
+            let own = results.iter().filter(|r| r.method == *method && r.fusion == Some(*fusion));
             let errors: Vec<_> = own.map(|result| result.error).collect();
             let names = vec![method.name().to_uppercase(), fusion.to_string()];
             rows.push([names, summary(&errors)].concat());

@@ -13,9 +13,7 @@ use rand_pcg::Pcg64;
 use crate::Failure;
 use crate::numbers::{median, print_table};
 
-const POINTS: [usize; 8] = [
-    2_000, 5_000, 10_000, 20_000, 50_000, 100_000, 200_000, 500_000,
-];
+const POINTS: [usize; 8] = [2_000, 5_000, 10_000, 20_000, 50_000, 100_000, 200_000, 500_000];
 /// Sides of the photo, as multiples of what they are.
 const SCALES: [f64; 5] = [0.25, 0.5, 1.0, 2.0, 3.0];
 const BINS: [usize; 7] = [4, 8, 16, 32, 64, 128, 256];
@@ -35,9 +33,7 @@ pub struct Options {
 }
 
 pub fn run(options: &Options) -> Result<(), Failure> {
-    rayon::ThreadPoolBuilder::new()
-        .num_threads(1)
-        .build_global()?;
+    rayon::ThreadPoolBuilder::new().num_threads(1).build_global()?;
     let rounds = options.rounds;
     by_points(rounds);
     by_size(rounds);
@@ -67,10 +63,7 @@ fn by_points(rounds: usize) {
     let (query, cloud) = seen_by(registered_cost("pm").as_ref());
     let rows = POINTS.map(|count| {
         let points = dense(&cloud.points, count);
-        row(
-            count,
-            of_both(&points, &query, &PAIR.query.intrinsics, rounds),
-        )
+        row(count, of_both(&points, &query, &PAIR.query.intrinsics, rounds))
     });
     print_table("points,PM (µs),MI (µs)", &rows);
 }
@@ -99,10 +92,7 @@ fn by_size(rounds: usize) {
         let back = |at: u32, size: u32| ((f64::from(at) / scale) as u32).min(size - 1);
         let pixel = |x, y| *query.get_pixel(back(x, query.width()), back(y, query.height()));
         let query = FloatImage::from_fn(intrinsics.width, intrinsics.height, pixel);
-        row(
-            intrinsics.area(),
-            of_both(&cloud.points, &Arc::new(query), &intrinsics, rounds),
-        )
+        row(intrinsics.area(), of_both(&cloud.points, &Arc::new(query), &intrinsics, rounds))
     });
     print_table("pixels,PM (µs),MI (µs)", &rows);
 }
@@ -122,17 +112,11 @@ fn scaled(intrinsics: &Intrinsics, scale: f64) -> Intrinsics {
 /// A hypothesis of MI over the bins of its histogram.
 fn by_bins(rounds: usize) {
     let rows = BINS.map(|bins| {
-        let params = MutualInformationParams {
-            bins,
-            ..MutualInformationParams::default()
-        };
+        let params = MutualInformationParams { bins, ..MutualInformationParams::default() };
         let cost = MutualInformation::new(&params);
         let (query, cloud) = seen_by(&cost);
         let intrinsics = &PAIR.query.intrinsics;
-        row(
-            bins,
-            [hypothesis(&cloud.points, &query, intrinsics, &cost, rounds)],
-        )
+        row(bins, [hypothesis(&cloud.points, &query, intrinsics, &cost, rounds)])
     });
     print_table("bins,MI (µs)", &rows);
 }
@@ -143,31 +127,19 @@ fn by_bins(rounds: usize) {
 /// enough.
 fn by_keypoints(rounds: usize) {
     let photos = [&PAIR.query.photo.gray, &PAIR.reference.photo.gray].map(enlarged);
-    let params = |max_keypoints| SurfParams {
-        threshold: 1.0,
-        max_keypoints,
-        ..SurfParams::default()
-    };
+    let params =
+        |max_keypoints| SurfParams { threshold: 1.0, max_keypoints, ..SurfParams::default() };
     let most = params(KEYPOINTS[KEYPOINTS.len() - 1]);
-    let [query, reference] = photos
-        .each_ref()
-        .map(|photo| surf(photo, &most).descriptors);
+    let [query, reference] = photos.each_ref().map(|photo| surf(photo, &most).descriptors);
     let known = query.len().min(reference.len());
-    let rows = KEYPOINTS
-        .into_iter()
-        .filter(|&count| count <= known)
-        .map(|count| {
-            let found = processor_s(rounds, || surf(&photos[0], &params(count)));
-            let matched = processor_s(rounds, || {
-                nearest_neighbours(&query[..count], &reference[..count])
-            });
-            row(count, [1e3 * found, 1e3 * matched])
-        });
+    let rows = KEYPOINTS.into_iter().filter(|&count| count <= known).map(|count| {
+        let found = processor_s(rounds, || surf(&photos[0], &params(count)));
+        let matched =
+            processor_s(rounds, || nearest_neighbours(&query[..count], &reference[..count]));
+        row(count, [1e3 * found, 1e3 * matched])
+    });
     let rows: Vec<_> = rows.collect();
-    print_table(
-        "keypoints,SURF of a photo (ms),matching one way (ms)",
-        &rows,
-    );
+    print_table("keypoints,SURF of a photo (ms),matching one way (ms)", &rows);
 }
 
 /// Processor time of one hypothesis \[µs\].

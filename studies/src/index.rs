@@ -45,10 +45,7 @@ pub struct Options {
 }
 
 pub fn run(options: &Options) -> Result<(), Failure> {
-    let frames = *options
-        .frames
-        .first()
-        .ok_or("a number of frames expected")?;
+    let frames = *options.frames.first().ok_or("a number of frames expected")?;
     match (&options.build, &options.ask) {
         (Some(path), _) => println!("{}", cells(built(path, frames, options)?)),
         (_, Some(path)) => println!("{}", cells(queried(path, frames, options)?)),
@@ -73,11 +70,8 @@ pub fn run(options: &Options) -> Result<(), Failure> {
 
 /// What a part says in a process of its own.
 fn alone(what: &str, path: &Path, frames: usize, options: &Options) -> Result<String, Failure> {
-    let numbers = [
-        ("--frames", frames),
-        ("--features", options.features),
-        ("--words", options.words),
-    ];
+    let numbers =
+        [("--frames", frames), ("--features", options.features), ("--words", options.words)];
     let numbers = numbers.map(|(option, number)| format!("{option}={number}"));
     let mut command = Command::new(std::env::current_exe()?);
     command.arg("index").arg(what).arg(path).args(numbers);
@@ -121,14 +115,7 @@ fn built(path: &Path, frames: usize, options: &Options) -> Result<[f64; 6], Fail
     let whole = worked.elapsed().as_secs_f64();
     let clock = started.elapsed().as_secs_f64();
     let megabytes = summary.bytes as f64 / 1e6;
-    Ok([
-        learnt - made,
-        quantized - learnt,
-        whole - quantized,
-        clock,
-        memory_mb("VmHWM"),
-        megabytes,
-    ])
+    Ok([learnt - made, quantized - learnt, whole - quantized, clock, memory_mb("VmHWM"), megabytes])
 }
 
 fn queried(path: &Path, frames: usize, options: &Options) -> Result<[f64; 11], Failure> {
@@ -153,27 +140,11 @@ fn queried(path: &Path, frames: usize, options: &Options) -> Result<[f64; 11], F
             found += usize::from(first.is_some_and(|frame| frame.abs_diff(place) <= 2));
         }
         let processor = 1e3 * work.as_secs_f64() / QUERIES as f64;
-        [
-            processor,
-            percentile(&mut times, 0.5),
-            percentile(&mut times, 0.95),
-        ]
+        [processor, percentile(&mut times, 0.5), percentile(&mut times, 0.95)]
     });
     let ([a, b, c], [d, e, f]) = (by_scores, verified);
     let [own, pages] = ["RssAnon", "RssFile"].map(memory_mb);
-    Ok([
-        opened,
-        memory_open,
-        a,
-        b,
-        c,
-        d,
-        e,
-        f,
-        own,
-        pages,
-        found as f64,
-    ])
+    Ok([opened, memory_open, a, b, c, d, e, f, own, pages, found as f64])
 }
 
 /// What is seen of the road from a frame; `visit` changes the noise.
@@ -199,8 +170,5 @@ fn view(frame: usize, features: usize, visit: u64) -> Features {
         });
         descriptor
     });
-    Features {
-        keypoints: keypoints.collect(),
-        descriptors: descriptors.collect(),
-    }
+    Features { keypoints: keypoints.collect(), descriptors: descriptors.collect() }
 }

@@ -22,10 +22,7 @@ pub struct Options {
 }
 
 pub fn run(options: &Options) -> Result<(), Failure> {
-    let Options {
-        folder,
-        points: count,
-    } = options;
+    let Options { folder, points: count } = options;
     let path = folder.to_str().ok_or("a plain path expected")?;
     let map = folder.join("map.laz");
     if !map.exists() {

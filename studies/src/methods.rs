@@ -75,17 +75,10 @@ impl FromStr for Asked {
 
     fn from_str(text: &str) -> Result<Self, Failure> {
         let mut words = text.split_whitespace();
-        let method = words
-            .next()
-            .ok_or("the name of a method expected")?
-            .parse()?;
+        let method = words.next().ok_or("the name of a method expected")?.parse()?;
         let mut params = Params::default();
         words.try_for_each(|assignment| params.assign(assignment))?;
-        Ok(Self {
-            label: text.to_owned(),
-            method,
-            params,
-        })
+        Ok(Self { label: text.to_owned(), method, params })
     }
 }
 
@@ -121,10 +114,8 @@ pub fn run(options: &Options) -> Result<(), Failure> {
                 scenes.insert(name.clone(), Street::new(name, size)?);
             }
             let scene = |name: &String| &scenes[name] as &dyn Scene;
-            let pairs: Vec<[&dyn Scene; 2]> = cells
-                .iter()
-                .map(|cell| cell.each_ref().map(scene))
-                .collect();
+            let pairs: Vec<[&dyn Scene; 2]> =
+                cells.iter().map(|cell| cell.each_ref().map(scene)).collect();
             let places = street.or(starts).unwrap_or(0);
             at_places(places, |place| {
                 let cases = match street {
@@ -147,12 +138,8 @@ pub fn run(options: &Options) -> Result<(), Failure> {
 /// Pairs of conditions, the reference's and the query's.
 fn cells(words: &[String]) -> Result<Vec<[String; 2]>, Failure> {
     let pairs_of = |conditions: &[String]| -> Vec<[String; 2]> {
-        let pair = |a: &String| {
-            conditions
-                .iter()
-                .map(|b| [a.clone(), b.clone()])
-                .collect::<Vec<_>>()
-        };
+        let pair =
+            |a: &String| conditions.iter().map(|b| [a.clone(), b.clone()]).collect::<Vec<_>>();
         conditions.iter().flat_map(pair).collect()
     };
     let conditions: Vec<String> = Street::conditions().map(str::to_owned).collect();
@@ -164,9 +151,8 @@ fn cells(words: &[String]) -> Result<Vec<[String; 2]>, Failure> {
         words if words.iter().all(|word| conditions.contains(word)) => pairs_of(words),
         words => {
             let pair = |word: &String| {
-                let (a, b) = word
-                    .split_once('-')
-                    .ok_or(format!("{word} is no pair of conditions"))?;
+                let (a, b) =
+                    word.split_once('-').ok_or(format!("{word} is no pair of conditions"))?;
                 Ok([a.to_owned(), b.to_owned()])
             };
             words.iter().map(pair).collect::<Result<_, String>>()?
@@ -214,18 +200,12 @@ fn print(measured: &[Measured], options: &Options) {
         }
     }
     let rows = groups.iter().map(|((row, method), own)| {
-        let names = vec![
-            row.trim_start().to_owned(),
-            options.method[*method].label.clone(),
-        ];
+        let names = vec![row.trim_start().to_owned(), options.method[*method].label.clone()];
         let errors: Vec<_> = own.iter().map(|one| one.error).collect();
         let time = format!("{:.2} s", mean(own.iter().map(|one| one.seconds)));
         [names, summary(&errors), vec![time]].concat()
     });
-    print_table(
-        &format!(",method,{SUMMARY},time"),
-        &rows.collect::<Vec<_>>(),
-    );
+    print_table(&format!(",method,{SUMMARY},time"), &rows.collect::<Vec<_>>());
 }
 
 /// A table for each method, of the reference's condition (rows) by the query's (columns), and one that asks why MI
@@ -243,10 +223,7 @@ fn print_matrices(measured: &[Measured], options: &Options) -> Result<(), Failur
                 let is_here = |one: &&Measured| one.method == method && one.rows[0] == name;
                 cell(&measured.iter().filter(is_here).collect::<Vec<_>>())
             });
-            [format!("**{reference}**")]
-                .into_iter()
-                .chain(cells)
-                .collect()
+            [format!("**{reference}**")].into_iter().chain(cells).collect()
         });
         let columns: String = conditions.iter().map(|name| format!(",{name}")).collect();
         print_table(&columns, &rows.collect::<Vec<_>>());
@@ -258,22 +235,14 @@ fn print_matrices(measured: &[Measured], options: &Options) -> Result<(), Failur
             tested.label
         );
         matrix(method, &|here| {
-            let within = |limit| {
-                percent(
-                    here.iter().filter(|one| off(one) < limit).count(),
-                    here.len(),
-                )
-            };
+            let within =
+                |limit| percent(here.iter().filter(|one| off(one) < limit).count(), here.len());
             let [ten, two, one] = [10.0, 2.0, 1.0].map(within);
             let found = median(here.iter().map(off).filter(|metres| metres.is_finite()));
             format!("{ten:.0} / {two:.0} / {one:.0} %, {found:.2} m")
         });
     }
-    let Some(mi) = options
-        .method
-        .iter()
-        .position(|tested| tested.method == Method::MI)
-    else {
+    let Some(mi) = options.method.iter().position(|tested| tested.method == Method::MI) else {
         return Ok(());
     };
     println!(
@@ -281,18 +250,12 @@ fn print_matrices(measured: &[Measured], options: &Options) -> Result<(), Failur
          poses more than 2 m off, those that cost more than the truth + those that cost less\n"
     );
     matrix(mi, &|here| {
-        let known = || {
-            here.iter()
-                .filter_map(|one| Some((off(one), one.information?)))
-        };
+        let known = || here.iter().filter_map(|one| Some((off(one), one.information?)));
         let [truth, found, chance] =
             [0, 1, 2].map(|k| median(known().map(|(_, values)| values[k])));
         let far = || known().filter(|(metres, _)| *metres >= 2.0);
         let missed = far().filter(|(_, [truth, found, _])| truth > found).count();
-        format!(
-            "{truth:.2} / {found:.2} / {chance:.2}; {missed} + {}",
-            far().count() - missed
-        )
+        format!("{truth:.2} / {found:.2} / {chance:.2}; {missed} + {}", far().count() - missed)
     });
     Ok(())
 }

@@ -26,22 +26,13 @@ pub static PAIR: LazyLock<Problem> = LazyLock::new(|| {
 
 fn named_pair(scene: &str, indices: &str) -> Result<Problem, Box<dyn Error>> {
     let scene = scene::open(scene, None)?;
-    let index = |text: &str| {
-        text.trim()
-            .parse()
-            .ok()
-            .filter(|&index| index < scene.frames().len())
-    };
+    let index = |text: &str| text.trim().parse().ok().filter(|&index| index < scene.frames().len());
     let pair = indices
         .split_once(',')
         .and_then(|(query, reference)| Some((index(query)?, index(reference)?)));
     let (query, reference) =
         pair.ok_or("the indices of a query and a reference expected, as 70,62")?;
-    Ok(Problem::new(
-        scene.query(query)?,
-        scene.reference(reference)?,
-        15.0,
-    )?)
+    Ok(Problem::new(scene.query(query)?, scene.reference(reference)?, 15.0)?)
 }
 
 /// The cost of the method of this name, as it is by default.
@@ -67,7 +58,5 @@ pub fn poses_of_a_disc() -> Vec<Pose> {
     let lattice = Lattice::new(Phase::PositionCoarse, centre, 10.0, &GridParams::default());
     let lattice = lattice.expect("a small lattice");
     let offsets = lattice.hypotheses().map(|(_, offset)| offset);
-    offsets
-        .map(|offset| offset.reference_from_camera())
-        .collect()
+    offsets.map(|offset| offset.reference_from_camera()).collect()
 }

@@ -25,9 +25,7 @@ pub struct Options {
 }
 
 pub fn run(options: &Options) -> Result<(), Failure> {
-    rayon::ThreadPoolBuilder::new()
-        .num_threads(1)
-        .build_global()?;
+    rayon::ThreadPoolBuilder::new().num_threads(1).build_global()?;
     if let Some(folder) = &options.export {
         return export(folder);
     }
@@ -49,21 +47,12 @@ fn export(folder: &Path) -> Result<(), Failure> {
     fs::create_dir_all(folder)?;
     let write = |name: &str, bytes: Vec<u8>| fs::write(folder.join(name), bytes);
     let floats = |name: &str, values: &mut dyn Iterator<Item = f32>| {
-        write(
-            &format!("{name}.f32"),
-            values.flat_map(f32::to_le_bytes).collect(),
-        )
+        write(&format!("{name}.f32"), values.flat_map(f32::to_le_bytes).collect())
     };
     let doubles = |name: &str, values: &mut dyn Iterator<Item = f64>| {
-        write(
-            &format!("{name}.f64"),
-            values.flat_map(f64::to_le_bytes).collect(),
-        )
+        write(&format!("{name}.f64"), values.flat_map(f64::to_le_bytes).collect())
     };
-    for (name, photo) in [
-        ("query", &PAIR.query.photo),
-        ("reference", &PAIR.reference.photo),
-    ] {
+    for (name, photo) in [("query", &PAIR.query.photo), ("reference", &PAIR.reference.photo)] {
         write(&format!("{name}.u8"), photo.gray.as_raw().clone())?;
         let descriptors = surf(&photo.gray, &turning()).descriptors;
         let numbers = descriptors.as_flattened().iter().copied();
@@ -72,26 +61,17 @@ fn export(folder: &Path) -> Result<(), Failure> {
     let (query, cloud) = seen_by(registered_cost("mi").as_ref());
     floats("query_channel", &mut query.iter().copied())?;
     let points = || cloud.points.iter();
-    floats(
-        "points",
-        &mut points().flat_map(|point| point.position.coords.data.0[0]),
-    )?;
+    floats("points", &mut points().flat_map(|point| point.position.coords.data.0[0]))?;
     floats("values", &mut points().map(|point| point.intensity))?;
     let poses = poses_of_a_disc();
-    doubles(
-        "poses",
-        &mut poses.iter().flat_map(|pose| rows_of(&pose.inverse())),
-    )?;
+    doubles("poses", &mut poses.iter().flat_map(|pose| rows_of(&pose.inverse())))?;
     for (name, case) in Outliers::cases() {
         let numbers = (0..TRIALS).flat_map(|trial| {
             let (correspondences, truth) = case.draw(trial);
             let numbers = correspondences
                 .into_iter()
                 .flat_map(|c| [c.pixel.x, c.pixel.y, c.point.x, c.point.y, c.point.z]);
-            rows_of(&truth)
-                .into_iter()
-                .chain(numbers)
-                .collect::<Vec<f64>>()
+            rows_of(&truth).into_iter().chain(numbers).collect::<Vec<f64>>()
         });
         doubles(&name, &mut { numbers })?;
     }

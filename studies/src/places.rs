@@ -39,16 +39,11 @@ impl Chosen {
         if self.real {
             let pairs = real_pairs::all()?;
             return at_places(pairs.len(), |number| {
-                work(&Place {
-                    ground: Ground::Real(&pairs[number]),
-                    number,
-                })
+                work(&Place { ground: Ground::Real(&pairs[number]), number })
             });
         }
         let drives = Drives::new();
-        at_places(self.places, |number| {
-            work(&Place::numbered(&drives, number, self.seed))
-        })
+        at_places(self.places, |number| work(&Place::numbered(&drives, number, self.seed)))
     }
 }
 
@@ -130,20 +125,10 @@ impl<'a> Place<'a> {
         let frames = drives.day.frame_count();
         let query = rng.random_range(0..frames);
         let apart = rng.random_range(3..8);
-        let reference = if rng.random() {
-            (query + apart) % frames
-        } else {
-            (query + frames - apart) % frames
-        };
-        let place = StreetPlace {
-            drives,
-            query,
-            reference,
-        };
-        Self {
-            ground: Ground::Street(place),
-            number,
-        }
+        let reference =
+            if rng.random() { (query + apart) % frames } else { (query + frames - apart) % frames };
+        let place = StreetPlace { drives, query, reference };
+        Self { ground: Ground::Street(place), number }
     }
 
     /// The place on the street, if it is there.

@@ -52,23 +52,13 @@ struct Answer {
 
 pub fn run(options: &Options) -> Result<(), Failure> {
     let mut params = Params::default();
-    options
-        .set
-        .iter()
-        .try_for_each(|assignment| params.assign(assignment))?;
-    let index_options = IndexOptions {
-        words: options.words,
-        every: 1,
-        seed: options.seed,
-    };
+    options.set.iter().try_for_each(|assignment| params.assign(assignment))?;
+    let index_options = IndexOptions { words: options.words, every: 1, seed: options.seed };
     let references = scene::open(&options.scenes[0], None)?;
     let total = references.frames().len();
     let held_out = evenly_spread(total, total.saturating_sub(options.frames));
     let temporary = tempfile::tempdir()?;
-    let path = options
-        .index
-        .clone()
-        .unwrap_or_else(|| temporary.path().join("places"));
+    let path = options.index.clone().unwrap_or_else(|| temporary.path().join("places"));
     if Index::open(&path, params.retrieval.checks).is_err() {
         let mut request = Retriever::request(references.as_ref(), &index_options, &params);
         request.frames.retain(|frame| !held_out.contains(frame));
@@ -88,25 +78,14 @@ pub fn run(options: &Options) -> Result<(), Failure> {
             0 => held_out.clone(),
             _ => evenly_spread(queries.frames().len(), options.queries),
         };
-        let answers = ask(
-            &index,
-            &params,
-            references.as_ref(),
-            queries.as_ref(),
-            &frames,
-        )?;
+        let answers = ask(&index, &params, references.as_ref(), queries.as_ref(), &frames)?;
         rows.push(row(queries.name(), &answers));
     }
     const HEAD: &str =
         "query,queries,top 1,top 5,verified: top 1,top 5,first is verified,its inliers,time (ms)";
     print_table(HEAD, &rows);
     let counts = index.description().counts;
-    println!(
-        "{} frames of {}, {} words",
-        counts.documents,
-        references.name(),
-        counts.words
-    );
+    println!("{} frames of {}, {} words", counts.documents, references.name(), counts.words);
     Ok(())
 }
 
@@ -118,13 +97,8 @@ fn ask(
     frames: &[usize],
 ) -> Result<Vec<Answer>, Failure> {
     let detector = params.retrieval.surf(&params.surf);
-    let unverified = RetrievalParams {
-        verify: 0,
-        ..params.retrieval
-    };
-    let features = frames
-        .par_iter()
-        .map(|&frame| Ok(surf(&queries.photo(frame)?.gray, &detector)));
+    let unverified = RetrievalParams { verify: 0, ..params.retrieval };
+    let features = frames.par_iter().map(|&frame| Ok(surf(&queries.photo(frame)?.gray, &detector)));
     let features: Result<Vec<Features>, scene::SceneError> = features.collect();
     let known = frames
         .iter()
@@ -159,21 +133,14 @@ fn row(name: &str, answers: &[Answer]) -> Vec<String> {
         row.push(share(&|answer| answer.is_found[ranking][top]));
     }
     row.push(share(&|answer| answer.inliers.is_some()));
-    let inliers = answers
-        .iter()
-        .filter_map(|answer| Some(answer.inliers? as f64));
+    let inliers = answers.iter().filter_map(|answer| Some(answer.inliers? as f64));
     row.push(format!("{:.0}", median(inliers)));
-    row.push(format!(
-        "{:.1}",
-        median(answers.iter().map(|answer| answer.ms))
-    ));
+    row.push(format!("{:.1}", median(answers.iter().map(|answer| answer.ms))));
     row
 }
 
 /// So many of the frames, at equal distances.
 fn evenly_spread(frames: usize, count: usize) -> Vec<usize> {
     let count = count.min(frames);
-    (0..count)
-        .map(|i| (2 * i + 1) * frames / (2 * count))
-        .collect()
+    (0..count).map(|i| (2 * i + 1) * frames / (2 * count)).collect()
 }

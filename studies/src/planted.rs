@@ -76,10 +76,7 @@ pub fn run(options: &Options) -> Result<(), Failure> {
     let halves: &[(&str, usize)] = if options.chosen.real {
         &[("Pairs of real photos", 2)]
     } else {
-        &[
-            ("Places that the rules were made with", 0),
-            ("Places that were set aside", 1),
-        ]
+        &[("Places that the rules were made with", 0), ("Places that were set aside", 1)]
     };
     for &(title, half) in halves {
         for (is_withheld, truth) in [(false, "truth known"), (true, "truth withheld")] {
@@ -99,12 +96,7 @@ fn at(place: &Place<'_>, only: Option<&str>) -> Result<Vec<Judged>, Failure> {
     let mut found = Vec::new();
     let is_right = |result: &QueryResult| result.grade == Grade::Right;
     // A place at which a method fails anyway says nothing about a fault.
-    let mut sound: Vec<bool> = place
-        .case()
-        .results(&METHODS, true)?
-        .iter()
-        .map(is_right)
-        .collect();
+    let mut sound: Vec<bool> = place.case().results(&METHODS, true)?.iter().map(is_right).collect();
     // The hybrid needs its second method where a fault takes the first.
     sound[3] &= sound[2];
     for &(fault, plant) in faults::ALL {
@@ -112,10 +104,7 @@ fn at(place: &Place<'_>, only: Option<&str>) -> Result<Vec<Judged>, Failure> {
             continue;
         }
         let Some(case) = plant(place) else { continue };
-        let [known, withheld] = [
-            case.results(&METHODS, true)?,
-            case.results(&METHODS, false)?,
-        ];
+        let [known, withheld] = [case.results(&METHODS, true)?, case.results(&METHODS, false)?];
         for method in (0..METHODS.len()).filter(|&method| sound[method]) {
             for (is_withheld, result) in [(false, &known[method]), (true, &withheld[method])] {
                 let primary = result.diagnosis.first();
@@ -152,16 +141,11 @@ fn report(
     let (mut right, mut alarms) = (0, 0);
     let mut rows = Vec::new();
     for &(fault, _) in faults::ALL {
-        let expected = expected
-            .get(fault)
-            .ok_or(format!("{fault} is not in the table"))?;
+        let expected = expected.get(fault).ok_or(format!("{fault} is not in the table"))?;
         let mut row = vec![fault.to_owned()];
         for (method, name) in METHODS.iter().enumerate() {
             let (mut own, mut own_hits, mut harmless) = (0, 0, 0);
-            for one in found
-                .iter()
-                .filter(|j| j.fault == fault && j.method == method)
-            {
+            for one in found.iter().filter(|j| j.fault == fault && j.method == method) {
                 let codes = &expected[usize::from(one.is_withheld)][method];
                 let is_doubted = codes.iter().any(|code| code == Code::L1.name());
                 let is_unsure = one.found == UNSURE;
@@ -172,14 +156,8 @@ fn report(
                     codes.contains(&one.found) || is_unsure && is_doubted
                 };
                 if !is_hit && prints_misses {
-                    let codes = if one.is_right {
-                        "none".to_owned()
-                    } else {
-                        codes.join("|")
-                    };
-                    let Judged {
-                        place, found, text, ..
-                    } = one;
+                    let codes = if one.is_right { "none".to_owned() } else { codes.join("|") };
+                    let Judged { place, found, text, .. } = one;
                     println!(
                         "<!-- {fault} {place} {name}: {codes} expected, {found} found: {text} -->"
                     );

@@ -37,13 +37,7 @@ impl Outliers {
     pub fn cases() -> impl Iterator<Item = (String, Self)> {
         [30, 60, 80, 90].into_iter().flat_map(|percent| {
             [200, 1000].map(|correspondences| {
-                (
-                    format!("pose_{percent}_{correspondences}"),
-                    Self {
-                        percent,
-                        correspondences,
-                    },
-                )
+                (format!("pose_{percent}_{correspondences}"), Self { percent, correspondences })
             })
         })
     }
@@ -55,14 +49,8 @@ impl Outliers {
         let camera_from_world = random_pose(&mut rng);
         let correspondences = (0..self.correspondences).map(|i| {
             let point = random_point(&mut rng);
-            let shown = if i % 100 < self.percent {
-                random_point(&mut rng)
-            } else {
-                point
-            };
-            let pixel = intrinsics
-                .project(&shown)
-                .expect("a point in front of the camera");
+            let shown = if i % 100 < self.percent { random_point(&mut rng) } else { point };
+            let pixel = intrinsics.project(&shown).expect("a point in front of the camera");
             let mut noise = || rng.random_range(-1.7..1.7);
             Correspondence {
                 pixel: Point2::new(pixel.x + noise(), pixel.y + noise()),
@@ -75,9 +63,7 @@ impl Outliers {
 
 fn random_point(rng: &mut Pcg64) -> Point3<f64> {
     let pixel = Point2::new(rng.random_range(0.0..1240.0), rng.random_range(0.0..375.0));
-    PAIR.query
-        .intrinsics
-        .unproject(&pixel, rng.random_range(5.0..50.0))
+    PAIR.query.intrinsics.unproject(&pixel, rng.random_range(5.0..50.0))
 }
 
 fn random_pose(rng: &mut Pcg64) -> Pose {

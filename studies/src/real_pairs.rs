@@ -35,10 +35,7 @@ pub struct RealPair {
 
 /// A scene, and the poses registered for its frames.
 const SOURCES: [(&str, &str); 2] = [
-    (
-        "kitti/sequences/00",
-        "derived/kitti_odometry_00_003814_003823.txt",
-    ),
+    ("kitti/sequences/00", "derived/kitti_odometry_00_003814_003823.txt"),
     (
         "kitti_raw/2011_09_26/2011_09_26_drive_0013_sync",
         "derived/kitti_raw_2011_09_26_drive_0013.txt",
@@ -68,9 +65,7 @@ pub fn all() -> Result<Vec<RealPair>, Failure> {
 fn frames(folder: &Path, poses: &Path) -> Result<Vec<Frame>, Failure> {
     let scene = truth::open(&folder.to_string_lossy(), Some(poses))?;
     let known = (0..scene.frames().len()).filter(|&frame| scene.pose(frame).is_some());
-    known
-        .map(|frame| Ok(Frame::read(scene.as_ref(), frame)?))
-        .collect()
+    known.map(|frame| Ok(Frame::read(scene.as_ref(), frame)?)).collect()
 }
 
 fn pairs_of(frames: &[Frame], foreign: &RgbImage) -> Vec<RealPair> {

@@ -58,9 +58,7 @@ fn result_files(place: &Path) -> Result<BTreeMap<String, PathBuf>, Failure> {
         }
     }
     let error_of = |error: &dyn std::fmt::Display| format!("{}: {error}", place.display());
-    let entries = fs::read_dir(place)
-        .map_err(|error| error_of(&error))?
-        .flatten();
+    let entries = fs::read_dir(place).map_err(|error| error_of(&error))?.flatten();
     let files = entries.map(|entry| (entry.file_name(), entry.path().join("results.jsonl")));
     let found: BTreeMap<String, PathBuf> = files
         .filter(|(_, file)| file.is_file())
@@ -90,12 +88,10 @@ fn read(file: &Path) -> Result<BTreeMap<String, Value>, Failure> {
 
 fn identity(result: &Value) -> String {
     let values = IDENTITY.split(' ').filter_map(|key| result.get(key));
-    let words = values
-        .filter(|value| !value.is_null())
-        .map(|value| match value {
-            Value::String(text) => text.clone(),
-            other => other.to_string(),
-        });
+    let words = values.filter(|value| !value.is_null()).map(|value| match value {
+        Value::String(text) => text.clone(),
+        other => other.to_string(),
+    });
     words.collect::<Vec<_>>().join(" ")
 }
 
@@ -175,10 +171,7 @@ mod tests {
         let b = of(&[result("70", 0.25), result("72", 0.5)]);
         let found = differences(&a, &b);
         let lines: Vec<&str> = found.values().flatten().map(String::as_str).collect();
-        assert_eq!(
-            lines,
-            ["/cost/best: 0.5 became 0.25", "only in A", "only in B"]
-        );
+        assert_eq!(lines, ["/cost/best: 0.5 became 0.25", "only in A", "only in B"]);
         let mut failed = result("70", 0.5);
         failed["status"] = json!("failed");
         failed["reason"] = json!({ "code": "R3", "text": "" });

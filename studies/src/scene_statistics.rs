@@ -57,10 +57,8 @@ fn statistics(scene: &dyn Scene) -> Result<Rows, Failure> {
         .map(|&frame| Ok(scene.photo(frame)?.gray))
         .collect::<Result<Vec<_>, Failure>>()?;
 
-    let mut grey: Vec<f64> = photos
-        .iter()
-        .flat_map(|photo| photo.iter().copied().map(f64::from))
-        .collect();
+    let mut grey: Vec<f64> =
+        photos.iter().flat_map(|photo| photo.iter().copied().map(f64::from)).collect();
     let average = mean(grey.iter().copied());
     let deviation = mean(grey.iter().map(|value| (value - average).powi(2))).sqrt();
     let shares =
@@ -74,27 +72,12 @@ fn statistics(scene: &dyn Scene) -> Result<Rows, Failure> {
     let keypoints = |photo| surf(photo, &SurfParams::default()).keypoints.len() as f64;
     let covered = lidar_share(scene, &frames)?;
     let mut rows: Rows = [
-        (
-            "grey value, mean ± deviation",
-            format!("{average:.0} ± {deviation:.0}"),
-        ),
+        ("grey value, mean ± deviation", format!("{average:.0} ± {deviation:.0}")),
         ("… at 5, 25, 50, 75, 95 %", shares.join(", ")),
-        (
-            "gradient, mean / median / 90 %",
-            format!("{steep:.1} / {half:.1} / {most:.1}"),
-        ),
-        (
-            "power spectrum, slope",
-            format!("{:.2}", mean(photos.iter().map(spectrum_slope))),
-        ),
-        (
-            "SURF keypoints",
-            format!("{:.0}", mean(photos.iter().map(keypoints))),
-        ),
-        (
-            "image within 4 px of a LiDAR point, %",
-            figure(mean(covered), 0),
-        ),
+        ("gradient, mean / median / 90 %", format!("{steep:.1} / {half:.1} / {most:.1}")),
+        ("power spectrum, slope", format!("{:.2}", mean(photos.iter().map(spectrum_slope)))),
+        ("SURF keypoints", format!("{:.0}", mean(photos.iter().map(keypoints)))),
+        ("image within 4 px of a LiDAR point, %", figure(mean(covered), 0)),
     ]
     .map(|(name, figure)| (name.to_owned(), figure))
     .into();
@@ -106,11 +89,7 @@ fn statistics(scene: &dyn Scene) -> Result<Rows, Failure> {
 
 /// A number with so many digits; a dash where nothing is known.
 fn figure(value: f64, digits: usize) -> String {
-    if value.is_nan() {
-        "–".to_owned()
-    } else {
-        format!("{value:.digits$}")
-    }
+    if value.is_nan() { "–".to_owned() } else { format!("{value:.digits$}") }
 }
 
 /// Magnitudes of central differences.
@@ -118,8 +97,7 @@ fn gradients(photo: &GrayImage) -> Vec<f64> {
     let at = |x: u32, y: u32| f64::from(photo.get_pixel(x, y).0[0]);
     let magnitude = |x, y| (at(x + 1, y) - at(x - 1, y)).hypot(at(x, y + 1) - at(x, y - 1)) / 2.0;
     let rows = 1..photo.height() - 1;
-    rows.flat_map(|y| (1..photo.width() - 1).map(move |x| magnitude(x, y)))
-        .collect()
+    rows.flat_map(|y| (1..photo.width() - 1).map(move |x| magnitude(x, y))).collect()
 }
 
 /// Slope of log power over log frequency along the rows, between 1/64 and 1/4 cycles per pixel;
@@ -127,9 +105,8 @@ fn gradients(photo: &GrayImage) -> Vec<f64> {
 fn spectrum_slope(photo: &GrayImage) -> f64 {
     let length = photo.width() as usize;
     // A few frequencies, evenly spaced in their logarithm.
-    let cycles: Vec<f64> = (0..=16)
-        .map(|i| (length as f64 / 64.0 * 2f64.powf(f64::from(i) / 4.0)).round())
-        .collect();
+    let cycles: Vec<f64> =
+        (0..=16).map(|i| (length as f64 / 64.0 * 2f64.powf(f64::from(i) / 4.0)).round()).collect();
     let mut power = vec![0.0; cycles.len()];
     for row in photo.rows().step_by(4) {
         let values: Vec<f64> = row.map(|pixel| f64::from(pixel.0[0])).collect();
@@ -147,13 +124,8 @@ fn spectrum_slope(photo: &GrayImage) -> f64 {
         }
     }
     let points = cycles.iter().zip(&power);
-    let points: Vec<(f64, f64)> = points
-        .map(|(cycles, power)| (cycles.ln(), power.ln()))
-        .collect();
-    let (x, y) = (
-        mean(points.iter().map(|p| p.0)),
-        mean(points.iter().map(|p| p.1)),
-    );
+    let points: Vec<(f64, f64)> = points.map(|(cycles, power)| (cycles.ln(), power.ln())).collect();
+    let (x, y) = (mean(points.iter().map(|p| p.0)), mean(points.iter().map(|p| p.1)));
     let covariance: f64 = points.iter().map(|p| (p.0 - x) * (p.1 - y)).sum();
     covariance / points.iter().map(|p| (p.0 - x).powi(2)).sum::<f64>()
 }
@@ -214,9 +186,11 @@ fn pairs(
         let problem = Problem::new(query_frame, scene.reference(reference)?, 2.0 * distance_m)?;
         let params = Params::default();
         let outcome = localize(&problem, Method::FB, &params);
-        errors.push(outcome.pose.map_or(f64::INFINITY, |pose| {
-            PoseError::between(&truth, &pose).translation_m
-        }));
+        errors.push(
+            outcome
+                .pose
+                .map_or(f64::INFINITY, |pose| PoseError::between(&truth, &pose).translation_m),
+        );
         inliers.extend(outcome.counts.map(|counts| counts.inliers as f64));
         let direct = estimator::entry(Method::MI).make(&params);
         let score = direct.score_at(&problem, &truth);

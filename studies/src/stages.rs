@@ -22,10 +22,7 @@ pub const TRIALS: u64 = 10;
 
 /// The features that turn with the image, as those of other programs do.
 pub fn turning() -> SurfParams {
-    SurfParams {
-        upright: false,
-        ..SurfParams::default()
-    }
+    SurfParams { upright: false, ..SurfParams::default() }
 }
 
 /// What a stage does each time it is called; how good the outcome is.
@@ -54,15 +51,9 @@ pub fn with_stage<R>(name: &str, measure: impl FnOnce(usize, &mut Work<'_>) -> R
     }
     Some(match name {
         "surf" | "surf_upright" => {
-            let params = if name == "surf" {
-                turning()
-            } else {
-                SurfParams::default()
-            };
+            let params = if name == "surf" { turning() } else { SurfParams::default() };
             let items = surf(reference, &params).keypoints.len();
-            measure(items, &mut || {
-                json!(surf(reference, &params).keypoints.len())
-            })
+            measure(items, &mut || json!(surf(reference, &params).keypoints.len()))
         }
         "match" => {
             let [query, reference] =
@@ -76,9 +67,8 @@ pub fn with_stage<R>(name: &str, measure: impl FnOnce(usize, &mut Work<'_>) -> R
         "p3p" => {
             let problems = p3p_problems(P3P_PROBLEMS);
             measure(problems.len(), &mut || {
-                let solutions = problems
-                    .iter()
-                    .map(|(bearings, points)| p3p(bearings, points).len());
+                let solutions =
+                    problems.iter().map(|(bearings, points)| p3p(bearings, points).len());
                 json!({ "solutions": solutions.sum::<usize>() })
             })
         }
@@ -120,10 +110,7 @@ fn both_costs<R>(splat_px: usize, measure: impl FnOnce(usize, &mut Work<'_>) -> 
         unreachable!("PM looks at differences, MI at a joint histogram");
     };
     let of_points: Vec<f32> = cloud.points.iter().map(|point| point.intensity).collect();
-    let values = Values {
-        query: &query,
-        points: &of_points,
-    };
+    let values = Values { query: &query, points: &of_points };
     let points = PointArrays::new(cloud.points.iter().map(|point| point.position));
     let mut canvas = DepthCanvas::new(&PAIR.query.intrinsics, splat_px).expect("a usual photo");
     let keep = |query, synthetic| IntensityPair { query, synthetic };
@@ -153,9 +140,7 @@ fn robust_pose<R>(case: Outliers, measure: impl FnOnce(usize, &mut Work<'_>) -> 
         let distances = drawn.iter().map(|(correspondences, truth)| {
             let intrinsics = &PAIR.query.intrinsics;
             let found = mlesac(correspondences, intrinsics, &params, 0, |_| Ok::<_, ()>(()));
-            found.map_or(f64::INFINITY, |found| {
-                (centre(&found.pose) - centre(truth)).norm()
-            })
+            found.map_or(f64::INFINITY, |found| (centre(&found.pose) - centre(truth)).norm())
         });
         let mut distances: Vec<f64> = distances.collect();
         distances.sort_by(f64::total_cmp);

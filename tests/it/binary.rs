@@ -124,9 +124,7 @@ pub fn refused(folder: &Path, table: &str) {
 #[track_caller]
 pub fn cells<const N: usize>(row: &str) -> [&str; N] {
     let cells: Vec<&str> = row.split(" | ").map(str::trim).collect();
-    cells
-        .try_into()
-        .unwrap_or_else(|_| panic!("{N} cells: {row}"))
+    cells.try_into().unwrap_or_else(|_| panic!("{N} cells: {row}"))
 }
 
 /// What a file says.

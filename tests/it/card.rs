@@ -32,16 +32,10 @@ fn the_bar_says_what_each_result_is_worth_and_the_sentence_why() {
     }
     assert_eq!(right_ones(&window), 4);
 
-    let mut grey = finished(Setup {
-        query: GREY,
-        ..setup()
-    });
+    let mut grey = finished(Setup { query: GREY, ..setup() });
     assert_eq!(right_ones(&grey), 0);
     for result in results(&grey) {
-        send(
-            &mut grey,
-            Command::ShowPart(Part::Reference(result.method, 0)),
-        );
+        send(&mut grey, Command::ShowPart(Part::Reference(result.method, 0)));
         assert!(app(&grey).options.shows_why);
         let primary = result.diagnosis.first().expect("a verdict");
         let sentence = primary.text.split(". ").next().expect("a sentence");
@@ -53,10 +47,7 @@ fn the_bar_says_what_each_result_is_worth_and_the_sentence_why() {
 /// The window goes to the first method that is wrong, and shows why.
 #[test]
 fn a_run_that_ends_opens_at_the_cause() {
-    let grey = finished(Setup {
-        query: GREY,
-        ..setup()
-    });
+    let grey = finished(Setup { query: GREY, ..setup() });
     let state = app(&grey);
     assert!(state.options.shows_why);
     let span = state.run().span_at(state.cursor()).expect("a part");
@@ -83,25 +74,14 @@ fn a_run_that_ends_opens_at_the_cause() {
 
 #[test]
 fn nothing_moves_between_two_steps() {
-    let mut window = finished(Setup {
-        query: GREY,
-        ..setup()
-    });
+    let mut window = finished(Setup { query: GREY, ..setup() });
     let places = |window: &Harness<'_, App>| -> Vec<egui::Rect> {
-        [
-            "Step",
-            "Truth",
-            "Compare",
-            "Search",
-            "Step inside the stage",
-            "Why",
-            "FB: ",
-        ]
-        .map(|label| {
-            let mut found = window.query_all_by_label_contains(label);
-            found.next().unwrap_or_else(|| panic!("{label}")).rect()
-        })
-        .to_vec()
+        ["Step", "Truth", "Compare", "Search", "Step inside the stage", "Why", "FB: "]
+            .map(|label| {
+                let mut found = window.query_all_by_label_contains(label);
+                found.next().unwrap_or_else(|| panic!("{label}")).rect()
+            })
+            .to_vec()
     };
     let at_end = places(&window);
     for command in [Command::First, Command::Forward(40), Command::Last] {
@@ -149,11 +129,7 @@ fn what_helped_is_tried_by_a_button_and_compared_with_the_run_before() {
     let helped = explanation.expect("it went wrong");
     let best = helped.best().expect("something helped").error;
     let errors = helped.helped.iter().map(|helped| helped.error);
-    assert!(
-        errors
-            .into_iter()
-            .all(|error| error.translation_m >= best.translation_m)
-    );
+    assert!(errors.into_iter().all(|error| error.translation_m >= best.translation_m));
     assert!(helped.helped.len() > 1 && helped.helped[0].error != best);
     window.get_by_label_contains("Try ").click();
     wait(&mut window, |app| app.app_state().kept.is_some());
@@ -218,10 +194,7 @@ fn a_lecture_shows_nothing_of_what_is_still_to_come() {
     press(&mut window, Modifiers::NONE, Key::F3);
     window.run_steps(3);
     send(&mut window, Command::MoveCursor(1));
-    assert!(
-        is_said(&window, "It finds points that stand out"),
-        "the stage in one sentence"
-    );
+    assert!(is_said(&window, "It finds points that stand out"), "the stage in one sentence");
     let known = app(&window).options.clone();
     assert!(known.hides_future && !known.shows_why);
     press(&mut window, Modifiers::NONE, Key::F2);
@@ -232,18 +205,12 @@ fn a_lecture_shows_nothing_of_what_is_still_to_come() {
 #[test]
 fn a_batch_is_filtered_sorted_and_opened() {
     let all = finished(setup());
-    let grey = finished(Setup {
-        query: GREY,
-        ..setup()
-    });
+    let grey = finished(Setup { query: GREY, ..setup() });
     let known = [(1, results(&all)), (GREY, results(&grey))];
     let mut window = window_with_results(setup(), Results::from(known));
     press(&mut window, Modifiers::NONE, Key::F4);
     window.run_steps(3);
-    assert!(is_said(
-        &window,
-        "8 of 8 results; wrong or without a pose: FB 1, PM 1, MI 1, HY 1"
-    ));
+    assert!(is_said(&window, "8 of 8 results; wrong or without a pose: FB 1, PM 1, MI 1, HY 1"));
     let filter = |window: &mut Harness<'_, App>, text: &str| {
         let field = window.get_by_label("Where");
         field.focus();
@@ -253,10 +220,7 @@ fn a_batch_is_filtered_sorted_and_opened() {
         window.run_steps(3);
     };
     filter(&mut window, "method = mi and code = D5");
-    assert!(is_said(
-        &window,
-        "1 of 8 results; wrong or without a pose: MI 1"
-    ));
+    assert!(is_said(&window, "1 of 8 results; wrong or without a pose: MI 1"));
     filter(&mut window, "method = = mi");
     assert!(is_said(&window, "a value expected"));
     filter(&mut window, "error >= 0");
@@ -269,10 +233,7 @@ fn a_batch_is_filtered_sorted_and_opened() {
 #[test]
 fn saving_asks_where_and_offers_a_name_that_says_what_it_is() {
     let folder = tempfile::tempdir().expect("a folder");
-    let mut window = finished(Setup {
-        folder: folder.path().to_owned(),
-        ..setup()
-    });
+    let mut window = finished(Setup { folder: folder.path().to_owned(), ..setup() });
     send(&mut window, Command::AskWhere(SaveTarget::Recording));
     assert!(is_said(&window, "Save the recording"));
     press(&mut window, Modifiers::NONE, Key::Escape);
@@ -290,18 +251,9 @@ fn saving_asks_where_and_offers_a_name_that_says_what_it_is() {
 
 #[test]
 fn what_is_known_from_a_run_folder_is_told_before_the_query_is_run_again() {
-    let grey = finished(Setup {
-        query: GREY,
-        ..setup()
-    });
+    let grey = finished(Setup { query: GREY, ..setup() });
     let known: Results = [(GREY, results(&grey))].into();
-    let mut window = window_with_results(
-        Setup {
-            query: GREY,
-            ..setup()
-        },
-        known.clone(),
-    );
+    let mut window = window_with_results(Setup { query: GREY, ..setup() }, known.clone());
     run_until_idle(&mut window);
     assert!(is_said(&window, "FB: paused") && is_said(&window, "MI: not run yet"));
     // The table says the cause in a phrase.

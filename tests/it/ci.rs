@@ -35,10 +35,7 @@ fn a_known_failure_turns_no_job_red_and_one_that_is_fixed_is_said() {
 
     write(&list, "# the lamp was off\n2 fb R2\n1 fb\n");
     let said = eval(&sequence, &format!("{gated} --out green")).ok();
-    has(
-        &said.out,
-        "1 known failure is left out of gates ~ 1 fb no longer fails; remove",
-    );
+    has(&said.out, "1 known failure is left out of gates ~ 1 fb no longer fails; remove");
     let junit = sequence.text("green/junit.xml");
     assert_eq!(junit.matches("<skipped").count(), 1, "{junit}");
     assert_eq!(junit.matches("<failure").count(), 0);
@@ -62,11 +59,7 @@ fn a_known_failure_is_no_regression() {
     sequence.blacken("000002");
     write(sequence.path().join("known.txt"), "000002 fb\n");
     assert_eq!(eval(&sequence, "--baseline good --out red").code, Some(1));
-    eval(
-        &sequence,
-        "--baseline good --known-failures known.txt --out green",
-    )
-    .ok();
+    eval(&sequence, "--baseline good --known-failures known.txt --out green").ok();
 }
 
 #[test]
@@ -74,15 +67,9 @@ fn the_summary_of_a_step_is_appended_where_there_is_one() {
     let sequence = sequence();
     write(sequence.path().join("summary.md"), "# before\n");
     let words = "--gate 'median(time)@fb < 60' --gate 'success@fb > 0.9' --out run";
-    assert_eq!(
-        eval_with(&sequence, words, Some("summary.md")).code,
-        Some(1)
-    );
+    assert_eq!(eval_with(&sequence, words, Some("summary.md")).code, Some(1));
     let text = sequence.text("summary.md");
-    assert!(
-        text.starts_with("# before\n### ❌ posescope: kitti/42"),
-        "{text}"
-    );
+    assert!(text.starts_with("# before\n### ❌ posescope: kitti/42"), "{text}");
     has(
         &text,
         "| `median(time)@fb < 60` | passed | ~ | `success@fb > 0.9` | failed | ~ | FB | 66.7 |",

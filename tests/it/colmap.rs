@@ -30,57 +30,30 @@ type Camera = (u32, &'static str, u32, [u64; 2], &'static [f64]);
 
 const CAMERAS: [Camera; 2] = [
     (1, "PINHOLE", 1, [160, 64], &[100.0, 101.0, 80.5, 32.5]),
-    (
-        7,
-        "OPENCV",
-        4,
-        [96, 80],
-        &[90.0, 90.0, 48.0, 40.0, -0.05, 0.01, 0.001, -0.001],
-    ),
+    (7, "OPENCV", 4, [96, 80], &[90.0, 90.0, 48.0, 40.0, -0.05, 0.01, 0.001, -0.001]),
 ];
 
 /// Id, name, camera, rotation and translation of `camera_from_world`, ids of the points that it observes.
 type Image = (u32, &'static str, u32, [f64; 4], [f64; 3], &'static [i64]);
 
 const IMAGES: [Image; 2] = [
-    (
-        4,
-        "b side/2.png",
-        7,
-        [0.923_879_533, 0.0, 0.382_683_432, 0.0],
-        [1.0, 2.0, 3.0],
-        &[],
-    ),
-    (
-        2,
-        "a/1.png",
-        1,
-        [1.0, 0.0, 0.0, 0.0],
-        [0.5, 0.0, 4.0],
-        &[30, -1, 10, 20],
-    ),
+    (4, "b side/2.png", 7, [0.923_879_533, 0.0, 0.382_683_432, 0.0], [1.0, 2.0, 3.0], &[]),
+    (2, "a/1.png", 1, [1.0, 0.0, 0.0, 0.0], [0.5, 0.0, 4.0], &[30, -1, 10, 20]),
 ];
 
-const POINTS: [(u64, [f64; 3]); 3] = [
-    (10, [0.0, 0.0, 6.0]),
-    (20, [1.0, -0.5, 7.0]),
-    (30, [-2.0, 0.25, 16.0]),
-];
+const POINTS: [(u64, [f64; 3]); 3] =
+    [(10, [0.0, 0.0, 6.0]), (20, [1.0, -0.5, 7.0]), (30, [-2.0, 0.25, 16.0])];
 
 /// A project with photos and the model in `sparse/0`.
 pub fn write(folder: &Path, form: Form) {
     let model = folder.join("sparse/0");
     fs::create_dir_all(&model).expect("writable");
     for (_, name, camera, ..) in IMAGES {
-        let (.., [width, height], _) = CAMERAS
-            .into_iter()
-            .find(|(id, ..)| *id == camera)
-            .expect("is there");
+        let (.., [width, height], _) =
+            CAMERAS.into_iter().find(|(id, ..)| *id == camera).expect("is there");
         let path = folder.join("images").join(name);
         fs::create_dir_all(path.parent().expect("has one")).expect("writable");
-        wall(width as u32, height as u32)
-            .save(path)
-            .expect("writable");
+        wall(width as u32, height as u32).save(path).expect("writable");
     }
     match form {
         Form::Text => write_text(&model),
@@ -116,10 +89,7 @@ fn write_text(model: &Path) {
 
 fn write_binary(model: &Path) {
     let floats = |values: &[f64]| -> Vec<u8> {
-        values
-            .iter()
-            .flat_map(|value| value.to_le_bytes())
-            .collect()
+        values.iter().flat_map(|value| value.to_le_bytes()).collect()
     };
     let mut bytes = (CAMERAS.len() as u64).to_le_bytes().to_vec();
     for (id, _, number, size, parameters) in CAMERAS {
@@ -206,10 +176,7 @@ fn both_forms_say_the_same() {
         let expected = [[-1.5, 0.25, 20.0], [0.5, 0.0, 10.0], [1.5, -0.5, 11.0]];
         assert_eq!(cloud.points, expected.map(Point3::from));
         assert!(!scene.has_cloud(1));
-        let error = scene
-            .reference(1)
-            .expect_err("observes nothing")
-            .to_string();
+        let error = scene.reference(1).expect_err("observes nothing").to_string();
         has(&error, "frame 1 has one");
     }
 }
@@ -300,9 +267,7 @@ fn features(model: &Path, name: &str) -> Vec<(Point2<f64>, u64)> {
         .map(|word| word.parse().expect("a number"))
         .collect();
     let features = numbers.chunks_exact(3).filter(|feature| feature[2] >= 0.0);
-    features
-        .map(|f| (Point2::new(f[0] - 0.5, f[1] - 0.5), f[2] as u64))
-        .collect()
+    features.map(|f| (Point2::new(f[0] - 0.5, f[1] - 0.5), f[2] as u64)).collect()
 }
 
 #[test]

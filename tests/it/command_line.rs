@@ -17,17 +17,9 @@ fn results(sequence: &SmallSequence, words: &str) -> Vec<Value> {
 #[test]
 fn results_come_in_query_then_method_order_with_the_promised_keys() {
     let sequence = SmallSequence::write();
-    let results = results(
-        &sequence,
-        "--query 5 --query 7 --reference 4 --method mi,fb",
-    );
+    let results = results(&sequence, "--query 5 --query 7 --reference 4 --method mi,fb");
     let order = results.iter().map(|r| json!([r["query"], r["method"]]));
-    let expected = [
-        ["000005", "fb"],
-        ["000005", "mi"],
-        ["000007", "fb"],
-        ["000007", "mi"],
-    ];
+    let expected = [["000005", "fb"], ["000005", "mi"], ["000007", "fb"], ["000007", "mi"]];
     assert_eq!(order.collect::<Vec<_>>(), expected.map(|pair| json!(pair)));
     let promised = "schema scene query references method fusion seed status reason pose error \
                     initial_error counts cost diagnosis";
@@ -69,9 +61,7 @@ fn usage_errors_have_exit_code_2_and_name_the_next_step() {
     ";
     for row in table.lines().map(str::trim).filter(|row| !row.is_empty()) {
         let [words, expected] = cells(row);
-        sequence
-            .run(&format!("run sequences/42 {words}"))
-            .fails_with(2, expected);
+        sequence.run(&format!("run sequences/42 {words}")).fails_with(2, expected);
     }
 }
 
@@ -96,17 +86,11 @@ fn a_reference_is_chosen_within_the_radius_and_never_the_query_itself() {
     let line = |words: &str| format!("run sequences/42 --query 5 --method mi --json - -q {words}");
     let references = |words: &str| -> Vec<Value> {
         let results: Vec<Value> = objects(&sequence.run(&line(words)).ok().out);
-        results
-            .iter()
-            .map(|result| result["references"][0].clone())
-            .collect()
+        results.iter().map(|result| result["references"][0].clone()).collect()
     };
     assert_eq!(references("--reference nearest:2"), ["000004", "000007"]);
     assert_eq!(references("--reference random:5 --radius 1.5"), ["000004"]);
-    assert_eq!(
-        references("--reference random:5 --radius 0.5 --prior 1.5"),
-        ["000004"]
-    );
+    assert_eq!(references("--reference random:5 --radius 0.5 --prior 1.5"), ["000004"]);
     assert_eq!(sequence.run(&line("--radius 0.5")).code, Some(3));
 }
 
@@ -120,9 +104,7 @@ fn where_no_reference_is_near_the_distance_is_named_that_was_searched() {
         3 | view sequences/42 --query 5 --method mi --radius 15 --prior 0.5 | within 0.5 m of query 000005; raise --radius or --prior, or name a frame
         ",
     );
-    sequence
-        .run("eval sequences/42 --method mi --prior 0.5 -q --out run")
-        .ok();
+    sequence.run("eval sequences/42 --method mi --prior 0.5 -q --out run").ok();
     for result in objects::<Value>(&sequence.text("run/results.jsonl")) {
         let expected = "No reference frame with pose and scan within 0.5 m of the query.";
         assert_eq!(result["reason"]["text"], expected);
@@ -161,14 +143,9 @@ fn the_street_is_solved_and_the_bytes_do_not_depend_on_the_number_of_threads() {
 fn a_reader_that_has_seen_enough_is_no_error() {
     let binary = assert_cmd::cargo::cargo_bin!("posescope").display();
     let script = format!("'{binary}' params | true; exit ${{PIPESTATUS[0]}}");
-    let output = std::process::Command::new("bash")
-        .args(["-c", &script])
-        .output();
+    let output = std::process::Command::new("bash").args(["-c", &script]).output();
     let output = output.expect("bash is there");
-    assert!(
-        output.status.success() && output.stderr.is_empty(),
-        "{output:?}"
-    );
+    assert!(output.status.success() && output.stderr.is_empty(), "{output:?}");
 }
 
 #[test]
@@ -213,12 +190,7 @@ fn a_pipe_has_a_line_for_each_result_and_no_rules() {
     let text = printed(&SmallSequence::write(), TWO_QUERIES, None);
     let lines: Vec<&str> = text.lines().collect();
     assert!(lines[0].starts_with("query   reference  "), "{text}");
-    let expected = [
-        ("000005", "fb"),
-        ("000005", "mi"),
-        ("000007", "fb"),
-        ("000007", "mi"),
-    ];
+    let expected = [("000005", "fb"), ("000005", "mi"), ("000007", "fb"), ("000007", "mi")];
     for (line, (query, method)) in lines[1..].iter().zip(expected) {
         let cells: Vec<&str> = line.split("  ").map(str::trim).collect();
         assert_eq!((cells[0], cells[1]), (query, "000004"), "{text}");
@@ -232,10 +204,7 @@ fn eighty_columns_hold_every_result_with_whole_words() {
     let sequence = SmallSequence::write();
     let narrow = printed(&sequence, TWO_QUERIES, Some("80"));
     expect_narrow(&narrow);
-    assert!(
-        narrow.starts_with("query 000005, reference 000004, start 1.000 m\n"),
-        "{narrow}"
-    );
+    assert!(narrow.starts_with("query 000005, reference 000004, start 1.000 m\n"), "{narrow}");
     // Nothing of what a wide terminal shows is missing or broken, but the times.
     let wide = printed(&sequence, TWO_QUERIES, Some("400"));
     let rows = wide.split_once('\n').map_or("", |(_, rows)| rows);
@@ -243,10 +212,7 @@ fn eighty_columns_hold_every_result_with_whole_words() {
     let known: Vec<String> = narrow.split_whitespace().map(plain).collect();
     for word in rows.split_whitespace() {
         let is_time = word.parse::<f64>().is_ok();
-        assert!(
-            is_time || known.contains(&plain(word)),
-            "`{word}` of\n{wide}\nin\n{narrow}"
-        );
+        assert!(is_time || known.contains(&plain(word)), "`{word}` of\n{wide}\nin\n{narrow}");
     }
 }
 
@@ -269,10 +235,6 @@ fn an_evaluation_fits_eighty_columns_and_is_markdown_in_a_pipe() {
     expect_narrow(&narrow);
     assert!(!narrow.contains('|'), "{narrow}");
     let label = narrow.lines().find(|line| line.contains("median (m)"));
-    assert_eq!(
-        label.map(|line| line.split_whitespace().count()),
-        Some(4),
-        "{narrow}"
-    );
+    assert_eq!(label.map(|line| line.split_whitespace().count()), Some(4), "{narrow}");
     has(&printed(&sequence, &line("b"), None), "|:--|--:|");
 }

@@ -25,25 +25,13 @@ fn two_runs_are_one_table_of_what_became_different() {
     let mut window = finished(setup());
     let before = results(&window);
     press(&mut window, Modifiers::NONE, Key::P);
-    send(
-        &mut window,
-        Command::ShowPart(Part::Reference(Method::FB, 0)),
-    );
+    send(&mut window, Command::ShowPart(Part::Reference(Method::FB, 0)));
     send(&mut window, Command::ShowTab(Tab::Numbers));
     assert!(is_said(&window, "Both runs have the same settings."));
 
-    send(
-        &mut window,
-        Command::SetParam {
-            key: "fb.ratio".to_owned(),
-            value: "0.6".to_owned(),
-        },
-    );
+    send(&mut window, Command::SetParam { key: "fb.ratio".to_owned(), value: "0.6".to_owned() });
     run_until_idle(&mut window);
-    send(
-        &mut window,
-        Command::ShowPart(Part::Reference(Method::FB, 0)),
-    );
+    send(&mut window, Command::ShowPart(Part::Reference(Method::FB, 0)));
     let after = results(&window);
     let matches = |results: &[QueryResult]| results[0].counts.expect("of FB").with_depth;
     let (a, b) = (matches(&before), matches(&after));
@@ -103,9 +91,7 @@ fn results_are_drawn_as_the_condition_chooses_them() {
     window.run_steps(3);
     let of_method = known.iter().filter(|result| result.method == Method::MI);
     let all = of_method.clone().count();
-    let right = of_method
-        .filter(|result| result.diagnosis.is_empty())
-        .count();
+    let right = of_method.filter(|result| result.diagnosis.is_empty()).count();
     assert!(is_said(&window, &format!("MI ok: {right} of {all}")));
 
     // By condition; a click shows the results of a number.
@@ -120,19 +106,11 @@ fn results_are_drawn_as_the_condition_chooses_them() {
     window.get_by_label("Scatter").click();
     window.run_steps(3);
     assert!(is_said(&window, &drawn(&is_it)));
-    window
-        .state_mut()
-        .send(Command::FilterResults(String::new()));
+    window.state_mut().send(Command::FilterResults(String::new()));
 
     window.get_by_label("Scatter").click();
-    send(
-        &mut window,
-        Command::FilterResults("method = mi".to_owned()),
-    );
-    assert!(is_said(
-        &window,
-        &drawn(&|result| result.method == Method::MI)
-    ));
+    send(&mut window, Command::FilterResults("method = mi".to_owned()));
+    assert!(is_said(&window, &drawn(&|result| result.method == Method::MI)));
     send(&mut window, Command::FilterResults("method = ".to_owned()));
     assert!(is_said(&window, "expected"));
 }
@@ -142,21 +120,12 @@ fn a_result_is_opened_at_the_step_that_decided_it() {
     let mut window = over_a_run();
     let failed = |window: &Harness<'_, App>, code: Code| {
         let known = &app(window).results[&GREY];
-        known.iter().position(|result| {
-            result
-                .diagnosis
-                .first()
-                .is_some_and(|finding| finding.code == code)
-        })
+        known
+            .iter()
+            .position(|result| result.diagnosis.first().is_some_and(|finding| finding.code == code))
     };
     let result = failed(&window, Code::R2).expect("a grey photo has no features");
-    send(
-        &mut window,
-        Command::OpenResult {
-            query: GREY,
-            result,
-        },
-    );
+    send(&mut window, Command::OpenResult { query: GREY, result });
     run_until_idle(&mut window);
     let state = app(&window);
     assert_eq!(state.setup.query, GREY);
@@ -198,10 +167,7 @@ fn over_two_runs() -> (Harness<'static, App>, Results, Results) {
         assert!(result.diagnosis.is_empty());
         result.diagnosis.clone_from(&told);
     }
-    let known = KnownResults {
-        now: now.clone(),
-        before: Some(before.clone()),
-    };
+    let known = KnownResults { now: now.clone(), before: Some(before.clone()) };
     let mut window = crate::window::window_with_results(setup(), known);
     run_until_idle(&mut window);
     (window, before, now)
@@ -212,12 +178,9 @@ fn verdicts_that_became_others_are_a_matrix_and_a_click_shows_their_queries() {
     let (mut window, before, now) = over_two_runs();
     press(&mut window, Modifiers::NONE, Key::F4);
     since_a(&mut window);
-    let code = before[&1]
-        .iter()
-        .find(|one| one.method == Method::MI)
-        .expect("asked for")
-        .diagnosis[0]
-        .code;
+    let code = before[&1].iter().find(|one| one.method == Method::MI).expect("asked for").diagnosis
+        [0]
+    .code;
     let results: usize = now.values().map(Vec::len).sum();
     let words = format!("1 of {results} verdicts changed: MI {code} → ok 1");
     assert!(is_said(&window, &words), "{words}");
@@ -234,10 +197,7 @@ fn verdicts_that_became_others_are_a_matrix_and_a_click_shows_their_queries() {
         panic!("one change");
     };
     assert_eq!(
-        format!(
-            "{} {} {} {}",
-            only.method, only.before, only.after, only.count
-        ),
+        format!("{} {} {} {}", only.method, only.before, only.after, only.count),
         format!("mi {code} ok 1")
     );
 
@@ -248,11 +208,7 @@ fn verdicts_that_became_others_are_a_matrix_and_a_click_shows_their_queries() {
     assert!(is_said(&window, "wrong or without a pose: MI 0"));
     // The same among a condition, and away again.
     let label = format!("MI {code} → ok ×");
-    window
-        .get_all_by_label(&label)
-        .next()
-        .expect("a filter")
-        .click();
+    window.get_all_by_label(&label).next().expect("a filter").click();
     window.run_steps(4);
     assert!(is_said(&window, &format!("{results} of {results} results")));
     press(&mut window, Modifiers::NONE, Key::D);
@@ -282,10 +238,7 @@ fn results_are_kept_and_those_that_follow_are_held_against_them() {
     // Nothing is right any more within a hair.
     send(
         &mut window,
-        Command::SetParam {
-            key: "grid.coarse_step".to_owned(),
-            value: "3".to_owned(),
-        },
+        Command::SetParam { key: "grid.coarse_step".to_owned(), value: "3".to_owned() },
     );
     run_until_idle(&mut window);
     show(&mut window, "batch");
@@ -303,12 +256,8 @@ fn recall_says_how_many_are_right_within_the_tolerance_of_the_run() {
     window.run_steps(3);
     let state = app(&window);
     let right = state.setup.task.protocol.right;
-    let of_mi: Vec<&QueryResult> = state
-        .results
-        .values()
-        .flatten()
-        .filter(|result| result.method == Method::MI)
-        .collect();
+    let of_mi: Vec<&QueryResult> =
+        state.results.values().flatten().filter(|result| result.method == Method::MI).collect();
     let within = of_mi.iter().filter(|result| {
         result.error.is_some_and(|error| {
             error.translation_m <= right.translation_m && error.rotation_deg <= right.rotation_deg

@@ -4,10 +4,8 @@ use crate::binary::{Said, command_in, has, refused};
 use crate::small_sequence::SmallSequence;
 
 /// What hides every driver.
-const NOWHERE: [(&str, &str); 2] = [
-    ("VK_DRIVER_FILES", "/nonexistent.json"),
-    ("VK_ICD_FILENAMES", "/nonexistent.json"),
-];
+const NOWHERE: [(&str, &str); 2] =
+    [("VK_DRIVER_FILES", "/nonexistent.json"), ("VK_ICD_FILENAMES", "/nonexistent.json")];
 
 /// An evaluation into a folder of the name of what it computes on.
 fn eval(compute: &str) -> String {
@@ -53,10 +51,7 @@ fn who_asks_for_a_card_is_told_once_which_methods_search_without_it() {
         return;
     }
     assert_eq!(without(&asked), 1, "{}", asked.err);
-    has(
-        &asked.err,
-        "mi6 does not use the graphics card: it compares three channels at once\n",
-    );
+    has(&asked.err, "mi6 does not use the graphics card: it compares three channels at once\n");
     assert_eq!(without(&run("auto")), 0);
 }
 
@@ -76,9 +71,7 @@ fn a_dense_surface_is_written_and_least_near_the_truth() {
     let line =
         "run sequences/42 --query 2 --radius 2 --set surface.yaw_step=5 --set surface.step=0.5";
     let surface = format!("{line} --reference 1");
-    let said = sequence
-        .run(&format!("{surface} --surface surface.csv"))
-        .ok();
+    let said = sequence.run(&format!("{surface} --surface surface.csv")).ok();
     assert!(said.out.starts_with("lowest cost 0."), "{}", said.out);
     has(&said.out, "from the truth");
     let table = sequence.text("surface.csv");
@@ -86,9 +79,7 @@ fn a_dense_surface_is_written_and_least_near_the_truth() {
     assert_eq!(head, "right_m,forward_m,yaw_deg,cost,covered_px");
     // The disc of 2 m in steps of half a metre.
     assert_eq!(rows.lines().count(), 49);
-    sequence
-        .run(&format!("{surface} --method pm --surface surface.png"))
-        .ok();
+    sequence.run(&format!("{surface} --method pm --surface surface.png")).ok();
     let size = image::image_dimensions(sequence.path().join("surface.png")).expect("a picture");
     assert_eq!(size, (27, 27));
     let table = format!(

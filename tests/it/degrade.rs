@@ -53,17 +53,12 @@ fn a_run_folder_says_what_was_degraded_and_goes_on_with_nothing_else() {
     has(&plain.text("run/run.toml"), "degrade = \"invert\"\n");
     assert!(!worse.text("run/run.toml").contains("degrade"));
     let said = plain.run(&format!("{line} run --degrade gamma=2 --resume"));
-    said.fails_with(
-        2,
-        "`degrade = \"invert\"` instead of `degrade = \"gamma=2\"`",
-    );
+    said.fails_with(2, "`degrade = \"invert\"` instead of `degrade = \"gamma=2\"`");
 
     // Noise is the same on any number of threads, and another for another seed.
     let [one, three, seed] = ["--threads 1", "--threads 3", "--seed 4"].map(|words| {
         let out = words.replace(' ', "");
-        plain
-            .run(&format!("{line} ./{out} --degrade noise=20 {words}"))
-            .ok();
+        plain.run(&format!("{line} ./{out} --degrade noise=20 {words}")).ok();
         plain.text(&format!("{out}/results.jsonl"))
     });
     assert_eq!(one, three);

@@ -69,16 +69,8 @@ fn are_named(is_planted: impl Fn(Fault) -> bool) {
 /// Nothing is wrong with it.
 fn healthy(scene: &dyn Scene) {
     let found = examine(scene).unwrap_or_else(|error| panic!("{error}"));
-    let finding = found
-        .finding
-        .as_ref()
-        .map(|finding| (finding.mistake, &finding.remedy));
-    println!(
-        "{}: {:?} {:?}",
-        scene.name(),
-        found.agreement,
-        found.remarks
-    );
+    let finding = found.finding.as_ref().map(|finding| (finding.mistake, &finding.remedy));
+    println!("{}: {:?} {:?}", scene.name(), found.agreement, found.remarks);
     assert_eq!(finding, None, "{}", scene.name());
     assert!(!found.is_broken(), "{}: {:?}", scene.name(), found.remarks);
 }
@@ -168,14 +160,9 @@ fn a_scene_without_clouds_cannot_be_localised_against() {
 #[test]
 fn the_command_reports_and_draws() {
     let sequence = SmallSequence::write();
-    let table = sequence
-        .run("doctor sequences/42 --picture a.png --save a.rrd")
-        .out;
+    let table = sequence.run("doctor sequences/42 --picture a.png --save a.rrd").out;
     has(&table, "frames     3, 3 with a pose, 3 with a cloud");
-    assert!(
-        table.lines().all(|line| line.chars().count() <= 120),
-        "{table}"
-    );
+    assert!(table.lines().all(|line| line.chars().count() <= 120), "{table}");
     let at = |name: &str| sequence.path().join(name);
     assert_eq!(image::open(at("a.png")).expect("a picture").width(), 160);
     assert!(fs::metadata(at("a.rrd")).expect("a recording").len() > 1000);

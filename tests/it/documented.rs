@@ -14,10 +14,7 @@ use commands::{commands, documents, own_arguments};
 
 /// What has to be there before the commands of a page are run, as its reader has it.
 const BEFORE: [(&str, &[&str]); 2] = [
-    (
-        "ci.md",
-        &["eval street --limit 1 --method mi --out baseline -q"],
-    ),
+    ("ci.md", &["eval street --limit 1 --method mi --out baseline -q"]),
     (
         "other-systems.md",
         &[
@@ -33,10 +30,7 @@ const INDEXED: [&str; 1] = ["retrieval.md"];
 
 /// What is too long for a test, or wants what is not at hand, with the tests that do it otherwise.
 const NOT_HERE: [(&str, &str); 10] = [
-    (
-        "eval street --query-scene street:night --preset large",
-        "retrieval",
-    ),
+    ("eval street --query-scene street:night --preset large", "retrieval"),
     ("run SCENE --query IMG_0815.jpg", "loose_photo"),
     ("index …/sequences/00", "retrieval"),
     ("eval …/sequences/", "evaluation"),
@@ -45,10 +39,7 @@ const NOT_HERE: [(&str, &str); 10] = [
     ("view …/sequences/00 --query 3823 --estimates", "foreign"),
     ("lesson four-points", "lessons"),
     ("lesson light", "lessons"),
-    (
-        "run …/sequences/00 --query 3823 --reference 3814 --method pm,mi",
-        "compute",
-    ),
+    ("run …/sequences/00 --query 3823 --reference 3814 --method pm,mi", "compute"),
 ];
 
 /// The words of a command, as this page's reader would give them to a small machine.
@@ -126,10 +117,7 @@ fn go_through(page: &str) {
         run(folder.path(), &words, has_index);
         done += 1;
     }
-    assert!(
-        done > 0 || sequences.is_none(),
-        "{page} has no command that could be run"
-    );
+    assert!(done > 0 || sequences.is_none(), "{page} has no command that could be run");
 }
 
 /// The pages with commands of ours. Those with many have a test of their own, so that they run side by side.

@@ -33,9 +33,7 @@ fn anchors(text: &str) -> Vec<String> {
             }
             Event::End(TagEnd::Heading(_)) => {
                 let words = heading.take().unwrap_or_default().to_lowercase();
-                let kept = words
-                    .chars()
-                    .filter(|c| c.is_alphanumeric() || " -_".contains(*c));
+                let kept = words.chars().filter(|c| c.is_alphanumeric() || " -_".contains(*c));
                 anchors.push(kept.map(|c| if c == ' ' { '-' } else { c }).collect());
             }
             _ => {}
@@ -61,11 +59,7 @@ fn every_link_within_the_project_leads_somewhere() {
                 Some((file, anchor)) => (file, Some(anchor)),
                 None => (&*dest_url, None),
             };
-            let target = if file.is_empty() {
-                path.clone()
-            } else {
-                path.with_file_name(file)
-            };
+            let target = if file.is_empty() { path.clone() } else { path.with_file_name(file) };
             assert!(target.exists(), "{}: {dest_url}", path.display());
             if let Some(anchor) = anchor {
                 let text = std::fs::read_to_string(&target).expect("a page");
@@ -96,21 +90,13 @@ fn table_of_verdicts() -> String {
                      |---|---|---|---|---|\n"
         .to_owned();
     for rule in RULES {
-        let families: Vec<&str> = rule
-            .applies_to
-            .iter()
-            .map(|family| family.words())
-            .collect();
+        let families: Vec<&str> = rule.applies_to.iter().map(|family| family.words()).collect();
         let applies_to = match families.len() {
             0 => "–".to_owned(),
             all if all == Family::ALL.len() => "all".to_owned(),
             _ => families.join(", "),
         };
-        let conclusive = if rule.is_conclusive {
-            ", conclusive"
-        } else {
-            ""
-        };
+        let conclusive = if rule.is_conclusive { ", conclusive" } else { "" };
         let truth = if rule.needs_truth { "yes" } else { "no" };
         table += &format!(
             "| **{}** | {}{conclusive} | {applies_to} | {truth} | {} |\n",
@@ -126,9 +112,7 @@ fn verdicts_in_the_docs_are_those_of_the_rules() {
     let page = std::fs::read_to_string(&path).expect("the page");
     let begin = page.find("<!-- verdicts").expect("where the table begins");
     let begin = begin + page[begin..].find("-->").expect("its end") + "-->\n".len();
-    let end = page
-        .find("<!-- /verdicts -->")
-        .expect("where the table ends");
+    let end = page.find("<!-- /verdicts -->").expect("where the table ends");
     let table = table_of_verdicts() + "\n";
     if std::env::var_os("UPDATE_DOCS").is_some() {
         let page = format!("{}{table}{}", &page[..begin], &page[end..]);

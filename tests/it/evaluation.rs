@@ -39,27 +39,16 @@ fn timeless(folder: &Path) -> (BTreeMap<PathBuf, Vec<u8>>, BTreeSet<OsString>) {
         entries.map(|entry| entry.file_name()).collect()
     };
     let files = names(folder).into_iter().map(PathBuf::from);
-    let is_timeless = |name: &PathBuf| {
-        !["timings.jsonl", "failures"]
-            .map(Path::new)
-            .contains(&&**name)
-    };
+    let is_timeless =
+        |name: &PathBuf| !["timings.jsonl", "failures"].map(Path::new).contains(&&**name);
     let read = |name: PathBuf| (name.clone(), fs::read(folder.join(name)).expect("readable"));
-    (
-        files.filter(is_timeless).map(read).collect(),
-        names(&folder.join("failures")),
-    )
+    (files.filter(is_timeless).map(read).collect(), names(&folder.join("failures")))
 }
 
 #[track_caller]
 fn assert_same(left: &Path, right: &Path) {
     let ((left, recorded), (right, others)) = (timeless(left), timeless(right));
-    assert!(
-        left.keys().eq(right.keys()),
-        "{:?} {:?}",
-        left.keys(),
-        right.keys()
-    );
+    assert!(left.keys().eq(right.keys()), "{:?} {:?}", left.keys(), right.keys());
     for (name, bytes) in &left {
         assert!(right[name] == *bytes, "{} differs", name.display());
     }
@@ -74,11 +63,7 @@ fn a_run_folder_holds_what_is_promised() {
     has(&said.out, "success (%)");
     let (files, recordings) = timeless(&out);
     let expected = "junit.xml report.html results.jsonl run.toml summary.json";
-    assert!(
-        files.keys().eq(expected.split(' ').map(Path::new)),
-        "{:?}",
-        files.keys()
-    );
+    assert!(files.keys().eq(expected.split(' ').map(Path::new)), "{:?}", files.keys());
     assert!(out.join("timings.jsonl").is_file());
     // Tables and plots follow from the results.
     let run = RunResults::read(&out).expect("a run");
@@ -86,10 +71,7 @@ fn a_run_folder_holds_what_is_promised() {
     has(&summary.to_markdown(), "| success (%) |");
     assert_eq!(summary.to_csv().lines().count(), 1 + 2);
     has(&summary.to_latex(), "\\begin{tabular}");
-    has(
-        &Plot::Recall.svg(&run).expect("the truth is known"),
-        "kitti/42",
-    );
+    has(&Plot::Recall.svg(&run).expect("the truth is known"), "kitti/42");
     let results = run.results;
     assert_eq!(results.len(), 2 * FRAMES.len());
     let order = |at: usize| (results[at].query.as_str(), results[at].method.name());
@@ -110,19 +92,14 @@ fn a_run_folder_holds_what_is_promised() {
     assert_eq!(junit.matches("<failure ").count(), failed.len());
     // The first failures are recorded.
     assert!(recordings.iter().eq(&failed[..3]), "{recordings:?}");
-    has(
-        &said.err,
-        &format!("{} failures were not recorded", failed.len() - 3),
-    );
+    has(&said.err, &format!("{} failures were not recorded", failed.len() - 3));
 }
 
 #[test]
 fn threads_kills_and_shards_make_no_difference() {
     let sequence = SmallSequence::of(&FRAMES);
     let folder = |name: &str| sequence.path().join(name);
-    sequence
-        .run(&format!("{EVAL} whole {STRICT} --threads 1"))
-        .ok();
+    sequence.run(&format!("{EVAL} whole {STRICT} --threads 1")).ok();
     let results = |name: &str| folder(name).join("results.jsonl");
     let all = lines(results("whole"));
     // Killed as soon as it has results of its own, queries away from the end.
@@ -183,10 +160,7 @@ fn a_run_whose_description_lacks_a_parameter_goes_on_and_compares() {
     let fewer: Vec<&str> = text.lines().filter(known).collect();
     // FB has them, and so has the method with another feature.
     assert_eq!(fewer.len() + 8, text.lines().count(), "{text}");
-    write(
-        sequence.path().join("old/run.toml"),
-        fewer.join("\n") + "\n",
-    );
+    write(sequence.path().join("old/run.toml"), fewer.join("\n") + "\n");
     write(sequence.path().join("old/results.jsonl"), "");
     sequence.run(&format!("{EVAL} old --resume")).ok();
     assert!(sequence.text("whole/results.jsonl") == sequence.text("old/results.jsonl"));
@@ -258,9 +232,7 @@ fn gates_and_regressions_decide_the_exit_code() {
 fn exports_hold_the_poses_and_say_what_they_cannot_hold() {
     let sequence = SmallSequence::of(&FRAMES[..4]);
     sequence.run(&format!("{EVAL} run")).ok();
-    sequence
-        .run(&format!("{EVAL} partly --query 2 --query 3"))
-        .ok();
+    sequence.run(&format!("{EVAL} partly --query 2 --query 3")).ok();
     let export = |format: &str| {
         let line = format!("results run --where 'method = mi' --as {format}");
         sequence.run(&line).ok().out
@@ -292,20 +264,14 @@ fn exports_hold_the_poses_and_say_what_they_cannot_hold() {
         2 | results partly --where 'method = mi' --as kitti | kitti ~ frame 0 is not a query
         ",
     );
-    sequence
-        .run("results run --where 'method = mi' --as colmap --out model")
-        .ok();
+    sequence.run("results run --where 'method = mi' --as colmap --out model").ok();
     let cameras = sequence.text("model/cameras.txt");
     has(&cameras, "1 PINHOLE 160 64 100 100 80.5 32.5");
 }
 
 /// A draw of queries, all of them where no limit is set.
 fn draw(limit: Option<Limit>) -> Draw<'static> {
-    Draw {
-        limit,
-        only: &[],
-        seed: 0,
-    }
+    Draw { limit, only: &[], seed: 0 }
 }
 
 #[test]
@@ -314,9 +280,7 @@ fn a_share_of_the_frames_is_held_out_of_the_references_and_a_number_is_not() {
     let scene = open(sequence.folder());
     let drawn = |limit: &str| {
         let limit = Some(limit.parse().expect("a limit"));
-        draw(limit)
-            .pair(0, scene.as_ref(), scene.as_ref())
-            .expect("queries")
+        draw(limit).pair(0, scene.as_ref(), scene.as_ref()).expect("queries")
     };
     let (share, number) = (drawn("25%"), drawn("3"));
     assert_eq!(share.queries.len(), 3);
@@ -391,12 +355,8 @@ fn a_query_that_panics_is_a_failed_result_and_the_rest_goes_on() {
     };
     let out = sequence.path().join("run");
     let mut folder = RunFolder::create(&out, &run).expect("a new folder");
-    let execution = Execution {
-        run: &run,
-        scenes: &scenes,
-        params: &Params::default(),
-        indices: &[],
-    };
+    let execution =
+        Execution { run: &run, scenes: &scenes, params: &Params::default(), indices: &[] };
     execution
         .run_remaining(&mut folder, &mut NoRunObserver(NoObserver))
         .expect("a panic is a result");

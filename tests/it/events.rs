@@ -32,9 +32,7 @@ fn every_event_is_a_line_whose_numbers_are_those_of_the_result() {
     assert_eq!(detected.len(), 2);
     assert_eq!(
         detected[0]["x_px"].as_array().map(Vec::len),
-        fb["counts"]["query_keypoints"]
-            .as_u64()
-            .map(|count| count as usize)
+        fb["counts"]["query_keypoints"].as_u64().map(|count| count as usize)
     );
     let classified = of("FeaturesClassified", "fb", "000004");
     let states = classified[0]["state"].as_array().expect("states");
@@ -57,11 +55,7 @@ fn every_event_is_a_line_whose_numbers_are_those_of_the_result() {
     assert_eq!(scored.len(), tried);
     let assessed = of("MinimumAssessed", "mi", "000007");
     assert_eq!(assessed[0]["best"], mi["cost"]["best"]);
-    assert!(
-        events
-            .iter()
-            .any(|event| event["kind"] == "ReferencesFused")
-    );
+    assert!(events.iter().any(|event| event["kind"] == "ReferencesFused"));
     for event in &events {
         let kind = event["kind"].as_str().expect("a name");
         let documented = documented(kind);
@@ -103,34 +97,20 @@ fn a_run_over_many_queries_tells_each_once_however_often_it_is_gone_on_with() {
     let sequence = SmallSequence::write();
     let whole = told_by_eval(&sequence, "whole", "");
     let events: Vec<Json> = objects(&whole);
-    for (query, radius) in [
-        ("000004", 2.0),
-        ("000004", 3.0),
-        ("000005", 2.0),
-        ("000005", 3.0),
-    ] {
+    for (query, radius) in [("000004", 2.0), ("000004", 3.0), ("000005", 2.0), ("000005", 3.0)] {
         let is_it = |event: &Json| event["query"] == query && event["radius_m"] == radius;
         assert!(events.iter().any(is_it), "{query} {radius}");
     }
-    assert!(
-        events
-            .iter()
-            .all(|event| event["scene"] == events[0]["scene"])
-    );
+    assert!(events.iter().all(|event| event["scene"] == events[0]["scene"]));
 
     let first = told_by_eval(&sequence, "first", "--shard 1/2");
     let second = told_by_eval(&sequence, "second", "--shard 2/2");
     assert!(!first.is_empty() && !second.is_empty());
-    assert!(
-        first.clone() + &second == whole,
-        "the parts are not the whole"
-    );
+    assert!(first.clone() + &second == whole, "the parts are not the whole");
 
     // As a run that was stopped after its first query leaves it.
     let lines = sequence.text("whole/results.jsonl");
-    let of_first = lines
-        .split_inclusive('\n')
-        .filter(|line| line.contains("\"query\":\"000004\""));
+    let of_first = lines.split_inclusive('\n').filter(|line| line.contains("\"query\":\"000004\""));
     let of_first: String = of_first.collect();
     assert!(!of_first.is_empty() && of_first.len() < lines.len());
     write(sequence.path().join("whole/results.jsonl"), of_first);
@@ -152,9 +132,6 @@ fn a_file_that_cannot_be_written_is_told_before_anything_is_run() {
     ] {
         let line = "eval sequences/42 --query 5 --method fb -q --out run --events";
         sequence.run(&format!("{line} {events}")).fails(code, words);
-        assert!(
-            !sequence.path().join("run").exists(),
-            "the same command refuses it"
-        );
+        assert!(!sequence.path().join("run").exists(), "the same command refuses it");
     }
 }

@@ -29,10 +29,7 @@ fn named_poses(results: &[QueryResult], method: Method) -> String {
     let line = |result: &QueryResult| {
         let pose = result.pose.as_ref()?.to_pose()?.inverse();
         let (t, q) = (pose.translation.vector, pose.rotation.coords);
-        Some(format!(
-            "{} {} {} {} {} {} {} {}\n",
-            result.query, q.w, q.x, q.y, q.z, t.x, t.y, t.z
-        ))
+        Some(format!("{} {} {} {} {} {} {} {}\n", result.query, q.w, q.x, q.y, q.z, t.x, t.y, t.z))
     };
     of_method.filter_map(line).collect()
 }
@@ -47,10 +44,9 @@ fn an_estimate_that_is_our_own_pose_gets_the_verdicts_that_need_a_pose_alone() {
     let folder = TempDir::new().expect("a folder");
     let file = folder.path().join("poses.txt");
     // Night and rain against an overcast reference: MI is wrong in many ways.
-    for (queries, wanted) in [
-        ("street:night", "--query 70 --query 300"),
-        ("street:snow", "--query 160 --query 610"),
-    ] {
+    for (queries, wanted) in
+        [("street:night", "--query 70 --query 300"), ("street:snow", "--query 160 --query 610")]
+    {
         let street = format!("street:overcast --query-scene {queries} --radius 8");
         let asked = format!("{street} {wanted} --reference nearest:2 --method mi");
         for ours in results(folder.path(), &asked) {
@@ -61,9 +57,7 @@ fn an_estimate_that_is_our_own_pose_gets_the_verdicts_that_need_a_pose_alone() {
             let (query, reference) = (&ours.query, &ours.references[0]);
             let pair = format!("{street} --query {query} --reference {reference}");
             let given = format!("{pair} --method other --estimates other=poses.txt");
-            let [other] = results(folder.path(), &given)
-                .try_into()
-                .expect("one result");
+            let [other] = results(folder.path(), &given).try_into().expect("one result");
             assert_eq!(other.method.name(), "other");
             let [a, b] = [&pose, other.pose.as_ref().expect("a pose")].map(|pose| pose.position_m);
             assert!(a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-9));
@@ -79,10 +73,7 @@ fn an_estimate_that_is_our_own_pose_gets_the_verdicts_that_need_a_pose_alone() {
             let (needed, said) = (codes(&ours), codes(&other));
             println!("{queries} {query} {reference}: {needed:?} → {said:?}");
             for code in alone {
-                assert!(
-                    !needed.contains(&code) || said.contains(&code),
-                    "{query}: {code}"
-                );
+                assert!(!needed.contains(&code) || said.contains(&code), "{query}: {code}");
             }
             let is_wrong = needed.iter().any(|code| code.is_failure());
             assert_eq!(is_wrong, !said.is_empty(), "{query}");
@@ -126,12 +117,7 @@ fn all_four_texts_say_the_same() {
     fs::create_dir(at("model")).expect("writable");
     write(at("model/images.txt"), colmap);
     write(at("vloc.txt"), named_poses(&found, Method::MI));
-    let given = [
-        "tum=tum.txt",
-        "kitti=kitti.txt",
-        "model=model",
-        "vloc=vloc.txt",
-    ];
+    let given = ["tum=tum.txt", "kitti=kitti.txt", "model=model", "vloc=vloc.txt"];
     let given = given.map(|given| format!(" --estimates {given}")).concat();
     let results = results(sequence.path(), &(ALL.to_owned() + &given));
     assert_eq!(results.len(), 5 * found.len());
@@ -152,35 +138,22 @@ fn all_four_texts_say_the_same() {
 fn a_run_folder_knows_the_other_system_and_all_that_reads_it_does_too() {
     let (sequence, found) = small();
     // One query has no pose.
-    write(
-        sequence.path().join("poses.txt"),
-        named_poses(&found[1..], Method::MI),
-    );
+    write(sequence.path().join("poses.txt"), named_poses(&found[1..], Method::MI));
     let eval =
         "eval sequences/42 --out run --method mi --radius 3 --estimates super-glue=poses.txt";
     let said = sequence.run(&format!("{eval} --gate 'success@super-glue >= 0.9'"));
     assert_eq!(said.code, Some(1), "one of three has no pose");
     has(&said.out, "super-glue");
-    has(
-        &sequence.text("run/results.jsonl"),
-        "super-glue has no pose of 000004",
-    );
+    has(&sequence.text("run/results.jsonl"), "super-glue has no pose of 000004");
     sequence.run(&format!("{eval} --resume")).ok();
     let said = sequence.run("results run --as vloc --where 'method = super-glue'");
     assert_eq!(said.ok().out.lines().count(), 2);
     sequence.run("compare run run").ok();
     // A run that names a method which nobody brought is not read.
     let run = sequence.text("run/run.toml");
-    let without = run
-        .split_inclusive('\n')
-        .filter(|line| !line.starts_with("estimates"));
-    write(
-        sequence.path().join("run/run.toml"),
-        without.collect::<String>(),
-    );
-    sequence
-        .run("compare run run")
-        .fails(3, "run.toml: ~ `super-glue` is no method");
+    let without = run.split_inclusive('\n').filter(|line| !line.starts_with("estimates"));
+    write(sequence.path().join("run/run.toml"), without.collect::<String>());
+    sequence.run("compare run run").fails(3, "run.toml: ~ `super-glue` is no method");
 }
 
 #[test]
@@ -191,10 +164,7 @@ fn poses_that_cannot_be_read_are_named_with_their_line() {
     for (content, words) in [
         ("", "poses expected, none found"),
         ("1 2 3\n", "poses.txt:1: TUM"),
-        (
-            "a.png 1 0 0 0 0 0 0\n",
-            "with names like `000004`; the file has names like `a.png`",
-        ),
+        ("a.png 1 0 0 0 0 0 0\n", "with names like `000004`; the file has names like `a.png`"),
         (
             "5 1 0 0 0 0 0 0\n5.png 1 0 0 0 0 0 0\n",
             "poses.txt:2: one pose per frame expected, frame 000005",
@@ -203,22 +173,10 @@ fn poses_that_cannot_be_read_are_named_with_their_line() {
             "0.4 0 0 0 0 0 0 1\n0.5 0 0 0 0 0 9 1\n",
             "poses.txt:2: a quaternion of length 1 expected",
         ),
-        (
-            "a.png 2 0 0 0 0 0 0\n",
-            "poses.txt:1: a quaternion of length 1 expected",
-        ),
-        (
-            "77.4 0 0 0 0 0 0 1\n",
-            "the frames' times are 0.4 … 0.7, the poses' times 77.4",
-        ),
-        (
-            "1 0 0 0 0 1 0 0 0 0 1 x\n",
-            "poses.txt:1: a number expected, `x` found",
-        ),
-        (
-            "1 1 0 0 0 0 0 0 1 5.png\n\n2 1 0 0 0 0 0 0 1\n",
-            "poses.txt:3: a line `id qw",
-        ),
+        ("a.png 2 0 0 0 0 0 0\n", "poses.txt:1: a quaternion of length 1 expected"),
+        ("77.4 0 0 0 0 0 0 1\n", "the frames' times are 0.4 … 0.7, the poses' times 77.4"),
+        ("1 0 0 0 0 1 0 0 0 0 1 x\n", "poses.txt:1: a number expected, `x` found"),
+        ("1 1 0 0 0 0 0 0 1 5.png\n\n2 1 0 0 0 0 0 0 1\n", "poses.txt:3: a line `id qw"),
     ] {
         write(&file, content);
         let read = scene::read_estimates(&file, scene.as_ref());

@@ -37,13 +37,9 @@ const TOOLBAR: [&str; 13] = [
 ];
 
 fn window(size: [f32; 2], setup: Setup) -> Harness<'static, App> {
-    let setup = Setup {
-        mode: RunMode::Running,
-        ..setup
-    };
-    let mut window = Harness::builder()
-        .with_size(size)
-        .build_eframe(|creation| App::new(creation, setup));
+    let setup = Setup { mode: RunMode::Running, ..setup };
+    let mut window =
+        Harness::builder().with_size(size).build_eframe(|creation| App::new(creation, setup));
     finish(&mut window);
     wait(&mut window, |app| !app.app_state().is_working_out());
     window.run_steps(3);
@@ -58,43 +54,23 @@ fn rect(window: &Harness<'_, App>, label: &str) -> Rect {
 #[test]
 fn the_canvas_has_the_room_and_the_toolbar_is_one_line_at_every_size() {
     for (size, share) in SIZES {
-        let window = window(
-            size,
-            Setup {
-                query: GREY,
-                ..setup()
-            },
-        );
+        let window = window(size, Setup { query: GREY, ..setup() });
         let canvas = window.state().canvas();
         let area = |rect: Rect| rect.width() * rect.height();
         let own = area(canvas) / (size[0] * size[1]);
-        assert!(
-            own >= share,
-            "{size:?}: the canvas has {own:.3} of the window"
-        );
+        assert!(own >= share, "{size:?}: the canvas has {own:.3} of the window");
         // The proof fills the canvas in one direction, but for its margins and titles.
-        let pictures = window
-            .query_all_by_role(Role::Image)
-            .map(|node| node.rect());
+        let pictures = window.query_all_by_role(Role::Image).map(|node| node.rect());
         let inside = pictures.filter(|rect| canvas.contains_rect(*rect));
-        let filled = inside
-            .fold(Rect::NOTHING, |all, rect| all.union(rect))
-            .size()
-            / canvas.size();
-        assert!(
-            filled.max_elem() > 0.9,
-            "{size:?}: the pictures fill {filled:?} of {canvas:?}"
-        );
+        let filled = inside.fold(Rect::NOTHING, |all, rect| all.union(rect)).size() / canvas.size();
+        assert!(filled.max_elem() > 0.9, "{size:?}: the pictures fill {filled:?} of {canvas:?}");
         let buttons = TOOLBAR.map(|label| (label, rect(&window, label)));
         for ((left, a), (right, b)) in buttons.iter().zip(&buttons[1..]) {
             assert!(
                 a.right() <= b.left() + 0.5,
                 "{size:?}: {left} {a:?} and {right} {b:?} overlap"
             );
-            assert!(
-                b.bottom() <= 42.0 && b.right() <= size[0],
-                "{size:?}: {right} {b:?}"
-            );
+            assert!(b.bottom() <= 42.0 && b.right() <= size[0], "{size:?}: {right} {b:?}");
         }
         assert!(app(&window).options.shows_why);
     }
@@ -104,9 +80,8 @@ fn the_canvas_has_the_room_and_the_toolbar_is_one_line_at_every_size() {
 fn eight_methods_and_three_references_have_their_places() {
     let names = ["fb", "pm", "mi", "hy", "mi6", "fb2", "robust", "nid"];
     let mut setup = setup();
-    setup.task.protocol.methods = names
-        .map(|name| name.parse::<Method>().expect("a method"))
-        .to_vec();
+    setup.task.protocol.methods =
+        names.map(|name| name.parse::<Method>().expect("a method")).to_vec();
     setup.chosen = vec![0, 2].into();
     for (size, _) in SIZES {
         let mut window = window(size, setup.clone());
@@ -116,21 +91,13 @@ fn eight_methods_and_three_references_have_their_places() {
             let label = name.to_uppercase();
             let label = format!("{label}: ");
             let mut found = window.query_all_by_label_contains(&label);
-            let cell = found
-                .next()
-                .unwrap_or_else(|| panic!("{label} at {size:?}"));
+            let cell = found.next().unwrap_or_else(|| panic!("{label} at {size:?}"));
             cells.push(cell.rect());
         }
         for pair in cells.windows(2) {
-            assert!(
-                pair[0].right() <= pair[1].left() + 0.5,
-                "{size:?}: {pair:?}"
-            );
+            assert!(pair[0].right() <= pair[1].left() + 0.5, "{size:?}: {pair:?}");
         }
-        assert!(
-            cells.iter().all(|cell| whole.contains_rect(*cell)),
-            "{size:?}: {cells:?}"
-        );
+        assert!(cells.iter().all(|cell| whole.contains_rect(*cell)), "{size:?}: {cells:?}");
         // Every reference can be reached.
         let last = Part::Reference(Method::FB, 1);
         send(&mut window, Command::ShowPart(last));

@@ -48,12 +48,7 @@ fn latitudes_and_longitudes_are_tied_to_the_scene_by_its_own_frames() {
     // The road runs east.
     let degrees = |way_m: f64| (way_m / (6_371_000.0 * 48.0_f64.to_radians().cos())).to_degrees();
     let mut text = "filename,Latitude,Longitude,Altitude\n".to_owned();
-    for (name, way_m) in [
-        ("000004", 4.0),
-        ("000005.png", 5.0),
-        ("7", 7.0),
-        ("mine.jpg", 6.8),
-    ] {
+    for (name, way_m) in [("000004", 4.0), ("000005.png", 5.0), ("7", 7.0), ("mine.jpg", 6.8)] {
         text += &format!("{name},48.0,{:.9},300\n", 11.0 + degrees(way_m));
     }
     table(&sequence, &text);
@@ -68,24 +63,15 @@ fn a_table_that_is_none_is_refused_in_one_line() {
         ("", "none found"),
         ("5 1 2 3\n", "gps.csv:1: a header with the columns"),
         ("name x y z\n", "one line per frame"),
-        (
-            "name x y z\n5 1 2\n",
-            "gps.csv:2: 4 columns expected, 3 found",
-        ),
-        (
-            "name x y z\n5 1 2 north\n",
-            "gps.csv:2: a number expected, `north` found",
-        ),
+        ("name x y z\n5 1 2\n", "gps.csv:2: 4 columns expected, 3 found"),
+        ("name x y z\n5 1 2 north\n", "gps.csv:2: a number expected, `north` found"),
         ("name x y z\nother 1 2 3\n", "names like `000004`"),
         (
             "name x y z\n5 1 2 3\n000005.png 1 2 3\n",
             "gps.csv:3: one position per frame expected, frame 000005",
         ),
         ("name lat lon\n5 95 0\n", "gps.csv:2: a latitude"),
-        (
-            "name lat lon\n4 1 0\n5 2 0\n",
-            "gps.csv: at least 3 frames with a known pose",
-        ),
+        ("name lat lon\n4 1 0\n5 2 0\n", "gps.csv: at least 3 frames with a known pose"),
         (
             "name lat lon\n4 1 0\n5 1 0\n7 1 0\n",
             "gps.csv: frames with a known pose at different places",

@@ -9,12 +9,8 @@ use std::fs;
 use std::path::Path;
 
 /// The folders with the sources of the packages.
-const PACKAGES: [&str; 4] = [
-    "src",
-    "crates/posescope-core/src",
-    "crates/posescope-gpu/src",
-    "crates/posescope-street/src",
-];
+const PACKAGES: [&str; 4] =
+    ["src", "crates/posescope-core/src", "crates/posescope-gpu/src", "crates/posescope-street/src"];
 
 /// A module by its path below the crate; empty for `lib.rs`.
 type Module = Vec<String>;
@@ -46,10 +42,7 @@ fn no_file_is_in_a_circle_of_imports() {
             found.insert((package.to_owned(), files));
         }
     }
-    assert!(
-        found.is_empty(),
-        "these files import each other: {found:#?}"
-    );
+    assert!(found.is_empty(), "these files import each other: {found:#?}");
 }
 
 #[test]
@@ -158,11 +151,7 @@ fn read(folder: &Path, module: &Module, sources: &mut Sources) {
             read(&path, &inside(stem), sources);
         } else if path.extension().is_some_and(|extension| extension == "rs") {
             let source = fs::read_to_string(&path).expect("readable");
-            let of_file = if stem == "lib" {
-                module.clone()
-            } else {
-                inside(stem)
-            };
+            let of_file = if stem == "lib" { module.clone() } else { inside(stem) };
             sources.insert(of_file, source);
         }
     }
@@ -170,20 +159,15 @@ fn read(folder: &Path, module: &Module, sources: &mut Sources) {
 
 /// Who imports whom.
 fn graph(sources: &Sources) -> Graph {
-    let imports: BTreeMap<&Module, Vec<Import>> = sources
-        .iter()
-        .map(|(module, source)| (module, imports(&tokens(source))))
-        .collect();
+    let imports: BTreeMap<&Module, Vec<Import>> =
+        sources.iter().map(|(module, source)| (module, imports(&tokens(source)))).collect();
     // What is passed on, by the module that does so and the name; none if from another package.
     let mut passed_on: BTreeMap<Module, Option<Module>> = BTreeMap::new();
     for (module, imports) in &imports {
         for import in imports {
             if let Some(name) = &import.passed_on_as {
                 let from = absolute(module, &import.path, sources);
-                passed_on.insert(
-                    [module.as_slice(), std::slice::from_ref(name)].concat(),
-                    from,
-                );
+                passed_on.insert([module.as_slice(), std::slice::from_ref(name)].concat(), from);
             }
         }
     }
@@ -253,18 +237,12 @@ fn circles(graph: &Graph) -> Vec<Vec<Module>> {
     for component in components(graph) {
         let is_home = |home: &&Module| component.iter().all(|module| module.starts_with(home));
         // The root of the crate is no home: everybody is inside it.
-        match component
-            .iter()
-            .find(is_home)
-            .filter(|home| !home.is_empty())
-        {
+        match component.iter().find(is_home).filter(|home| !home.is_empty()) {
             Some(home) => {
                 let inside = |module: &&Module| *module != home && component.contains(*module);
                 let imported = |by: &Module| graph[by].iter().filter(inside).cloned().collect();
                 let inner = component.iter().filter(inside);
-                let inner: Graph = inner
-                    .map(|module| (module.clone(), imported(module)))
-                    .collect();
+                let inner: Graph = inner.map(|module| (module.clone(), imported(module))).collect();
                 circles.extend(self::circles(&inner));
             }
             None => circles.push(component),
@@ -292,11 +270,7 @@ fn components(graph: &Graph) -> Vec<Vec<Module>> {
         .keys()
         .map(|from| {
             let back = |to: &&&Module| reached.get(**to).is_some_and(|far| far.contains(from));
-            reached[from]
-                .iter()
-                .filter(back)
-                .map(|m| (*m).clone())
-                .collect()
+            reached[from].iter().filter(back).map(|m| (*m).clone()).collect()
         })
         .filter(|component: &Vec<Module>| component.len() > 1)
         .collect();
@@ -336,10 +310,7 @@ fn imports(tokens: &[String]) -> Vec<Import> {
                     path.extend(tokens.get(at + 1).cloned());
                     at += 2;
                 }
-                imports.push(Import {
-                    path,
-                    passed_on_as: None,
-                });
+                imports.push(Import { path, passed_on_as: None });
             }
             _ => at += 1,
         }
@@ -386,10 +357,7 @@ fn tree(
     if is_renamed {
         path.pop();
     }
-    imports.push(Import {
-        path,
-        passed_on_as: name.filter(|_| is_public),
-    });
+    imports.push(Import { path, passed_on_as: name.filter(|_| is_public) });
 }
 
 /// Words, `::` and single characters, without comments, texts and lifetimes.

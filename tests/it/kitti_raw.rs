@@ -37,12 +37,7 @@ const METRES_PER_DEGREE: f64 = 6_378_137.0 * std::f64::consts::PI / 180.0;
 /// Writes a drive below a day's folder: frames 3, 4 and 6 of a car that drives east at 10 m/s.
 pub fn write(day: &Path) -> PathBuf {
     let drive = day.join("2011_09_26_drive_0001_sync");
-    for folder in [
-        "image_00/data",
-        "image_02/data",
-        "velodyne_points/data",
-        "oxts/data",
-    ] {
+    for folder in ["image_00/data", "image_02/data", "velodyne_points/data", "oxts/data"] {
         fs::create_dir_all(drive.join(folder)).expect("writable");
     }
     fs::write(day.join("calib_cam_to_cam.txt"), CAMERAS).expect("writable");
@@ -99,10 +94,7 @@ fn poses_are_those_of_the_camera_from_its_place_at_the_first_packet() {
     assert!((times[0] - midnight - (13.0 * 3600.0 + 10.0 * 60.0 + 51.3)).abs() < 1e-5);
 
     let color = open(drive.join("image_02"));
-    assert_eq!(
-        color.name(),
-        "kitti-raw/2011_09_26_drive_0001_sync/image_02"
-    );
+    assert_eq!(color.name(), "kitti-raw/2011_09_26_drive_0001_sync/image_02");
     let pose = color.pose(0).expect("is known");
     assert!((pose.translation.vector.x + 0.06).abs() < 1e-6, "{pose}");
 }
@@ -147,10 +139,8 @@ fn derived() -> Option<BTreeMap<usize, Pose>> {
     let lines = text.lines().filter(|line| !line.starts_with('#'));
     let pose = |line: &str| {
         let (number, matrix) = line.split_once(' ').expect("a number and a matrix");
-        let matrix: Vec<f64> = matrix
-            .split_whitespace()
-            .map(|word| word.parse().expect("a number"))
-            .collect();
+        let matrix: Vec<f64> =
+            matrix.split_whitespace().map(|word| word.parse().expect("a number")).collect();
         let pose = pose_from_matrix(&Matrix3x4::from_row_slice(&matrix)).expect("rigid");
         (number.parse().expect("a number"), pose)
     };

@@ -76,9 +76,7 @@ fn small(setup: Setup) -> Harness<'static, App> {
 fn walls() -> Setup {
     let mut setup = crate::window::setup();
     setup.mode = posescope::session::RunMode::Running;
-    setup.task.protocol.methods = ["fb", "mi"]
-        .map(|name| name.parse().expect("a method"))
-        .to_vec();
+    setup.task.protocol.methods = ["fb", "mi"].map(|name| name.parse().expect("a method")).to_vec();
     setup
 }
 
@@ -90,10 +88,7 @@ fn a_question_is_answered_before_anything_of_the_answer_is_shown() {
     let at = |window: &Harness<'_, App>| app(window).cursor();
     let found = moment.find(app(&window).run());
     assert_eq!(Some(at(&window)), found);
-    assert!(
-        !is_said(&window, "● right"),
-        "nothing is told before its time"
-    );
+    assert!(!is_said(&window, "● right"), "nothing is told before its time");
     assert!(!is_said(&window, "It was said in the beginning"));
     assert!(!app(&window).options.shows_truth);
 
@@ -138,16 +133,9 @@ fn a_place_is_guessed_on_the_empty_map_and_measured_afterwards() {
     assert_eq!(options.lockstep, Some(3));
     press(&mut window, Modifiers::NONE, Key::Period);
     assert_eq!(app(&window).options.lockstep, Some(4));
-    assert!(
-        !is_said(&window, "● right"),
-        "no method is done at its fourth step"
-    );
+    assert!(!is_said(&window, "● right"), "no method is done at its fourth step");
     send(&mut window, Command::StepTogether(Some(usize::MAX - 1)));
-    assert_eq!(
-        window.query_all_by_label_contains("● right").count(),
-        2,
-        "a panel each"
-    );
+    assert_eq!(window.query_all_by_label_contains("● right").count(), 2, "a panel each");
 
     window.get_by_label("Close the lesson").click();
     window.run_steps(3);
@@ -166,30 +154,18 @@ fn go_through(lesson: &Lesson) -> Vec<(String, Vec<QueryResult>)> {
         .build_eframe(|creation| App::new(creation, setup).with_lesson(lesson.clone()));
     let mut results: Vec<(String, Vec<QueryResult>)> = Vec::new();
     for page in &lesson.pages {
-        assert_eq!(
-            run_until_idle(&mut window),
-            RunState::Finished,
-            "{}",
-            page.title
-        );
+        assert_eq!(run_until_idle(&mut window), RunState::Finished, "{}", page.title);
         window.run_steps(3);
         assert!(is_said(&window, &page.title), "{}", page.title);
         let state = app(&window);
         let shown = state.run().results().cloned().collect();
-        if results
-            .last()
-            .is_none_or(|(variant, _)| *variant != page.variant)
-        {
+        if results.last().is_none_or(|(variant, _)| *variant != page.variant) {
             results.push((page.variant.clone(), shown));
         }
         check_moment(&window, &page.at, &page.title);
         if let Some(question) = &page.question {
             let reason: String = question.because.chars().take(20).collect();
-            assert!(
-                !is_said(&window, &reason),
-                "{}: told before it is asked",
-                page.title
-            );
+            assert!(!is_said(&window, &reason), "{}: told before it is asked", page.title);
             match &question.answer {
                 Answer::Choice { right, .. } => {
                     let keys = [Key::Num1, Key::Num2, Key::Num3, Key::Num4];
@@ -213,9 +189,7 @@ fn check_moment(window: &Harness<'_, App>, moment: &Moment, title: &str) {
     let state = app(window);
     let place = match moment {
         Moment::End => state.run().len() - 1,
-        moment => moment
-            .find(state.run())
-            .unwrap_or_else(|| panic!("{title}: no {moment}")),
+        moment => moment.find(state.run()).unwrap_or_else(|| panic!("{title}: no {moment}")),
     };
     assert_eq!(state.cursor(), place, "{title}: {moment}");
 }
@@ -251,27 +225,18 @@ fn claims_hold(is_meant: impl Fn(&Lesson) -> bool) {
         // What no page shows is run for its claims alone.
         for (variant, setting) in &lesson.variants {
             if !results.iter().any(|(shown, _)| shown == variant) {
-                let job = setting
-                    .open(&|_| None)
-                    .expect("a setting")
-                    .job(&Arc::default());
+                let job = setting.open(&|_| None).expect("a setting").job(&Arc::default());
                 let told = job.work(0, &mut NoObserver, |_| {}).expect("results");
                 results.push((variant.clone(), told));
             }
         }
         for claim in &lesson.claims {
-            let of_variant = results
-                .iter()
-                .filter(|(variant, _)| *variant == claim.variant);
+            let of_variant = results.iter().filter(|(variant, _)| *variant == claim.variant);
             let is_met = of_variant
                 .flat_map(|(_, results)| results)
                 .any(|result| claim.holds.is_met(result));
             let (name, variant) = (&lesson.name, &claim.variant);
-            assert!(
-                is_met,
-                "{name}, {variant}: no result with {}",
-                claim.holds.text()
-            );
+            assert!(is_met, "{name}, {variant}: no result with {}", claim.holds.text());
         }
     }
 }
@@ -296,10 +261,7 @@ fn lessons_are_listed_and_recorded() {
 fn recorded_pages(path: &std::path::Path) -> Vec<(i64, String)> {
     let chunks = chunks(path);
     let mut pages = Vec::new();
-    for chunk in chunks
-        .iter()
-        .filter(|chunk| chunk.entity_path().to_string() == "/lesson")
-    {
+    for chunk in chunks.iter().filter(|chunk| chunk.entity_path().to_string() == "/lesson") {
         let steps = chunk.timelines().iter().find_map(|(name, column)| {
             (name.as_str() == entities::STEP_TIMELINE).then(|| column.times_raw().to_vec())
         });
@@ -328,20 +290,13 @@ fn turn_their_pages(is_meant: impl Fn(&Lesson) -> bool) {
     let folder = tempfile::tempdir().expect("a folder");
     let lessons = Lesson::all().expect("our own").into_iter();
     for lesson in lessons.filter(is_meant) {
-        run_in(
-            folder.path(),
-            &format!("lesson {} --save a.rrd", lesson.name),
-        )
-        .ok();
+        run_in(folder.path(), &format!("lesson {} --save a.rrd", lesson.name)).ok();
         let path = folder.path().join("a.rrd");
         let recorded = recorded_pages(&path);
         let all = lesson.pages.len();
         let wanted: Vec<String> = (lesson.pages.iter().enumerate())
             .flat_map(|(index, page)| {
-                [
-                    Some(page.markdown(index + 1, all)),
-                    page.answered(index + 1, all),
-                ]
+                [Some(page.markdown(index + 1, all)), page.answered(index + 1, all)]
             })
             .flatten()
             .collect();

@@ -37,9 +37,7 @@ fn at_every_moment(
     run_until_idle(window);
     see(window, "waiting", &[]);
     window.state_mut().send(Command::Run);
-    wait(window, |app| {
-        *app.app_state().run_state() == RunState::Finished
-    });
+    wait(window, |app| *app.app_state().run_state() == RunState::Finished);
     window.state_mut().send(Command::SelectMethod(Method::FB));
     see(window, "features", &[]);
     window.state_mut().send(Command::SelectMethod(Method::MI));
@@ -49,9 +47,7 @@ fn at_every_moment(
     window.state_mut().send(Command::SetReferences(vec![0, 2]));
     let all = posescope::fusion::Fusion::all().collect();
     send(window, Command::SetFusions(all));
-    wait(window, |app| {
-        *app.app_state().run_state() == RunState::Finished
-    });
+    wait(window, |app| *app.app_state().run_state() == RunState::Finished);
     window.state_mut().send(Command::Last);
     see(window, "fused", &["references", "fusion", "space"]);
 }
@@ -68,11 +64,7 @@ fn seen(of: &[&str], in_pictures: bool) -> impl Iterator<Item = &'static str> {
 
 #[test]
 fn every_picture_looks_as_it_did() {
-    let Some(PaintedWindow {
-        mut window,
-        mut judge,
-    }) = painted(setup(), SIZE)
-    else {
+    let Some(PaintedWindow { mut window, mut judge }) = painted(setup(), SIZE) else {
         return;
     };
     let mut unlike = Vec::new();
@@ -92,27 +84,15 @@ fn every_picture_looks_as_it_did() {
 /// Each layout with the outcome of a run, at every size and in both themes.
 #[test]
 fn every_layout_looks_as_it_did() {
-    const SIZES: [[f32; 2]; 4] = [
-        [1000.0, 640.0],
-        [1280.0, 720.0],
-        [1600.0, 1000.0],
-        [2560.0, 1440.0],
-    ];
+    const SIZES: [[f32; 2]; 4] =
+        [[1000.0, 640.0], [1280.0, 720.0], [1600.0, 1000.0], [2560.0, 1440.0]];
     const LAYOUTS: [(Arrangement, &str); 3] = [
         (Arrangement::Inspect, "inspect"),
         (Arrangement::Lecture, "lecture"),
         (Arrangement::Batch, "batch"),
     ];
-    let setup = Setup {
-        query: GREY,
-        mode: RunMode::Running,
-        ..setup()
-    };
-    let Some(PaintedWindow {
-        mut window,
-        mut judge,
-    }) = painted(setup, SIZES[0])
-    else {
+    let setup = Setup { query: GREY, mode: RunMode::Running, ..setup() };
+    let Some(PaintedWindow { mut window, mut judge }) = painted(setup, SIZES[0]) else {
         return;
     };
     wait(&mut window, |app| {
@@ -149,19 +129,11 @@ fn words(window: &Harness<'_, App>) -> String {
     // A run of text repeats what it is part of.
     for node in nodes.filter(|node| node.role() != Role::TextRun) {
         let words = [node.label(), node.value()];
-        let words: Vec<String> = words
-            .into_iter()
-            .flatten()
-            .filter(|w| !w.is_empty())
-            .collect();
+        let words: Vec<String> = words.into_iter().flatten().filter(|w| !w.is_empty()).collect();
         if words.is_empty() {
             continue;
         }
-        text += &format!(
-            "{:?}: {}",
-            node.role(),
-            words.join(" = ").replace('\n', " / ")
-        );
+        text += &format!("{:?}: {}", node.role(), words.join(" = ").replace('\n', " / "));
         if let Some(toggled) = node.toggled() {
             text += &format!(" ({toggled:?})");
         }
@@ -178,9 +150,8 @@ fn words(window: &Harness<'_, App>) -> String {
 
 #[test]
 fn every_view_says_what_it_said() {
-    let mut window = Harness::builder()
-        .with_size(SIZE)
-        .build_eframe(|creation| App::new(creation, setup()));
+    let mut window =
+        Harness::builder().with_size(SIZE).build_eframe(|creation| App::new(creation, setup()));
     let mut settings = insta::Settings::clone_current();
     settings.set_snapshot_path("../snapshots");
     settings.set_prepend_module_to_snapshot(false);

@@ -30,19 +30,8 @@ fn a_photo_of_its_own_has_the_pose_of_the_frame_that_it_is_and_no_error() {
     let color = street.photo(frame).expect("is made").color;
     let path = folder.path().join("000070.png");
     color.expect("in colour").save(path).expect("writable");
-    let Intrinsics {
-        fx,
-        fy,
-        cx,
-        cy,
-        width,
-        height,
-    } = street.intrinsics(frame);
-    let line = format!(
-        "1 PINHOLE {width} {height} {fx} {fy} {} {}",
-        cx + 0.5,
-        cy + 0.5
-    );
+    let Intrinsics { fx, fy, cx, cy, width, height } = street.intrinsics(frame);
+    let line = format!("1 PINHOLE {width} {height} {fx} {fy} {} {}", cx + 0.5, cy + 0.5);
     let cameras = format!("# cameras\n2 SIMPLE_PINHOLE 64 48 50 32 24\n{line}\n");
     write(folder.path().join("cameras.txt"), cameras);
     let query = |words: &str| -> Json {
@@ -90,17 +79,9 @@ fn what_is_no_photo_or_no_camera_of_it_is_told() {
     let pinhole = "1 SIMPLE_PINHOLE 320 128 100 160 64";
     for (paths, camera, words) in [
         (vec![&path], None, "IMG_1.png ~ EXIF ~ --camera fx,fy,cx,cy"),
-        (
-            vec![&path],
-            Some("900,900,640,480"),
-            "IMG_1.png ~ 160x64 ~ 640,480",
-        ),
+        (vec![&path], Some("900,900,640,480"), "IMG_1.png ~ 160x64 ~ 640,480"),
         (vec![&path], Some(pinhole), "IMG_1.png ~ 320x128 ~ 160x64"),
-        (
-            vec![&path, &path],
-            Some(CAMERA),
-            "IMG_1.png ~ photos with different names",
-        ),
+        (vec![&path, &path], Some(CAMERA), "IMG_1.png ~ photos with different names"),
         (vec![&gone], Some(CAMERA), "gone.png"),
         (vec![&broken], Some(CAMERA), "broken.png"),
     ] {
@@ -138,34 +119,21 @@ pub fn jpeg(path: &Path, image: &GrayImage, fields: &[Field]) {
 }
 
 fn field(tag: Tag, value: Value) -> Field {
-    Field {
-        tag,
-        ifd_num: In::PRIMARY,
-        value,
-    }
+    Field { tag, ifd_num: In::PRIMARY, value }
 }
 
 /// What EXIF says of a lens, on 35 mm film.
 pub fn focal_length(millimetres: u16) -> Vec<Field> {
-    vec![field(
-        Tag::FocalLengthIn35mmFilm,
-        Value::Short(vec![millimetres]),
-    )]
+    vec![field(Tag::FocalLengthIn35mmFilm, Value::Short(vec![millimetres]))]
 }
 
 fn rational(number: u32, through: u32) -> Value {
-    let value = exif::Rational {
-        num: number,
-        denom: through,
-    };
+    let value = exif::Rational { num: number, denom: through };
     Value::Rational(vec![value])
 }
 
 fn opened(path: &Path) -> std::sync::Arc<dyn Scene> {
-    let photos = LoosePhotos {
-        paths: vec![path.to_owned()],
-        camera: None,
-    };
+    let photos = LoosePhotos { paths: vec![path.to_owned()], camera: None };
     photos.open().unwrap_or_else(|error| panic!("{error}"))
 }
 
@@ -192,11 +160,7 @@ fn exif_tells_the_focal_length_and_which_side_is_up() {
     let camera = opened(&path).intrinsics(0);
     assert!((camera.fx - 5.0 * 32.0 / 2.0).abs() < 1e-9, "{camera:?}");
     // Taken upright: the first row is the right side.
-    jpeg(
-        &path,
-        &image,
-        &[film, field(Tag::Orientation, Value::Short(vec![6]))],
-    );
+    jpeg(&path, &image, &[film, field(Tag::Orientation, Value::Short(vec![6]))]);
     let scene = opened(&path);
     let camera = scene.intrinsics(0);
     assert_eq!((camera.width, camera.height), (HEIGHT, WIDTH));
@@ -204,8 +168,5 @@ fn exif_tells_the_focal_length_and_which_side_is_up() {
     let stored = image::open(&path).expect("readable").into_luma8();
     assert_eq!(upright.dimensions(), (HEIGHT, WIDTH));
     assert_eq!(upright.get_pixel(HEIGHT - 1, 0), stored.get_pixel(0, 0));
-    assert_eq!(
-        upright.get_pixel(0, WIDTH - 1),
-        stored.get_pixel(WIDTH - 1, HEIGHT - 1)
-    );
+    assert_eq!(upright.get_pixel(0, WIDTH - 1), stored.get_pixel(WIDTH - 1, HEIGHT - 1));
 }

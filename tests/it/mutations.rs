@@ -33,9 +33,7 @@ const MUTATIONS: usize = 50;
 
 fn mutations() -> usize {
     let asked = std::env::var("POSESCOPE_MUTATIONS").ok();
-    asked
-        .and_then(|count| count.parse().ok())
-        .unwrap_or(MUTATIONS)
+    asked.and_then(|count| count.parse().ok()).unwrap_or(MUTATIONS)
 }
 
 /// A file as it may arrive: cut off, with bytes or pieces of another, doubled, or not there.
@@ -87,10 +85,7 @@ fn mutate<E: Display>(name: &str, files: &[PathBuf], mut read: impl FnMut() -> R
     let begun = Instant::now();
     let mut random = Pcg64Mcg::seed_from_u64(5);
     let (mut refused, mut slowest) = (0, Duration::ZERO);
-    let whole: Vec<Vec<u8>> = files
-        .iter()
-        .map(|path| fs::read(path).expect("readable"))
-        .collect();
+    let whole: Vec<Vec<u8>> = files.iter().map(|path| fs::read(path).expect("readable")).collect();
     for _ in 0..count {
         let which = random.random_range(0..files.len());
         let path = &files[which];
@@ -152,11 +147,7 @@ fn read_all(argument: &str, format: &str, sound: usize) -> Result<(), Vec<SceneE
     let frames = 0..scene.frames().len();
     let of_frame = |frame| [scene.query(frame).err(), scene.reference(frame).err()];
     let errors: Vec<_> = frames.flat_map(of_frame).flatten().collect();
-    if errors.len() <= sound {
-        Ok(())
-    } else {
-        Err(errors)
-    }
+    if errors.len() <= sound { Ok(()) } else { Err(errors) }
 }
 
 /// Whether `POSESCOPE_MUTATED` asks for something else than this.
@@ -166,9 +157,7 @@ fn is_left_out(name: &str) -> bool {
 
 fn mutate_scene(name: &str, format: &str, sample: &Sample) {
     let sound = read_all(&sample.argument, format, 0).map_or_else(|errors| errors.len(), |()| 0);
-    mutate(name, &files(&sample.root), || {
-        read_all(&sample.argument, format, sound)
-    });
+    mutate(name, &files(&sample.root), || read_all(&sample.argument, format, sound));
 }
 
 #[test]
@@ -220,9 +209,7 @@ fn no_damage_to_matches_makes_a_reader_panic() {
 #[test]
 fn no_damage_to_a_run_folder_makes_its_reader_panic() {
     let sequence = SmallSequence::write();
-    sequence
-        .run("eval sequences/42 --method fb,mi -q --out run")
-        .ok();
+    sequence.run("eval sequences/42 --method fb,mi -q --out run").ok();
     let out = sequence.path().join("run");
     let run = read_run(&out).expect("our own");
     let names = ["run.toml", "results.jsonl", "timings.jsonl"];
@@ -257,11 +244,7 @@ fn no_damage_to_an_index_makes_its_reader_panic() {
     let scene = scene::open(&text(&sequence.folder()), None).expect("our own");
     let params = Params::default();
     let path = sequence.path().join("an.posescope-index");
-    let options = IndexOptions {
-        words: 16,
-        every: 1,
-        seed: 0,
-    };
+    let options = IndexOptions { words: 16, every: 1, seed: 0 };
     let request = Retriever::request(scene.as_ref(), &options, &params);
     Retriever::build(scene.as_ref(), &path, &request, &params, |_| {}).expect("enough features");
     let query = scene.query(1).expect("readable");
@@ -277,15 +260,11 @@ fn no_damage_to_an_index_makes_its_reader_panic() {
 #[test]
 fn no_damage_to_a_table_of_poses_or_positions_makes_its_reader_panic() {
     let sequence = SmallSequence::write();
-    let scene: Arc<dyn Scene> = scene::open(&text(&sequence.folder()), None)
-        .expect("our own")
-        .into();
+    let scene: Arc<dyn Scene> =
+        scene::open(&text(&sequence.folder()), None).expect("our own").into();
     let at = |name: &str| sequence.path().join(name);
     for (name, content) in [
-        (
-            "tum.txt",
-            "0.4 0 0 4 0 0 0 1\n0.5 0 0 5.25 0 0.6 0 0.8\n0.7 1e1 0 7 0 0 0 1\n",
-        ),
+        ("tum.txt", "0.4 0 0 4 0 0 0 1\n0.5 0 0 5.25 0 0.6 0 0.8\n0.7 1e1 0 7 0 0 0 1\n"),
         (
             "kitti.txt",
             "1 0 0 0 0 1 0 0 0 0 1 4\n1 0 0 0 0 1 0 0 0 0 1 5\n0 0 1 0 0 1 0 0 -1 0 0 7\n",
@@ -305,14 +284,8 @@ fn no_damage_to_a_table_of_poses_or_positions_makes_its_reader_panic() {
         mutate(name, &[at(name)], || read().map_err(|error| vec![error]));
     }
     for (name, content) in [
-        (
-            "local.csv",
-            "name,x,y,z\n000004,0.5,0,4\n5,1e0,0,5\n000007.png,0,-0,7\n",
-        ),
-        (
-            "gps.csv",
-            "name lat lon alt\n4 48.1 11.5 300\n5 48.2 11.6 301\n7 48.3 11.5 302.5\n",
-        ),
+        ("local.csv", "name,x,y,z\n000004,0.5,0,4\n5,1e0,0,5\n000007.png,0,-0,7\n"),
+        ("gps.csv", "name lat lon alt\n4 48.1 11.5 300\n5 48.2 11.6 301\n7 48.3 11.5 302.5\n"),
     ] {
         fs::write(at(name), content).expect("writable");
         let read = || scene::located(Arc::clone(&scene), scene.as_ref(), &at(name)).map(drop);
@@ -328,17 +301,11 @@ fn no_damage_to_a_photo_or_its_camera_makes_their_reader_panic() {
     let focal = crate::loose_photo::focal_length(28);
     crate::loose_photo::jpeg(&photo, &wall(WIDTH, HEIGHT), &focal);
     let cameras = folder.path().join("cameras.txt");
-    fs::write(
-        &cameras,
-        "1 OPENCV 160 64 100 100 80 32 0.01 0 0 0\n2 RADIAL 64 48 50 32 24 0 0\n",
-    )
-    .expect("writable");
+    fs::write(&cameras, "1 OPENCV 160 64 100 100 80 32 0.01 0 0 0\n2 RADIAL 64 48 50 32 24 0 0\n")
+        .expect("writable");
     for camera in [None, Some(scene::CameraArgument::File(cameras.clone()))] {
         let read = || {
-            let photos = LoosePhotos {
-                paths: vec![photo.clone()],
-                camera: camera.clone(),
-            };
+            let photos = LoosePhotos { paths: vec![photo.clone()], camera: camera.clone() };
             let scene = photos.open()?;
             scene.photo(0).map(drop)
         };
@@ -347,8 +314,6 @@ fn no_damage_to_a_photo_or_its_camera_makes_their_reader_panic() {
             None => ("a photo with EXIF", &photo),
             Some(_) => ("cameras.txt", &cameras),
         };
-        mutate(name, std::slice::from_ref(file), || {
-            read().map_err(|error| vec![error])
-        });
+        mutate(name, std::slice::from_ref(file), || read().map_err(|error| vec![error]));
     }
 }

@@ -24,18 +24,9 @@ pub struct SnapshotComparison {
 fn render_state() -> Option<RenderState> {
     let setup = default_wgpu_setup();
     let instance = pollster::block_on(setup.new_instance());
-    let configuration = WgpuConfiguration {
-        wgpu_setup: setup,
-        ..WgpuConfiguration::default()
-    };
+    let configuration = WgpuConfiguration { wgpu_setup: setup, ..WgpuConfiguration::default() };
     let options = RendererOptions::PREDICTABLE;
-    pollster::block_on(RenderState::create(
-        &configuration,
-        &instance,
-        None,
-        options,
-    ))
-    .ok()
+    pollster::block_on(RenderState::create(&configuration, &instance, None, options)).ok()
 }
 
 fn words_of(info: &wgpu::AdapterInfo) -> String {
@@ -54,13 +45,7 @@ pub fn painted(setup: Setup, size: [f32; 2]) -> Option<PaintedWindow> {
         .with_size(size)
         .renderer(WgpuTestRenderer::from_render_state(state))
         .build_eframe(|creation| App::new(creation, setup));
-    Some(PaintedWindow {
-        window,
-        judge: SnapshotComparison {
-            adapter,
-            coarsely: 0,
-        },
-    })
+    Some(PaintedWindow { window, judge: SnapshotComparison { adapter, coarsely: 0 } })
 }
 
 impl SnapshotComparison {

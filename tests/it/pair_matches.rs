@@ -23,12 +23,8 @@ fn results(folder: &Path, words: &str) -> Vec<QueryResult> {
 /// FB's poses with the matches that FB exported.
 fn read_back(asked: &str) {
     let folder = TempDir::new().expect("a folder");
-    let [ours, again] = ["--export-matches", "--matches"].map(|option| {
-        results(
-            folder.path(),
-            &format!("{asked} --method fb,mi {option} matches"),
-        )
-    });
+    let [ours, again] = ["--export-matches", "--matches"]
+        .map(|option| results(folder.path(), &format!("{asked} --method fb,mi {option} matches")));
     assert_eq!(ours.len(), again.len());
     let mut localized = 0;
     let is_of_fb = |(ours, _): &(&QueryResult, &QueryResult)| ours.method == Method::FB;
@@ -42,12 +38,7 @@ fn read_back(asked: &str) {
     assert!(localized > 0);
     let others = |results: &[QueryResult]| -> Vec<QueryResult> {
         let others = results.iter().filter(|result| result.method == Method::MI);
-        others
-            .map(|result| QueryResult {
-                agreement: Vec::new(),
-                ..result.clone()
-            })
-            .collect()
+        others.map(|result| QueryResult { agreement: Vec::new(), ..result.clone() }).collect()
     };
     assert_eq!(others(&ours), others(&again), "MI has no matches");
 }
@@ -60,10 +51,7 @@ fn our_own_matches_read_back_give_our_own_pose_bit_for_bit() {
 #[test]
 fn our_own_matches_of_real_photos_read_back_give_our_own_pose_bit_for_bit() {
     if let Some(sequence) = authors_pair() {
-        read_back(&format!(
-            "'{}' --query 3823 --reference 3814",
-            sequence.display()
-        ));
+        read_back(&format!("'{}' --query 3823 --reference 3814", sequence.display()));
     }
 }
 
@@ -96,12 +84,7 @@ fn npy(kind: &str, shape: &str, bytes: &[u8]) -> Vec<u8> {
 
 /// As SuperGlue's demonstration writes it: three keypoints, two, and one match.
 fn npz(path: &Path) {
-    let floats = |values: &[f32]| {
-        values
-            .iter()
-            .flat_map(|v| v.to_le_bytes())
-            .collect::<Vec<_>>()
-    };
+    let floats = |values: &[f32]| values.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<_>>();
     let whole = [-1_i64, 1, -1].map(i64::to_le_bytes).concat();
     let keypoints = floats(&[1.0, 2.0, 3.5, 4.0, 5.0, 6.0]);
     let mut archive = zip::ZipWriter::new(fs::File::create(path).expect("writable"));
@@ -109,15 +92,9 @@ fn npz(path: &Path) {
         .compression_method(zip::CompressionMethod::Deflated);
     for (name, content) in [
         ("keypoints0.npy", npy("<f4", "(3, 2)", &keypoints)),
-        (
-            "keypoints1.npy",
-            npy("<f4", "(2, 2)", &floats(&[7.0, 8.0, 9.0, 10.25])),
-        ),
+        ("keypoints1.npy", npy("<f4", "(2, 2)", &floats(&[7.0, 8.0, 9.0, 10.25]))),
         ("matches.npy", npy("<i8", "(3,)", &whole)),
-        (
-            "match_confidence.npy",
-            npy("<f4", "(3,)", &floats(&[0.0, 0.5, 0.0])),
-        ),
+        ("match_confidence.npy", npy("<f4", "(3,)", &floats(&[0.0, 0.5, 0.0]))),
     ] {
         archive.start_file(name, options).expect("writable");
         archive.write_all(&content).expect("writable");
@@ -134,10 +111,7 @@ fn hloc(folder: &Path) {
     ] {
         let mut outer = features.create_group(name);
         let mut group = outer.create_group(image);
-        group
-            .create_dataset("keypoints")
-            .with_f32_data(&values)
-            .with_shape(&[count, 2]);
+        group.create_dataset("keypoints").with_f32_data(&values).with_shape(&[count, 2]);
         outer.add_group(group.finish());
         features.add_group(outer.finish());
     }
@@ -145,10 +119,7 @@ fn hloc(folder: &Path) {
     let mut matches = hdf5_pure::FileBuilder::new();
     let mut first = matches.create_group("query-000070.png");
     let mut second = first.create_group("mapping-000062.png");
-    second
-        .create_dataset("matches0")
-        .with_i16_data(&[-1, 1, -1])
-        .with_shape(&[3]);
+    second.create_dataset("matches0").with_i16_data(&[-1, 1, -1]).with_shape(&[3]);
     first.add_group(second.finish());
     matches.add_group(first.finish());
     matches.write(folder.join("matches.h5")).expect("writable");
@@ -179,9 +150,7 @@ fn all_forms_say_the_same_in_both_directions() {
         write(folder.path());
         let source = MatchFolder::open(folder.path()).unwrap_or_else(|error| panic!("{error}"));
         let pairs = |query: &str, reference: &str| {
-            let found = source
-                .matches(query, reference)
-                .unwrap_or_else(|error| panic!("{error}"));
+            let found = source.matches(query, reference).unwrap_or_else(|error| panic!("{error}"));
             let Some(posescope::features::PairMatches::Found(found)) = found else {
                 panic!("{form} has the pair");
             };

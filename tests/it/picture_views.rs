@@ -106,9 +106,7 @@ fn the_funnel_counts_every_feature_and_hides_the_states_that_are_clicked() {
 
     let (_, place) = lonely_inlier(&window);
     let inliers = count("inlier");
-    window
-        .get_by_label(&format!("inlier: {inliers}, shown"))
-        .click();
+    window.get_by_label(&format!("inlier: {inliers}, shown")).click();
     window.run_steps(2);
     window.get_by_label(&format!("inlier: {inliers}, hidden"));
     click(&mut window, place);
@@ -194,9 +192,7 @@ fn both_photos_zoom_together_and_a_double_click_shows_them_whole() {
     assert_ne!(app(&window).options.selected_feature, Some(feature));
     order(&mut window, Command::SelectFeature(None));
     // Each step of the test takes a quarter of a second; these clicks are one second apart, the one before is earlier.
-    window
-        .ctx
-        .options_mut(|options| options.input_options.max_double_click_delay = 1.3);
+    window.ctx.options_mut(|options| options.input_options.max_double_click_delay = 1.3);
     click(&mut window, area.center());
     click(&mut window, area.center());
     order(&mut window, Command::SelectFeature(None));
@@ -213,25 +209,17 @@ fn the_synthetic_view_shows_the_recorded_cost_and_place() {
         let cost = event.comparison.score.cost.expect("a cost");
         assert!(event.offset.right_m.abs() < 0.005 && event.offset.yaw_rad == 0.0);
         let (ahead, covered) = (event.offset.forward_m, event.comparison.score.covered);
-        let caption = format!(
-            "{}, result: cost {cost:.4}, {covered} px covered",
-            method.label()
-        );
+        let caption = format!("{}, result: cost {cost:.4}, {covered} px covered", method.label());
         let caption = window.get_by_label_contains(&caption);
         let words = caption.accesskit_node().value().expect("a label");
         let place = format!("0.00 m right, {ahead:.2} m ahead, turned 0.00° left");
         assert!(words.ends_with(&place), "{words}");
         let assessed = latest::<MinimumAssessed>(&window);
-        window.get_by_label(&format!(
-            "shuffled {:.4}",
-            assessed.shuffled.expect("a cost")
-        ));
+        window.get_by_label(&format!("shuffled {:.4}", assessed.shuffled.expect("a cost")));
         window.get_by_label(&format!("best {:.4}", assessed.best));
         let results = app(&window).run().results();
         let mut costs = results.filter(|result| result.method == method);
-        let cost = costs
-            .find_map(|result| result.cost.clone())
-            .expect("it has a cost");
+        let cost = costs.find_map(|result| result.cost.clone()).expect("it has a cost");
         window.get_by_label(&format!("truth {:.4}", cost.truth.expect("known")));
     }
 }

@@ -38,12 +38,7 @@ pub struct Planted<'a> {
 
 impl<'a> Planted<'a> {
     pub fn new(scene: &'a dyn Scene, fault: Fault, first: usize, count: usize) -> Self {
-        Self {
-            scene,
-            fault,
-            first,
-            names: scene.frames()[first..first + count].to_vec(),
-        }
+        Self { scene, fault, first, names: scene.frames()[first..first + count].to_vec() }
     }
 
     fn true_pose(&self, frame: usize) -> Option<Pose> {
@@ -55,10 +50,7 @@ impl<'a> Planted<'a> {
 fn flu_from_rdf() -> Pose {
     let turn = Matrix3::new(0.0, 0.0, 1.0, -1.0, 0.0, 0.0, 0.0, -1.0, 0.0);
     let turn = Rotation3::from_matrix_unchecked(turn);
-    Pose::from_parts(
-        Translation3::identity(),
-        UnitQuaternion::from_rotation_matrix(&turn),
-    )
+    Pose::from_parts(Translation3::identity(), UnitQuaternion::from_rotation_matrix(&turn))
 }
 
 /// The other camera of the pair is so far to the right \[m\].
@@ -79,10 +71,8 @@ fn with_angles_times(pose: &Pose, factor: f64) -> Pose {
 fn bent(photo: &GrayImage, camera: &Intrinsics, k1: f64) -> GrayImage {
     let (width, height) = photo.dimensions();
     GrayImage::from_fn(width, height, |x, y| {
-        let (u, v) = (
-            (f64::from(x) - camera.cx) / camera.fx,
-            (f64::from(y) - camera.cy) / camera.fy,
-        );
+        let (u, v) =
+            ((f64::from(x) - camera.cx) / camera.fx, (f64::from(y) - camera.cy) / camera.fy);
         let times = 1.0 + k1 * (u * u + v * v);
         let from_x = (camera.fx * u * times + camera.cx).round();
         let from_y = (camera.fy * v * times + camera.cy).round();
@@ -90,11 +80,7 @@ fn bent(photo: &GrayImage, camera: &Intrinsics, k1: f64) -> GrayImage {
             && from_y >= 0.0
             && from_x < f64::from(width)
             && from_y < f64::from(height);
-        if is_inside {
-            *photo.get_pixel(from_x as u32, from_y as u32)
-        } else {
-            image::Luma([0])
-        }
+        if is_inside { *photo.get_pixel(from_x as u32, from_y as u32) } else { image::Luma([0]) }
     })
 }
 
@@ -116,11 +102,7 @@ impl Scene for Planted<'_> {
                 cx: camera.cx + 18.0,
                 ..camera
             },
-            Fault::HalfPixel => Intrinsics {
-                cx: camera.cx + 0.5,
-                cy: camera.cy + 0.5,
-                ..camera
-            },
+            Fault::HalfPixel => Intrinsics { cx: camera.cx + 0.5, cy: camera.cy + 0.5, ..camera },
             _ => camera,
         }
     }

@@ -81,14 +81,11 @@ fn fb_recovers_the_pair_in_both_directions_for_nearly_every_seed() {
         let params = Params::default().fb.mlesac;
         let mut errors: Vec<PoseError> = (0..100)
             .map(|seed| {
-                let consensus = mlesac(
-                    &correspondences,
-                    &problem.query.intrinsics,
-                    &params,
-                    seed,
-                    |_| Ok::<_, ()>(()),
-                )
-                .expect("there is a consensus");
+                let consensus =
+                    mlesac(&correspondences, &problem.query.intrinsics, &params, seed, |_| {
+                        Ok::<_, ()>(())
+                    })
+                    .expect("there is a consensus");
                 PoseError::between(&truth, &problem.world_from_query(&consensus.pose.inverse()))
             })
             .collect();

@@ -56,10 +56,7 @@ fn run(recorder: &mut Recorder, methods: &[Method], params: &Params) {
             .make(params)
             .estimate(&problem, &mut Trace::to(&mut both))
             .expect("a recorder never cancels");
-        let tolerance = Tolerance {
-            translation_m: 0.4,
-            rotation_deg: 5.0,
-        };
+        let tolerance = Tolerance { translation_m: 0.4, rotation_deg: 5.0 };
         let subject = Subject::new(&problem, method, params, &outcome, &evidence);
         let subject = subject.against(Some(&truth), tolerance);
         let result = evaluate("two walls", &subject);
@@ -68,10 +65,7 @@ fn run(recorder: &mut Recorder, methods: &[Method], params: &Params) {
 }
 
 fn open(path: &Path, methods: &[Method]) -> Recorder {
-    let targets = Targets {
-        save: Some(path.to_owned()),
-        ..Targets::default()
-    };
+    let targets = Targets { save: Some(path.to_owned()), ..Targets::default() };
     Recorder::open(&targets, &identity(), methods).expect("a writable file")
 }
 
@@ -120,15 +114,8 @@ fn layout(path: &Path) -> String {
 pub fn timelines(chunks: &[Chunk]) -> BTreeMap<String, BTreeSet<String>> {
     let mut all: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
     for chunk in chunks {
-        let path = chunk
-            .entity_path()
-            .to_string()
-            .trim_start_matches('/')
-            .to_owned();
-        let names = chunk
-            .timelines()
-            .keys()
-            .map(|name| name.as_str().to_owned());
+        let path = chunk.entity_path().to_string().trim_start_matches('/').to_owned();
+        let names = chunk.timelines().keys().map(|name| name.as_str().to_owned());
         all.entry(path).or_default().extend(names);
     }
     all
@@ -137,9 +124,7 @@ pub fn timelines(chunks: &[Chunk]) -> BTreeMap<String, BTreeSet<String>> {
 fn assert_equal(left: &[Chunk], right: &[Chunk]) {
     let mut unmatched: Vec<&Chunk> = right.iter().collect();
     for chunk in left {
-        let equal = unmatched
-            .iter()
-            .position(|other| Chunk::ensure_similar(chunk, other).is_ok());
+        let equal = unmatched.iter().position(|other| Chunk::ensure_similar(chunk, other).is_ok());
         match equal {
             Some(place) => drop(unmatched.swap_remove(place)),
             None => panic!("{} differs", chunk.entity_path()),
@@ -199,10 +184,7 @@ fn view_classes(path: &Path) -> BTreeMap<String, String> {
         for class in chunk.iter_slices::<String>(component) {
             let id = chunk.entity_path().to_string();
             let known = classes.insert(id.clone(), class[0].to_string());
-            assert!(
-                known.is_none_or(|known| known == class[0].to_string()),
-                "{id}"
-            );
+            assert!(known.is_none_or(|known| known == class[0].to_string()), "{id}");
         }
     }
     classes
@@ -236,10 +218,7 @@ fn a_view_of_one_id_is_of_one_class_in_every_recording() {
     for one in &all {
         for other in &all {
             for (id, class) in one {
-                assert!(
-                    other.get(id).is_none_or(|known| known == class),
-                    "{id}: {class}"
-                );
+                assert!(other.get(id).is_none_or(|known| known == class), "{id}: {class}");
             }
         }
     }
@@ -248,12 +227,7 @@ fn a_view_of_one_id_is_of_one_class_in_every_recording() {
 #[test]
 fn every_promised_entity_is_on_its_timelines() {
     let folder = tempfile::tempdir().expect("a folder");
-    let chunks = chunks(&recorded(
-        &folder,
-        "run.rrd",
-        &Method::PAPER,
-        &Params::default(),
-    ));
+    let chunks = chunks(&recorded(&folder, "run.rrd", &Method::PAPER, &Params::default()));
     let found = timelines(&chunks);
     let mut promised: Vec<(String, &str)> = [
         "world/cloud",
@@ -300,14 +274,8 @@ fn every_promised_entity_is_on_its_timelines() {
         let Some(timelines) = found.get(&path) else {
             panic!("{path} is missing");
         };
-        assert!(
-            timelines.contains(timeline),
-            "{path} is not on {timeline}: {timelines:?}"
-        );
-        assert!(
-            timelines.contains(entities::QUERY_TIMELINE),
-            "{path} belongs to no query"
-        );
+        assert!(timelines.contains(timeline), "{path} is not on {timeline}: {timelines:?}");
+        assert!(timelines.contains(entities::QUERY_TIMELINE), "{path} belongs to no query");
     }
 }
 
@@ -331,18 +299,8 @@ fn a_recording_of_something_wrong_opens_on_the_picture_that_proves_it() {
 #[test]
 fn two_recordings_of_one_run_are_equal() {
     let folder = tempfile::tempdir().expect("a folder");
-    let first = chunks(&recorded(
-        &folder,
-        "first.rrd",
-        &Method::PAPER,
-        &Params::default(),
-    ));
-    let second = chunks(&recorded(
-        &folder,
-        "second.rrd",
-        &Method::PAPER,
-        &Params::default(),
-    ));
+    let first = chunks(&recorded(&folder, "first.rrd", &Method::PAPER, &Params::default()));
+    let second = chunks(&recorded(&folder, "second.rrd", &Method::PAPER, &Params::default()));
     assert_equal(&first, &second);
 }
 
@@ -355,9 +313,7 @@ fn the_hybrid_repeats_no_story_but_tells_all_of_it_when_alone() {
     let rows = |name: &str, methods: &[Method]| {
         let chunks = chunks(&recorded(&folder, name, methods, &without_matches));
         let count = |path: &str| {
-            let of = chunks
-                .iter()
-                .filter(|c| c.entity_path().to_string() == format!("/{path}"));
+            let of = chunks.iter().filter(|c| c.entity_path().to_string() == format!("/{path}"));
             of.map(Chunk::num_rows).sum::<usize>()
         };
         ["fb/matches/0", "mi/synthetic", "world/cloud"].map(count)
@@ -388,10 +344,7 @@ fn a_second_query_begins_with_a_clean_slate_and_later_steps() {
         .collect();
     let mut unique = evals.clone();
     unique.dedup();
-    assert!(
-        evals.is_sorted() && evals == unique,
-        "no trial of the second run is one of the first"
-    );
+    assert!(evals.is_sorted() && evals == unique, "no trial of the second run is one of the first");
     assert!(evals.len() > 100);
     let found = timelines(&chunks);
     assert!(entities::of_a_query().all(|root| found.contains_key(root)));
@@ -402,16 +355,7 @@ fn a_process_that_is_killed_leaves_what_it_told() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("killed.rrd");
     let mut process = std::process::Command::new(assert_cmd::cargo::cargo_bin!("posescope"))
-        .args([
-            "run",
-            "street",
-            "--query",
-            "70",
-            "--reference",
-            "62",
-            "-q",
-            "--save",
-        ])
+        .args(["run", "street", "--query", "70", "--reference", "62", "-q", "--save"])
         .arg(&path)
         .env("POSESCOPE_CACHE", crate::binary::CACHE)
         .spawn()
@@ -424,17 +368,10 @@ fn a_process_that_is_killed_leaves_what_it_told() {
     process.kill().expect("is still running");
     process.wait().expect("was killed");
     let found = timelines(&chunks(&path));
-    for promised in [
-        "fb/matches/0/inlier",
-        "world/estimate/fb/camera",
-        "pm/synthetic",
-    ] {
+    for promised in ["fb/matches/0/inlier", "world/estimate/fb/camera", "pm/synthetic"] {
         assert!(found.contains_key(promised), "{promised} is missing");
     }
-    assert!(
-        !found.contains_key("world/estimate/hy/camera"),
-        "it was not killed in the middle"
-    );
+    assert!(!found.contains_key("world/estimate/hy/camera"), "it was not killed in the middle");
 }
 
 #[test]
@@ -480,10 +417,7 @@ fn the_best_of_every_phase_and_one_in_ten_of_all_bests_are_shown() {
 #[cfg(target_os = "linux")]
 #[test]
 fn a_full_disk_is_reported_with_the_name_of_the_file() {
-    let targets = Targets {
-        save: Some(PathBuf::from("/dev/full")),
-        ..Targets::default()
-    };
+    let targets = Targets { save: Some(PathBuf::from("/dev/full")), ..Targets::default() };
     let Err(error) = Recorder::open(&targets, &identity(), &Method::PAPER) else {
         panic!("there is no room for even the header");
     };
@@ -521,11 +455,7 @@ fn ranking_of_twelve() -> ReferencesRanked {
     let reference = |frame: usize| RankedReference {
         name: format!("{frame:06}"),
         world_from_camera: Some(Pose::translation(0.0, 0.0, frame as f64)),
-        ranked: Ranked {
-            frame,
-            score: 1.0 / (1 + frame) as f32,
-            geometry: Geometry::Refused,
-        },
+        ranked: Ranked { frame, score: 1.0 / (1 + frame) as f32, geometry: Geometry::Refused },
     };
     let ranking = ReferenceRanking {
         criterion: Criterion::Words,
@@ -533,13 +463,9 @@ fn ranking_of_twelve() -> ReferencesRanked {
         chosen: 12,
         frames: (0..12).map(reference).collect(),
     };
-    let photos = (0..ranking.pictured().len())
-        .map(|rank| (rank != 2).then(|| Arc::clone(photo)))
-        .collect();
-    ReferencesRanked {
-        ranking: Arc::new(ranking),
-        photos,
-    }
+    let photos =
+        (0..ranking.pictured().len()).map(|rank| (rank != 2).then(|| Arc::clone(photo))).collect();
+    ReferencesRanked { ranking: Arc::new(ranking), photos }
 }
 
 fn tell_ranking(recorder: &mut Recorder, event: &ReferencesRanked) {
@@ -593,10 +519,7 @@ fn a_ranking_has_a_place_in_the_layout_only_where_there_is_one() {
         (layout.contains(entities::RETRIEVAL_TABLE), views.count())
     };
     assert_eq!(is_laid_out("without.rrd", None), (false, 0));
-    assert_eq!(
-        is_laid_out("with.rrd", Some(&ranking_of_twelve())),
-        (true, 10)
-    );
+    assert_eq!(is_laid_out("with.rrd", Some(&ranking_of_twelve())), (true, 10));
 }
 
 #[test]
@@ -627,17 +550,11 @@ fn any_method_is_recorded_be_it_registered_or_not() {
 fn frames_of_two_scenes_are_told_apart_in_a_recording() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("night.rrd");
-    let two = Identity {
-        scene: "snow".to_owned(),
-        query_scene: Some("night".to_owned()),
-        ..identity()
-    };
+    let two =
+        Identity { scene: "snow".to_owned(), query_scene: Some("night".to_owned()), ..identity() };
     assert_eq!(two.recording_name(), "night query ← snow reference");
     assert_eq!(identity().recording_name(), "two walls query");
-    let targets = Targets {
-        save: Some(path.clone()),
-        ..Targets::default()
-    };
+    let targets = Targets { save: Some(path.clone()), ..Targets::default() };
     let mut recorder = Recorder::open(&targets, &two, &[Method::FB]).expect("a writable file");
     run(&mut recorder, &[Method::FB], &Params::default());
     recorder.close().expect("a whole recording");

@@ -36,11 +36,7 @@ fn pick(window: &mut Harness<'_, App>, selection: Selection) -> RunState {
 
 fn index(file: &Path, params: &Params) {
     let scene = Walls::new();
-    let options = IndexOptions {
-        words: 400,
-        every: 1,
-        seed: 0,
-    };
+    let options = IndexOptions { words: 400, every: 1, seed: 0 };
     // The photos behind the first three cannot all be read.
     let mut request = Retriever::request(&scene, &options, params);
     request.frames.truncate(3);
@@ -52,17 +48,11 @@ fn references_are_chosen_by_hand_and_their_poses_fused() {
     let mut window = finished(setup());
     maximize(&mut window, "references");
     assert!(is_said(&window, "1 of 2 frames within 3 m"));
-    window
-        .get_by_role_and_label(egui::Role::CheckBox, "000002")
-        .click();
+    window.get_by_role_and_label(egui::Role::CheckBox, "000002").click();
     window.run_steps(2);
     finish(&mut window);
     assert_eq!(results(&window).len(), 2 * Method::PAPER.len());
-    assert!(
-        results(&window)
-            .iter()
-            .all(|result| result.fusion.is_none())
-    );
+    assert!(results(&window).iter().all(|result| result.fusion.is_none()));
 
     let stages = app(&window).run().stages();
     let inner = stages.iter().filter(|bar| bar.stage.name() == "detect");
@@ -103,13 +93,9 @@ fn references_are_chosen_by_hand_and_their_poses_fused() {
 
     // Without a second reference there is nothing to fuse, but a fusion of one is its pose.
     maximize(&mut window, "references");
-    window
-        .get_by_role_and_label(egui::Role::CheckBox, "000002")
-        .click();
+    window.get_by_role_and_label(egui::Role::CheckBox, "000002").click();
     window.run_steps(2);
-    window
-        .get_by_role_and_label(egui::Role::CheckBox, "000000")
-        .click();
+    window.get_by_role_and_label(egui::Role::CheckBox, "000000").click();
     window.run_steps(2);
     assert!(is_said(&window, "at least one reference"));
 }
@@ -140,10 +126,7 @@ fn references_are_ranked_by_their_matches() {
     let run = app(&window).run();
     assert_eq!(run.spans()[0].part, Part::Retrieval);
     maximize(&mut window, "retrieval");
-    assert!(is_said(
-        &window,
-        "1 of 2 frames are references, ranked by feature matches"
-    ));
+    assert!(is_said(&window, "1 of 2 frames are references, ranked by feature matches"));
     // What a setting changes does not change the references.
     let key = "fb.ratio".to_owned();
     let value = "0.7".to_owned();
@@ -168,18 +151,12 @@ fn references_are_found_by_an_index_and_a_missing_one_is_named() {
     ));
 
     index(&file, &Params::default());
-    assert_eq!(
-        pick(&mut window, Selection::Retrieved(2)),
-        RunState::Finished
-    );
+    assert_eq!(pick(&mut window, Selection::Retrieved(2)), RunState::Finished);
     let chosen = &app(&window).setup.chosen;
     assert_eq!(chosen.frames.len(), 2);
     assert_eq!(results(&window).len(), 2 * Method::PAPER.len());
     maximize(&mut window, "retrieval");
-    assert!(is_said(
-        &window,
-        "2 of 2 frames are references, ranked by visual words"
-    ));
+    assert!(is_said(&window, "2 of 2 frames are references, ranked by visual words"));
     let ranking = app(&window).setup.chosen.ranking.clone();
     let first = &ranking.expect("an index ranks").frames[0];
     let found = first.ranked.verification().expect("the walls are the same");

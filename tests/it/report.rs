@@ -19,10 +19,7 @@ fn run(sequence: &SmallSequence, out: &str, words: &str) -> String {
 
 /// Whatever an attribute or a style names.
 fn named<'a>(page: &'a str, before: &str, end: char) -> Vec<&'a str> {
-    page.split(before)
-        .skip(1)
-        .filter_map(|rest| rest.split(end).next())
-        .collect()
+    page.split(before).skip(1).filter_map(|rest| rest.split(end).next()).collect()
 }
 
 /// The page has these words, each after the one before.
@@ -30,9 +27,8 @@ fn named<'a>(page: &'a str, before: &str, end: char) -> Vec<&'a str> {
 fn has_in_order(page: &str, words: &str) {
     let mut rest = page;
     for word in words.split(" ~ ") {
-        let (_, after) = rest
-            .split_once(word)
-            .unwrap_or_else(|| panic!("`{word}` is missing or too early"));
+        let (_, after) =
+            rest.split_once(word).unwrap_or_else(|| panic!("`{word}` is missing or too early"));
         rest = after;
     }
 }
@@ -63,9 +59,7 @@ fn assert_self_contained(page: &str) {
         };
         assert!(is_inside, "{one}");
     }
-    for outside in [
-        "http:", "https:", "//cdn", "@import", "<link", "<iframe", "fetch(",
-    ] {
+    for outside in ["http:", "https:", "//cdn", "@import", "<link", "<iframe", "fetch("] {
         assert!(!page.contains(outside), "{outside}");
     }
 }
@@ -73,11 +67,7 @@ fn assert_self_contained(page: &str) {
 #[test]
 fn eval_leaves_a_report_that_needs_nothing_else() {
     let sequence = SmallSequence::of(&[0, 1, 2, 3]);
-    let page = run(
-        &sequence,
-        "run",
-        "--threads 1 --explain 1 --min-confidence 0.25",
-    );
+    let page = run(&sequence, "run", "--threads 1 --explain 1 --min-confidence 0.25");
     assert_self_contained(&page);
     assert_eq!(page.matches("<tr id=\"r").count(), 8);
     // Thumbnails are kept once for each query, whatever the number of its results.
@@ -86,10 +76,7 @@ fn eval_leaves_a_report_that_needs_nothing_else() {
     // The black photo is a failure of fb with the line that opens its recording, and a direct method's
     // failure has its costs.
     let viewer = web_viewer();
-    has(
-        &page,
-        &format!("<a hidden{viewer} data-recording=\"failures/000002-fb.rrd\">"),
-    );
+    has(&page, &format!("<a hidden{viewer} data-recording=\"failures/000002-fb.rrd\">"));
     for words in [
         "kitti/42 ~ success@mi &gt;= 0 ~ Too few keypoints ~ Cost of each position",
         "<code>rerun failures/000002-fb.rrd</code>",
@@ -107,10 +94,7 @@ fn eval_leaves_a_report_that_needs_nothing_else() {
          id=\"plots\" ~ id=\"figures\" ~ id=\"asked\"",
     );
     // The bars count every result, with its grade in words.
-    has(
-        &page,
-        "role=\"img\" aria-label=\"FB: ~ no pose\" ~ aria-label=\"MI: ",
-    );
+    has(&page, "role=\"img\" aria-label=\"FB: ~ no pose\" ~ aria-label=\"MI: ");
     // The worst failures are open, the greatest error first; a cause in the table leads to them.
     let (_, open) = page.split_once("id=\"failures\"").expect("failures");
     let (open, _) = open.split_once("id=\"queries\"").expect("results");
@@ -121,9 +105,7 @@ fn eval_leaves_a_report_that_needs_nothing_else() {
     assert_eq!(page.matches(" checked autocomplete").count(), 5);
 
     // From the folder alone, on any number of threads: the same bytes.
-    sequence
-        .run("results run --as html --out again.html --threads 3")
-        .ok();
+    sequence.run("results run --as html --out again.html --threads 3").ok();
     assert!(sequence.text("again.html") == page);
 
     // Without the scene there are no photos, which is said; everything else stays.
@@ -133,9 +115,7 @@ fn eval_leaves_a_report_that_needs_nothing_else() {
     assert_self_contained(&page);
     has(&page, "There are no photos: ");
     assert_eq!(page.matches("<tr id=\"r").count(), 8);
-    sequence
-        .run("results nowhere --as html")
-        .fails(3, "nowhere");
+    sequence.run("results nowhere --as html").fails(3, "nowhere");
 
     // What comes from elsewhere is no markup.
     for file in ["run.toml", "results.jsonl"] {
@@ -158,9 +138,7 @@ fn two_runs_are_held_against_each_other() {
     let before = run(&sequence, "before", "--right 0.5m,5deg --limit 3");
     has(&before, "<dt>limit</dt><dd>3</dd>");
     run(&sequence, "after", "--limit 3");
-    sequence
-        .run("compare before after --html compared.html")
-        .ok();
+    sequence.run("compare before after --html compared.html").ok();
     let page = sequence.text("compared.html");
     assert_self_contained(&page);
     // A wider tolerance fixes what was wrong.
@@ -173,9 +151,7 @@ fn a_browser_sorts_and_filters_it_without_a_complaint() {
     run(&sequence, "run", "");
     let script = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/ci/check-report.sh");
     let mut shell = Process::new("bash");
-    shell
-        .arg(script)
-        .arg(sequence.path().join("run/report.html"));
+    shell.arg(script).arg(sequence.path().join("run/report.html"));
     let Ok(output) = shell.output() else {
         return println!("skipped: no shell");
     };

@@ -8,9 +8,7 @@ use crate::small_sequence::SmallSequence;
 /// A sequence with a `run` over its frames.
 fn finished() -> SmallSequence {
     let sequence = SmallSequence::write();
-    sequence
-        .run("eval sequences/42 --method fb,mi --radius 3 --out run")
-        .ok();
+    sequence.run("eval sequences/42 --method fb,mi --radius 3 --out run").ok();
     sequence
 }
 
@@ -22,8 +20,7 @@ fn results(sequence: &SmallSequence, words: &str) -> Said {
 /// The numbers in the first column of a table.
 fn numbers(table: &str) -> Vec<f64> {
     let rows = table.lines().skip(1);
-    rows.filter_map(|line| line.split_whitespace().next()?.parse().ok())
-        .collect()
+    rows.filter_map(|line| line.split_whitespace().next()?.parse().ok()).collect()
 }
 
 #[test]
@@ -41,14 +38,8 @@ fn results_are_chosen_sorted_and_counted() {
     assert!(!wanted.is_empty());
 
     let condition = format!("--where 'method = MI and error < {limit}'");
-    let said = results(
-        &sequence,
-        &format!("{condition} --sort -error --columns error,query"),
-    );
-    assert_eq!(
-        said.err.trim(),
-        format!("{} of {} results", wanted.len(), all.len())
-    );
+    let said = results(&sequence, &format!("{condition} --sort -error --columns error,query"));
+    assert_eq!(said.err.trim(), format!("{} of {} results", wanted.len(), all.len()));
     let shown = numbers(&said.out);
     assert_eq!(shown.len(), wanted.len());
     for (shown, wanted) in shown.iter().zip(&wanted) {
@@ -67,14 +58,8 @@ fn results_are_chosen_sorted_and_counted() {
     let said = results(&sequence, "--where 'error >= 0' --as json --rows 1");
     assert_eq!(said.out.lines().count(), 1);
     has(&lines, said.out.trim());
-    let measured = all
-        .iter()
-        .filter(|result| !result["error"].is_null())
-        .count();
-    has(
-        &said.err,
-        &format!("1 of {measured} that meet the condition"),
-    );
+    let measured = all.iter().filter(|result| !result["error"].is_null()).count();
+    has(&said.err, &format!("1 of {measured} that meet the condition"));
 }
 
 #[test]
@@ -99,10 +84,7 @@ fn tables_and_figures_come_in_the_form_that_is_asked_for() {
     let text = |words: &str| results(&sequence, words).out;
     let csv = text("--as csv --where 'method = fb'");
     has(csv.lines().next().expect("a head"), "query,");
-    assert_eq!(
-        csv.lines().count(),
-        text("--where 'method = fb'").lines().count()
-    );
+    assert_eq!(csv.lines().count(), text("--where 'method = fb'").lines().count());
     let markdown = text("--as markdown --columns query,method");
     assert!(markdown.starts_with("| query | method |"), "{markdown}");
     has(&text("--table summary --as markdown"), "| success (%) |");

@@ -41,17 +41,11 @@ fn an_index_is_built_once_and_finds_the_reference() {
     }
 
     // Frames that are left out are not found and make it another index.
-    has(
-        &run(&format!("{INDEX} --without 200")).err,
-        "4 frames without 1",
-    );
+    has(&run(&format!("{INDEX} --without 200")).err, "4 frames without 1");
     let found = run(RUN).results();
     assert!(!found[0].references.contains(&"000200".to_owned()));
     has(&run(INDEX).err, "5 frames,");
-    refused(
-        folder.path(),
-        &format!("3 | {INDEX} --without 'no such frame' | no such frame"),
-    );
+    refused(folder.path(), &format!("3 | {INDEX} --without 'no such frame' | no such frame"));
 
     // An experiment asks the index that is named for each scene.
     let eval =
@@ -70,10 +64,7 @@ fn an_index_is_built_once_and_finds_the_reference() {
 
     // The queries of a run, which its folder names.
     run("eval street --query 200 --method fb -q --reference nearest:1 --out of-200");
-    has(
-        &run(&format!("{INDEX} --without of-200")).err,
-        "4 frames without 1",
-    );
+    has(&run(&format!("{INDEX} --without of-200")).err, "4 frames without 1");
 }
 
 #[test]

@@ -46,17 +46,13 @@ pub fn write_tum(folder: &Path) {
     let photo = wall(WIDTH, HEIGHT);
     let mut list = "# color images\n# timestamp filename\n".to_owned();
     for time in ["100.000000", "100.033000", "100.066000"] {
-        photo
-            .save(folder.join(format!("rgb/{time}.png")))
-            .expect("writable");
+        photo.save(folder.join(format!("rgb/{time}.png"))).expect("writable");
         list += &format!("{time} rgb/{time}.png\n");
     }
     fs::write(folder.join("rgb.txt"), list).expect("writable");
     let mut list = "# depth maps\n".to_owned();
     for time in ["100.011000", "100.054000", "100.070000"] {
-        depth(1.0 / 5000.0)
-            .save(folder.join(format!("depth/{time}.png")))
-            .expect("writable");
+        depth(1.0 / 5000.0).save(folder.join(format!("depth/{time}.png"))).expect("writable");
         list += &format!("{time} depth/{time}.png\n");
     }
     fs::write(folder.join("depth.txt"), list).expect("writable");
@@ -76,9 +72,7 @@ pub fn write_seven_scenes(folder: &Path) {
         fs::create_dir_all(&path).expect("writable");
         for frame in frames {
             let name = |end: &str| path.join(format!("frame-{frame:06}.{end}"));
-            wall(WIDTH, HEIGHT)
-                .save(name("color.png"))
-                .expect("writable");
+            wall(WIDTH, HEIGHT).save(name("color.png")).expect("writable");
             depth(0.001).save(name("depth.png")).expect("writable");
             let pose = format!("1\t0\t0\t{frame}\n0\t0\t-1\t2\n0\t1\t0\t3\n0\t0\t0\t1\n");
             fs::write(name("pose.txt"), pose).expect("writable");
@@ -166,9 +160,7 @@ fn a_depth_image_of_another_size_is_named() {
     let folder = TempDir::new().expect("a folder");
     write_tum(folder.path());
     let path = folder.path().join("depth/100.011000.png");
-    ImageBuffer::<Luma<u16>, Vec<u16>>::new(320, 240)
-        .save(&path)
-        .expect("writable");
+    ImageBuffer::<Luma<u16>, Vec<u16>>::new(320, 240).save(&path).expect("writable");
     let error = open(folder.path()).cloud(0).expect_err("small").to_string();
     damage::expect_words(&error, "640x480 ~ 320x240");
 }
@@ -184,11 +176,7 @@ fn seven_scenes_as_distributed_have_two_cameras() {
     assert_eq!((camera.fx, camera.cx), (525.0, 320.0));
     // Taken back to the depth camera, the cloud is the wall again.
     let cloud = scene.cloud(1).expect("is there");
-    let depth_camera = Intrinsics {
-        fx: 585.0,
-        fy: 585.0,
-        ..camera
-    };
+    let depth_camera = Intrinsics { fx: 585.0, fy: 585.0, ..camera };
     let world_from_depth = nalgebra::Isometry3::from_parts(
         nalgebra::Translation3::new(1.0, 2.0, 3.0),
         nalgebra::UnitQuaternion::from_axis_angle(
@@ -228,11 +216,8 @@ fn seven_scenes_open_by_split_and_by_sequence() {
 fn registered_depth_images_share_the_camera_of_the_photos() {
     let folder = TempDir::new().expect("a folder");
     write_seven_scenes(folder.path());
-    fs::write(
-        folder.path().join("camera-intrinsics.txt"),
-        "585 0 320\n0 585 240\n0 0 1\n",
-    )
-    .expect("writable");
+    fs::write(folder.path().join("camera-intrinsics.txt"), "585 0 320\n0 585 240\n0 0 1\n")
+        .expect("writable");
     for path in [folder.path().to_owned(), folder.path().join("seq-01")] {
         let scene = open(&path);
         let camera = scene.intrinsics(0);
@@ -279,11 +264,7 @@ fn a_point_of_the_real_kitchen_lands_on_itself_in_another_frame() {
     let [photo_a, photo_b] = [a, b].map(|frame| scene.photo(frame).expect("readable"));
     // What the photos show at both projections of a point differs less than elsewhere.
     let value = |photo: &GrayImage, pixel: Point2<f64>| {
-        f64::from(
-            photo
-                .get_pixel(pixel.x.round() as u32, pixel.y.round() as u32)
-                .0[0],
-        )
+        f64::from(photo.get_pixel(pixel.x.round() as u32, pixel.y.round() as u32).0[0])
     };
     let difference = |shift: f64| {
         let cloud = scene.cloud(a).expect("readable");

@@ -16,14 +16,8 @@ use crate::binary::arg;
 use crate::damage::open;
 use crate::{damage, data, layouts};
 
-const CAMERA: Intrinsics = Intrinsics {
-    fx: 60.0,
-    fy: 60.0,
-    cx: 39.5,
-    cy: 29.5,
-    width: 80,
-    height: 60,
-};
+const CAMERA: Intrinsics =
+    Intrinsics { fx: 60.0, fy: 60.0, cx: 39.5, cy: 29.5, width: 80, height: 60 };
 const FRAMES: usize = 100;
 /// Parked before the first and behind the second.
 const DRIVES: (usize, usize) = (30, 80);
@@ -39,12 +33,7 @@ fn scan(frame: usize) -> Vec<(Point3<f32>, f32)> {
     let depth = 60.0 - pose(frame).translation.vector.z as f32;
     let beams = (-20..=20).flat_map(|row| (-40..=40).map(move |column| (row, column)));
     beams
-        .map(|(row, column)| {
-            (
-                Point3::new(column as f32 * 0.5, row as f32 * 0.5, depth),
-                0.5,
-            )
-        })
+        .map(|(row, column)| (Point3::new(column as f32 * 0.5, row as f32 * 0.5, depth), 0.5))
         .collect()
 }
 
@@ -60,9 +49,7 @@ pub fn write_part(root: &Path, frames: Range<usize>) -> PathBuf {
         intrinsics: CAMERA,
         names: (0..FRAMES).map(|frame| frame.to_string()).collect(),
         poses: (0..FRAMES).map(pose).collect(),
-        times_s: (0..FRAMES)
-            .map(|frame| 1_000.0 + frame as f64 / 10.0)
-            .collect(),
+        times_s: (0..FRAMES).map(|frame| 1_000.0 + frame as f64 / 10.0).collect(),
         written: frames.clone().collect(),
         scanner: Point3::new(0.0, -0.5, 0.3),
     };
@@ -72,12 +59,7 @@ pub fn write_part(root: &Path, frames: Range<usize>) -> PathBuf {
         Rgb([block, block.wrapping_mul(3), 255 - block])
     });
     for index in frames {
-        let shot = Shot {
-            index,
-            photo: &photo,
-            scan: &scan(index),
-            depth: &|_| None,
-        };
+        let shot = Shot { index, photo: &photo, scan: &scan(index), depth: &|_| None };
         writer.frame(&shot).expect("writable");
     }
     writer.finish().expect("writable");
@@ -94,16 +76,8 @@ fn one_frame_in_ten_is_kept_while_the_car_moves() {
         .map(|frame| 10.0 * (kept.time_s(frame).expect("is known") - 1_000.0))
         .collect();
     assert!((6..=7).contains(&frames.len()), "{frames:?}");
-    assert!(
-        frames
-            .windows(2)
-            .all(|two| (two[1] - two[0] - 10.0).abs() < 1e-6),
-        "{frames:?}"
-    );
-    assert!(
-        frames[0] >= 20.0 && frames[frames.len() - 1] <= 90.0,
-        "{frames:?}"
-    );
+    assert!(frames.windows(2).all(|two| (two[1] - two[0] - 10.0).abs() < 1e-6), "{frames:?}");
+    assert!(frames[0] >= 20.0 && frames[frames.len() - 1] <= 90.0, "{frames:?}");
     let all = open(format!("{}:all", arg(&traversal)));
     assert_eq!(all.frames().len(), FRAMES);
     let camera = open(traversal.join("stereo/centre"));
@@ -138,11 +112,7 @@ fn scans_around_a_frame_are_gathered_in_its_camera() {
     assert!(cloud.len() > 200, "{}", cloud.len());
     // The wall of every scan is the same wall.
     let depth = 60.0 - pose(50).translation.vector.z as f32;
-    let off = cloud
-        .points
-        .iter()
-        .filter(|point| (point.z - depth).abs() > 0.2)
-        .count();
+    let off = cloud.points.iter().filter(|point| (point.z - depth).abs() > 0.2).count();
     assert!(off * 50 < cloud.len(), "{off} of {}", cloud.len());
 }
 
@@ -152,10 +122,7 @@ fn with_real_sdk(root: &Path, sdk: &Path) -> PathBuf {
     for part in ["models", "extrinsics"] {
         for entry in fs::read_dir(sdk.join(part)).expect("readable") {
             let file = entry.expect("readable").path();
-            let to = root
-                .join("sdk")
-                .join(part)
-                .join(file.file_name().expect("a file"));
+            let to = root.join("sdk").join(part).join(file.file_name().expect("a file"));
             let _ = fs::remove_file(&to);
             fs::write(&to, fs::read(&file).expect("readable")).expect("writable");
         }
@@ -173,9 +140,7 @@ fn with_real_sdk(root: &Path, sdk: &Path) -> PathBuf {
     fs::create_dir(traversal.join("mono_rear")).expect("writable");
     for entry in fs::read_dir(traversal.join("stereo/centre")).expect("readable") {
         let photo = entry.expect("readable").path();
-        let to = traversal
-            .join("mono_rear")
-            .join(photo.file_name().expect("a file"));
+        let to = traversal.join("mono_rear").join(photo.file_name().expect("a file"));
         fs::copy(photo, to).expect("writable");
     }
     traversal
@@ -191,20 +156,14 @@ fn the_cameras_of_the_sdk_stand_where_the_sdk_puts_them() {
     let camera = |folder: &str| open(format!("{}:all", arg(&traversal.join(folder))));
     let (front, rear) = (camera("stereo/centre"), camera("mono_rear"));
     assert_eq!(front.intrinsics(0).fx, 964.828979);
-    assert_eq!(
-        (rear.intrinsics(0).fx, rear.intrinsics(0).cx),
-        (400.0, 508.222931)
-    );
+    assert_eq!((rear.intrinsics(0).fx, rear.intrinsics(0).cx), (400.0, 508.222931));
     let at = |scene: &dyn Scene| scene.pose(40).expect("is known");
     let (front, rear) = (at(front.as_ref()), at(rear.as_ref()));
     // North is ahead; the rear camera looks back and down, 15° as its extrinsics say.
     let ahead = front * Vector3::z();
     let behind = rear * Vector3::z();
     assert!(ahead.angle(&Vector3::x()) < 0.1, "{ahead}");
-    assert!(
-        behind.angle(&-Vector3::x()) < 0.35 && behind.z > 0.1,
-        "{behind}"
-    );
+    assert!(behind.angle(&-Vector3::x()) < 0.35 && behind.z > 0.1, "{behind}");
     // Both hold their heads up: down is down.
     for pose in [front, rear] {
         assert!((pose * Vector3::y()).angle(&Vector3::z()) < 0.35);
@@ -212,10 +171,7 @@ fn the_cameras_of_the_sdk_stand_where_the_sdk_puts_them() {
     // Two metres behind the stereo camera.
     let apart = front.inverse() * rear;
     let apart = apart.translation.vector;
-    assert!(
-        (-2.3..-1.6).contains(&apart.z) && apart.x.abs() < 0.6,
-        "{apart}"
-    );
+    assert!((-2.3..-1.6).contains(&apart.z) && apart.x.abs() < 0.6, "{apart}");
 }
 
 #[test]

@@ -39,9 +39,7 @@ pub fn written(layout: &Layout, street: &Street, root: &Path) -> Box<dyn Scene> 
     for index in WRITTEN {
         let traversal = street.traversal();
         let scan = traversal.cloud(index).into_iter();
-        let scan: Vec<_> = scan
-            .map(|point| (point.position, point.reflectance))
-            .collect();
+        let scan: Vec<_> = scan.map(|point| (point.position, point.reflectance)).collect();
         let shot = Shot {
             index,
             photo: &traversal.image(index),
@@ -121,11 +119,7 @@ fn expect_frames(layout: &Layout, street: &Street, disk: &dyn Scene) {
 /// Of grey values, on average.
 fn mean_difference(a: &Option<RgbImage>, b: &Option<RgbImage>) -> f64 {
     let [a, b] = [a, b].map(|photo| photo.as_ref().expect("has colours").as_raw());
-    let sum: f64 = a
-        .iter()
-        .zip(b)
-        .map(|(a, b)| f64::from(a.abs_diff(*b)))
-        .sum();
+    let sum: f64 = a.iter().zip(b).map(|(a, b)| f64::from(a.abs_diff(*b))).sum();
     sum / a.len() as f64
 }
 
@@ -140,10 +134,7 @@ fn expect_cloud(layout: &Layout, street: &Street, disk: &dyn Scene) {
             for (read, written) in cloud.iter().zip(&scan) {
                 // As f32 from another origin.
                 let tolerance = 1e-6 * written.coords.norm() + 1e-6;
-                assert!(
-                    (read - written).norm() <= 4.0 * tolerance,
-                    "{read} {written}"
-                );
+                assert!((read - written).norm() <= 4.0 * tolerance, "{read} {written}");
             }
         }
         "colmap" => {
@@ -160,11 +151,7 @@ fn expect_cloud(layout: &Layout, street: &Street, disk: &dyn Scene) {
             assert!(cloud.len() > 3000, "{}", cloud.len());
             let from_other = street.pose(WRITTEN[1]).expect("is known").inverse()
                 * street.pose(WRITTEN[0]).expect("is known");
-            let other = street
-                .cloud(WRITTEN[0])
-                .expect("is there")
-                .points
-                .into_iter();
+            let other = street.cloud(WRITTEN[0]).expect("is there").points.into_iter();
             let all: Vec<Point3<f32>> = other
                 .map(|point| (from_other * point.cast::<f64>()).cast())
                 .chain(scan.iter().copied())
@@ -172,10 +159,7 @@ fn expect_cloud(layout: &Layout, street: &Street, disk: &dyn Scene) {
             for read in cloud.iter().step_by(97) {
                 let pixel = camera.project(&read.cast()).expect("is ahead");
                 assert!(camera.contains(&pixel));
-                assert!(
-                    all.iter().any(|point| (read - point).norm() < 0.04),
-                    "{read}"
-                );
+                assert!(all.iter().any(|point| (read - point).norm() < 0.04), "{read}");
             }
         }
         "tum" => {
@@ -207,25 +191,16 @@ fn expect_a_pose(layout: &Layout, disk: &dyn Scene) {
         matches: None,
     };
     let outcome = localize(&problem, Method::FB, &Params::default());
-    let pose = outcome
-        .pose
-        .unwrap_or_else(|failure| panic!("{}: {failure}", layout.name));
+    let pose = outcome.pose.unwrap_or_else(|failure| panic!("{}: {failure}", layout.name));
     let error = PoseError::between(&disk.pose(1).expect("is known"), &pose);
-    assert!(
-        error.translation_m < 0.5 && error.rotation_deg < 1.0,
-        "{}: {error}",
-        layout.name
-    );
+    assert!(error.translation_m < 0.5 && error.rotation_deg < 1.0, "{}: {error}", layout.name);
 }
 
 /// Errors of FB over some seeds \[m, °\], the middle one of each.
 fn middle_error(problem: &Problem, truth: &Pose) -> (f64, f64) {
     const SEEDS: u64 = 5;
     let errors = (0..SEEDS).map(|seed| {
-        let problem = Problem {
-            seed,
-            ..problem.clone()
-        };
+        let problem = Problem { seed, ..problem.clone() };
         let outcome = localize(&problem, Method::FB, &Params::default());
         let pose = outcome.pose.unwrap_or_else(|failure| panic!("{failure}"));
         PoseError::between(truth, &pose)
@@ -236,10 +211,7 @@ fn middle_error(problem: &Problem, truth: &Pose) -> (f64, f64) {
         values.sort_by(f64::total_cmp);
         values[values.len() / 2]
     };
-    (
-        middle(|error| error.translation_m),
-        middle(|error| error.rotation_deg),
-    )
+    (middle(|error| error.translation_m), middle(|error| error.rotation_deg))
 }
 
 /// What the layout of RobotCar changes, part by part: the photos, of which a third of the values is left,
@@ -290,10 +262,7 @@ fn what_is_lost_on_the_way_through_robotcar_is_known_part_by_part() {
         (0.05, 0.2),
         (0.15, 0.3),
     ]) {
-        assert!(
-            found.0 < limit.0 && found.1 < limit.1,
-            "{found:?} {limit:?}"
-        );
+        assert!(found.0 < limit.0 && found.1 < limit.1, "{found:?} {limit:?}");
     }
 }
 

@@ -22,11 +22,7 @@ pub struct Sample {
 impl Sample {
     /// A scene that lies in a folder which somebody else removes.
     pub fn of(folder: &Path) -> Self {
-        Self {
-            root: folder.to_owned(),
-            argument: text(folder),
-            _folder: Box::new(()),
-        }
+        Self { root: folder.to_owned(), argument: text(folder), _folder: Box::new(()) }
     }
 }
 
@@ -72,11 +68,7 @@ fn sample(format: &str) -> Sample {
         }
         other => panic!("a small scene of the format {other} is wanted here"),
     };
-    Sample {
-        root: written,
-        argument: text(&place),
-        _folder: Box::new(folder),
-    }
+    Sample { root: written, argument: text(&place), _folder: Box::new(folder) }
 }
 
 fn text(path: &Path) -> String {
@@ -97,19 +89,9 @@ fn every_format_is_recognised_by_itself_alone() {
     for (name, sample) in samples() {
         for entry in scene::ALL {
             let is_recognized = (entry.recognizes)(&sample.argument);
-            assert_eq!(
-                is_recognized,
-                entry.name == name,
-                "{} by {}",
-                name,
-                entry.name
-            );
+            assert_eq!(is_recognized, entry.name == name, "{} by {}", name, entry.name);
         }
-        assert!(
-            !scene::ALL
-                .iter()
-                .any(|entry| (entry.recognizes)(&format!("{name}-not-there")))
-        );
+        assert!(!scene::ALL.iter().any(|entry| (entry.recognizes)(&format!("{name}-not-there"))));
     }
     let empty = TempDir::new().expect("a folder");
     let argument = empty.path().to_str().expect("a plain path");
@@ -120,19 +102,13 @@ fn every_format_is_recognised_by_itself_alone() {
 fn every_format_yields_frames_that_fit_together() {
     for (name, sample) in samples() {
         let scene = open(&sample.argument);
-        assert!(
-            !scene.name().contains(&*sample.root.to_string_lossy()),
-            "{name}"
-        );
+        assert!(!scene.name().contains(&*sample.root.to_string_lossy()), "{name}");
         let frames = scene.frames();
         assert!(frames.len() > 1, "{name}");
         let unique: BTreeSet<&String> = frames.iter().collect();
         assert_eq!(unique.len(), frames.len(), "{name}");
         // Recordings are called by them.
-        assert!(
-            frames.iter().all(|frame| !frame.contains(['/', '\\'])),
-            "{name}"
-        );
+        assert!(frames.iter().all(|frame| !frame.contains(['/', '\\'])), "{name}");
         let mut references = 0;
         for frame in (0..frames.len()).take(3) {
             assert_eq!(scene.find(&frames[frame]).expect("is there"), frame);
@@ -141,17 +117,12 @@ fn every_format_yields_frames_that_fit_together() {
             assert_eq!(query.photo.dimensions(), (camera.width, camera.height));
             assert!(camera.fx > 0.0 && camera.fy > 0.0, "{name}");
             if scene.pose(frame).is_some() && scene.has_cloud(frame) {
-                let tuple = scene
-                    .reference(frame)
-                    .unwrap_or_else(|error| panic!("{error}"));
+                let tuple = scene.reference(frame).unwrap_or_else(|error| panic!("{error}"));
                 let in_view = |point: &&nalgebra::Point3<f32>| {
                     let pixel = camera.project(&point.cast());
                     pixel.is_some_and(|pixel| camera.contains(&pixel))
                 };
-                assert!(
-                    tuple.cloud.points.iter().any(|point| in_view(&point)),
-                    "{name}"
-                );
+                assert!(tuple.cloud.points.iter().any(|point| in_view(&point)), "{name}");
                 references += 1;
             } else {
                 assert!(scene.reference(frame).is_err(), "{name}");

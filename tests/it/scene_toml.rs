@@ -52,11 +52,7 @@ fn points() -> Vec<[f64; 3]> {
     let rows = (-6..=6).flat_map(|row| (-16..=16).map(move |column| (column, row)));
     rows.map(|(column, row)| {
         let [x, y, z] = ORIGIN;
-        [
-            x + 0.5 * f64::from(column),
-            y + 0.5 * f64::from(row),
-            z + 10.0,
-        ]
+        [x + 0.5 * f64::from(column), y + 0.5 * f64::from(row), z + 10.0]
     })
     .collect()
 }
@@ -75,9 +71,7 @@ fn expect_the_wall(scene: &dyn Scene, tolerance_m: f32) {
         .collect();
     assert_eq!(cloud.len(), expected.len());
     for point in &cloud.points {
-        let nearest = expected
-            .iter()
-            .position(|other| (other - point).norm() <= tolerance_m);
+        let nearest = expected.iter().position(|other| (other - point).norm() <= tolerance_m);
         expected.swap_remove(nearest.unwrap_or_else(|| panic!("{point} is not of the wall")));
     }
 }
@@ -122,11 +116,7 @@ fn poses_may_be_by_time_and_the_other_way_round() {
     assert_eq!(scene.time_s(1), Some(10.1));
     assert!(scene.pose(2).is_none());
 
-    with(
-        folder.path(),
-        "[camera]",
-        "pose = \"camera_from_world\"\n[camera]",
-    );
+    with(folder.path(), "[camera]", "pose = \"camera_from_world\"\n[camera]");
     let pose = open(folder.path()).pose(1).expect("is known");
     assert_eq!(pose, Pose::translation(-2.0, -2.0, -3.0));
 }
@@ -214,10 +204,7 @@ fn las(path: &Path) {
     builder.point_format = Format::new(if is_layered { 7 } else { 0 }).expect("a format");
     builder.point_format.is_compressed = path.extension().is_some_and(|end| end == "laz");
     for (axis, offset) in ORIGIN.into_iter().enumerate() {
-        let transform = las::Transform {
-            scale: 0.001,
-            offset,
-        };
+        let transform = las::Transform { scale: 0.001, offset };
         match axis {
             0 => builder.transforms.x = transform,
             1 => builder.transforms.y = transform,
@@ -290,10 +277,7 @@ fn every_frame_may_have_a_cloud_of_its_own() {
     let scene = described("");
     assert!(scene.has_cloud(0) && !scene.has_cloud(1) && scene.has_cloud(2));
     let points = scene.cloud(0).expect("is there").points;
-    assert_eq!(
-        points,
-        [Point3::new(0.0, 0.0, 9.0), Point3::new(1.0, 2.0, 3.0)]
-    );
+    assert_eq!(points, [Point3::new(0.0, 0.0, 9.0), Point3::new(1.0, 2.0, 3.0)]);
     let error = scene.cloud(1).expect_err("has none").to_string();
     has(&error, "2 frames have one: img0 … img2");
 
@@ -305,10 +289,7 @@ fn every_frame_may_have_a_cloud_of_its_own() {
     let [x, y, z] = ORIGIN;
     let map = format!("{} {y} {}\n", x + 1.5, z + 8.0);
     fs::write(scans.join("img2.xyz"), map).expect("writable");
-    let points = described("frame = \"world\"\n")
-        .cloud(2)
-        .expect("is there")
-        .points;
+    let points = described("frame = \"world\"\n").cloud(2).expect("is there").points;
     assert_eq!(points, [Point3::new(1.5, 0.0, 6.0)]);
 }
 

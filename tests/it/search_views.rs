@@ -32,9 +32,7 @@ fn span(window: &Harness<'_, App>, method: Method) -> Span {
 fn told<E: DebugEvent + Clone>(window: &Harness<'_, App>, method: Method) -> Vec<(usize, E)> {
     let records = span(window, method).records;
     let all = app(window).run().records();
-    records
-        .filter_map(|at| Some((at, E::from_event(&all[at].event)?.clone())))
-        .collect()
+    records.filter_map(|at| Some((at, E::from_event(&all[at].event)?.clone()))).collect()
 }
 
 fn move_to(window: &mut Harness<'_, App>, cursor: usize) {
@@ -101,22 +99,13 @@ fn hovering_a_cell_tells_its_recorded_cost_and_sends_its_pose() {
     move_to_end(&mut window, Method::MI);
     let scored = told::<PoseScored>(&window, Method::MI);
     let mut seen = Vec::new();
-    for (switch, map) in [
-        ("", "Cost map"),
-        ("Coverage", "Coverage map"),
-        ("Coverage", "Cost map"),
-    ] {
+    for (switch, map) in [("", "Cost map"), ("Coverage", "Coverage map"), ("Coverage", "Cost map")]
+    {
         if !switch.is_empty() {
             click(&window, switch);
             window.run_steps(2);
         }
-        for (right, down) in [
-            (0.5, 0.5),
-            (0.25, 0.5),
-            (0.5, 0.3),
-            (0.52, 0.34),
-            (0.7, 0.6),
-        ] {
+        for (right, down) in [(0.5, 0.5), (0.25, 0.5), (0.5, 0.3), (0.52, 0.34), (0.7, 0.6)] {
             let readout = hover(&mut window, map, right, down).expect("a cell");
             let (_, event) = scored
                 .iter()
@@ -170,34 +159,20 @@ fn the_maps_fill_as_the_cursor_goes_and_a_cell_of_half_a_search_is_as_recorded()
     let mut window = finished();
     send(&mut window, Command::Maximize(Some("surface")));
     let scored = told::<PoseScored>(&window, Method::MI);
-    for &(at, ref event) in scored
-        .iter()
-        .filter(|(_, event)| !event.phase.is_yaw())
-        .step_by(11)
-    {
+    for &(at, ref event) in scored.iter().filter(|(_, event)| !event.phase.is_yaw()).step_by(11) {
         move_to(&mut window, at);
         let before = |other: &&(usize, PoseScored)| other.0 <= at && other.1.phase == event.phase;
         let tried = scored.iter().filter(before).count();
         let name = text(&window, "Cost map");
         let phase = event.phase.name();
-        assert!(
-            name.contains(&format!("{phase}, {tried} of ")),
-            "{name} at {at}"
-        );
+        assert!(name.contains(&format!("{phase}, {tried} of ")), "{name} at {at}");
     }
     // The first rows are those behind the reference, at the foot of the map.
-    let middle = scored
-        .iter()
-        .filter(|(_, e)| e.phase == Phase::PositionCoarse);
+    let middle = scored.iter().filter(|(_, e)| e.phase == Phase::PositionCoarse);
     let (at, _) = *middle.clone().nth(15).expect("29 positions");
     move_to(&mut window, at);
     let readout = hover(&mut window, "Cost map", 0.5, 0.75).expect("a cell that was tried");
-    assert!(
-        middle
-            .clone()
-            .any(|(_, event)| readout.starts_with(&words(event))),
-        "{readout}"
-    );
+    assert!(middle.clone().any(|(_, event)| readout.starts_with(&words(event))), "{readout}");
     let untried = hover(&mut window, "Cost map", 0.5, 0.1);
     assert_eq!(untried, None);
     text(&window, "not tried yet at (0.0, 3.0) m");
@@ -211,19 +186,13 @@ fn the_nmi_that_is_shown_is_one_less_the_recorded_cost() {
         move_to(&mut window, at);
         let cost = view.comparison.score.cost.expect("textured walls");
         let shown = text(&window, "NMI = ");
-        assert!(
-            shown.ends_with(&format!(" = {:.4}", 1.0 - cost)),
-            "{shown}, not 1 - {cost}"
-        );
+        assert!(shown.ends_with(&format!(" = {:.4}", 1.0 - cost)), "{shown}, not 1 - {cost}");
         let Some(Explanation::JointHistogram(histogram)) = &view.comparison.explanation else {
             panic!("MI explains itself by a histogram");
         };
         let bits = histogram.query_entropy / 2_f64.ln();
         let entropies = text(&window, "H(Q) = ");
-        assert!(
-            entropies.starts_with(&format!("H(Q) = {bits:.3} bit, ")),
-            "{entropies}"
-        );
+        assert!(entropies.starts_with(&format!("H(Q) = {bits:.3} bit, ")), "{entropies}");
     }
 }
 
@@ -266,10 +235,7 @@ fn the_residuals_of_pm_say_what_was_ignored() {
     };
     let counted = weights.counted.iter().filter(|counted| **counted).count();
     text(&window, &format!("{counted} pixels count"));
-    text(
-        &window,
-        &format!("{} are ignored", weights.counted.len() - counted),
-    );
+    text(&window, &format!("{} are ignored", weights.counted.len() - counted));
     let median = weights.threshold.sqrt();
     text(&window, &format!("The median difference is {median:.2}"));
 }
@@ -282,26 +248,18 @@ fn ransac_counts_the_trials_and_a_click_goes_to_one() {
     for (made, (at, tried)) in trials.iter().enumerate().step_by(trials.len() / 5 + 1) {
         move_to(&mut window, *at);
         let head = text(&window, &format!("{} trials made", made + 1));
-        assert!(
-            head.ends_with(&format!("{} needed", tried.trial.trials_needed)),
-            "{head}"
-        );
+        assert!(head.ends_with(&format!("{} needed", tried.trial.trials_needed)), "{head}");
         text(&window, &format!("Trial {made}"));
     }
     move_to(&mut window, trials[trials.len() - 1].0);
     window.run_steps(2);
-    window
-        .get_by_label_contains("log likelihood by trial")
-        .click();
+    window.get_by_label_contains("log likelihood by trial").click();
     window.run_steps(3);
     let cursor = app(&window).cursor();
     let place = trials.iter().position(|(at, _)| *at == cursor);
     let place = place.expect("the cursor is at a trial");
     let middle = trials.len() / 2;
-    assert!(
-        place.abs_diff(middle) < trials.len() / 3,
-        "trial {place}, not about {middle}"
-    );
+    assert!(place.abs_diff(middle) < trials.len() / 3, "trial {place}, not about {middle}");
 }
 
 #[test]
@@ -313,17 +271,8 @@ fn the_acceptance_test_is_told_in_words() {
     move_to(&mut window, at);
     text(&window, "Accepted");
     let needed = judged.acceptance.needed.expect("enough correspondences");
-    text(
-        &window,
-        &format!(
-            "{} places of inliers ≥ {needed} needed",
-            judged.acceptance.inliers
-        ),
-    );
-    text(
-        &window,
-        &format!("{:.2} m from the reference ≤ 3.30 m", judged.distance_m),
-    );
+    text(&window, &format!("{} places of inliers ≥ {needed} needed", judged.acceptance.inliers));
+    text(&window, &format!("{:.2} m from the reference ≤ 3.30 m", judged.distance_m));
 }
 
 #[test]
@@ -333,14 +282,7 @@ fn every_moment_of_a_run_can_be_drawn() {
     // Each view says what is missing, or names what it draws.
     let views: [(&str, &[&str]); 3] = [
         ("surface", &["Nothing is searched yet", "Cost map"]),
-        (
-            "histogram",
-            &[
-                "No synthetic view yet",
-                "Joint histogram of",
-                "Residuals of",
-            ],
-        ),
+        ("histogram", &["No synthetic view yet", "Joint histogram of", "Residuals of"]),
         ("ransac", &["No hypothesis yet", "log likelihood by trial"]),
     ];
     for (view, said) in views {
@@ -376,12 +318,7 @@ fn the_costs_from_the_result_to_the_truth_end_in_those_of_both() {
     let reported = result.cost.as_ref().expect("a cost");
     let at = |share: f64| {
         let found = along.scores.iter().find(|(place, _)| *place == share);
-        found
-            .expect("both ends are tried")
-            .1
-            .expect("tried")
-            .cost
-            .expect("covered")
+        found.expect("both ends are tried").1.expect("tried").cost.expect("covered")
     };
     assert_eq!(at(0.0), reported.best);
     assert_eq!(at(1.0), reported.truth.expect("known"));
@@ -395,28 +332,19 @@ fn the_costs_from_the_result_to_the_truth_end_in_those_of_both() {
         assert_eq!(compared.map(|one| one.score), *score);
     }
     let words = text(&window, "Cost from the result to the truth: Cost ");
-    assert!(
-        words.contains(&format!("{:.4} at the result", reported.best)),
-        "{words}"
-    );
+    assert!(words.contains(&format!("{:.4} at the result", reported.best)), "{words}");
     let truth = format!("{:.4} at the truth", reported.truth.expect("known"));
     assert!(words.contains(&truth), "{words}");
     let error = result.error.expect("known").translation_m;
     assert!(words.contains(&format!("{error:.2} m away")), "{words}");
 
     // Pointing at the middle of the picture looks at a pose between both.
-    let plot = window
-        .get_by_label_contains("Cost from the result to the truth")
-        .rect();
+    let plot = window.get_by_label_contains("Cost from the result to the truth").rect();
     window.hover_at(plot.center());
     window.run_steps(3);
     let hovered = app(&window).hovered.expect("a pose");
     let way = hovered.translation.vector - along_from(&window);
-    let length = app(&window)
-        .cost_along(Method::MI)
-        .expect("traced")
-        .line
-        .length_m();
+    let length = app(&window).cost_along(Method::MI).expect("traced").line.length_m();
     assert!(way.norm() < 1.3 * length, "{way} of {length}");
     // A truth that is hidden has no line.
     send(&mut window, Command::ShowTruth);
@@ -472,10 +400,7 @@ fn the_dense_map_is_the_cheapest_heading_of_each_position_and_takes_the_camera_t
         let pose = problem.world_from_query(&offset.reference_from_camera());
         estimator.score_at(&problem, &pose)
     };
-    let (cells, least_covered) = (
-        filled.cheapest().scores.len(),
-        filled.cheapest().least_covered,
-    );
+    let (cells, least_covered) = (filled.cheapest().scores.len(), filled.cheapest().least_covered);
     let mut turned = 0;
     for (offset, best) in (0..cells).step_by(7).filter_map(|cell| filled.at(cell)) {
         assert_eq!(score(&offset), Some(best), "{offset:?}");
@@ -494,10 +419,7 @@ fn the_dense_map_is_the_cheapest_heading_of_each_position_and_takes_the_camera_t
     assert!(turned > 3, "nowhere is another heading cheaper");
     let (least, best) = filled.minimum().expect("textured walls");
     let words = text(&window, "Lowest of all: cost ");
-    assert!(
-        words.contains(&format!("{:.4}", best.cost.expect("covered"))),
-        "{words}"
-    );
+    assert!(words.contains(&format!("{:.4}", best.cost.expect("covered"))), "{words}");
     has(&words, " from the truth");
 
     // A click on its mark in the legend takes the camera there, heading and all.
@@ -529,16 +451,10 @@ fn the_dense_map_is_the_cheapest_heading_of_each_position_and_takes_the_camera_t
             right if right < -1e-6 => format!("{:.1}° right", -right),
             _ => "straight ahead".to_owned(),
         };
-        assert!(
-            readout.contains(&side.replace(".0°", "°")),
-            "{readout}: {side}"
-        );
+        assert!(readout.contains(&side.replace(".0°", "°")), "{readout}: {side}");
         headings.push(degrees);
     }
-    assert!(
-        headings.iter().any(|degrees| degrees.abs() > 1.0),
-        "{headings:?}"
-    );
+    assert!(headings.iter().any(|degrees| degrees.abs() > 1.0), "{headings:?}");
 
     // Without it the search's own map is back, and the filled one is kept.
     window.key_press(egui::Key::F);
@@ -583,11 +499,7 @@ fn a_dense_map_that_nobody_looks_at_stands_still_and_is_gone_on_with() {
     let state = app(&window);
     let params = &state.setup.task.params;
     let problem = &state.run().loaded.as_ref().expect("loaded").problems[0];
-    let grid = GridParams {
-        coarse_step_m: 0.1,
-        yaw_step_deg: 0.5,
-        ..params.grid.clone()
-    };
+    let grid = GridParams { coarse_step_m: 0.1, yaw_step_deg: 0.5, ..params.grid.clone() };
     let least_covered = whole.cheapest().least_covered;
     let mut at_once = DenseSurface::new(3.0, &grid, least_covered).expect("small");
     let estimator = posescope::estimator::entry(Method::MI).make(params);
@@ -602,10 +514,9 @@ fn a_dense_map_that_nobody_looks_at_stands_still_and_is_gone_on_with() {
     }
 
     // Other parameters make it another map.
-    window.state_mut().send(Command::SetParam {
-        key: "grid.yaw_range".to_owned(),
-        value: "1".to_owned(),
-    });
+    window
+        .state_mut()
+        .send(Command::SetParam { key: "grid.yaw_range".to_owned(), value: "1".to_owned() });
     wait(&mut window, |app| {
         let map = app.app_state().dense_map(Method::MI);
         map.is_none_or(|map| map.surface().expect("small").hypotheses() != whole.hypotheses())
@@ -629,10 +540,7 @@ fn pixels_of(picture: &image::RgbaImage, color: egui::Color32) -> usize {
 
 #[test]
 fn the_truth_is_seen_whatever_else_is_there() {
-    let setup = posescope::app::Setup {
-        mode: RunMode::Running,
-        ..setup()
-    };
+    let setup = posescope::app::Setup { mode: RunMode::Running, ..setup() };
     let Some(crate::painted::PaintedWindow { mut window, .. }) =
         crate::painted::painted(setup, [760.0, 520.0])
     else {
@@ -654,10 +562,7 @@ fn the_truth_is_seen_whatever_else_is_there() {
     let alone = pixels_of(&map(&mut window), truth);
     assert!(alone > 20, "{alone}");
     // The camera goes to the truth, where its own mark lies on that place too.
-    send(
-        &mut window,
-        Command::JumpCamera(posescope::app::NamedPose::Truth),
-    );
+    send(&mut window, Command::JumpCamera(posescope::app::NamedPose::Truth));
     wait(&mut window, |app| !app.app_state().is_probing());
     window.run_steps(3);
     let beneath = pixels_of(&map(&mut window), truth);

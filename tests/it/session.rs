@@ -91,10 +91,7 @@ fn results(session: &Session) -> Vec<QueryResult> {
 #[test]
 fn a_session_waits_at_the_first_event_and_steps_into_over_and_out() {
     let mut session = start(job(1), RunMode::Paused, &[]);
-    assert_eq!(
-        run_until_idle(&mut session),
-        RunState::Paused { breakpoint: None }
-    );
+    assert_eq!(run_until_idle(&mut session), RunState::Paused { breakpoint: None });
     assert_eq!(session.run().len(), 1);
     let first = &session.run().records()[0].event;
     assert_eq!(starts(first), Some(Stage::Estimator(Method::FB)));
@@ -111,10 +108,7 @@ fn a_session_waits_at_the_first_event_and_steps_into_over_and_out() {
     assert_eq!(ends(&event), Some(Stage::Match));
     let event = order(&mut session, RunMode::StepOut);
     assert_eq!(ends(&event), Some(Stage::Estimator(Method::FB)));
-    assert_eq!(
-        run_until_idle(&mut session),
-        RunState::Paused { breakpoint: None }
-    );
+    assert_eq!(run_until_idle(&mut session), RunState::Paused { breakpoint: None });
 }
 
 #[test]
@@ -137,14 +131,8 @@ fn stepping_gives_the_results_of_running() {
 
 #[test]
 fn a_breakpoint_stops_a_run_and_says_which_it_was() {
-    let mut session = start(
-        job(1),
-        RunMode::Running,
-        &["mi.yaw_coarse", "inliers < 1000"],
-    );
-    let stopped_by = |text: &str| RunState::Paused {
-        breakpoint: Some(text.to_owned()),
-    };
+    let mut session = start(job(1), RunMode::Running, &["mi.yaw_coarse", "inliers < 1000"]);
+    let stopped_by = |text: &str| RunState::Paused { breakpoint: Some(text.to_owned()) };
     assert_eq!(run_until_idle(&mut session), stopped_by("inliers < 1000"));
     let event = order(&mut session, RunMode::Running);
     assert_eq!(starts(&event).map(Stage::name), Some("yaw_coarse"));
@@ -173,10 +161,7 @@ fn a_running_session_pauses_and_a_paused_one_stays() {
     assert_eq!(session.state(), &RunState::Running);
     session.set_mode(RunMode::Paused);
     release.send(()).expect("the worker waits");
-    assert_eq!(
-        run_until_idle(&mut session),
-        RunState::Paused { breakpoint: None }
-    );
+    assert_eq!(run_until_idle(&mut session), RunState::Paused { breakpoint: None });
     let told = session.run().len();
     session.set_mode(RunMode::Paused);
     std::thread::sleep(Duration::from_millis(30));
@@ -198,11 +183,7 @@ fn a_paused_session_can_be_cancelled_and_a_dropped_one_ends() {
 
     let scene = Arc::new(Walls::new());
     let mut dropped = start(
-        Job {
-            references: scene.clone(),
-            queries: scene.clone(),
-            ..job(1)
-        },
+        Job { references: scene.clone(), queries: scene.clone(), ..job(1) },
         RunMode::Paused,
         &[],
     );
@@ -237,10 +218,7 @@ fn a_session_pauses_and_stops_within_a_lattice() {
     let in_the_lattice = |session: &Session| session.run().len() > 500;
     wait(&mut session, in_the_lattice);
     session.set_mode(RunMode::Paused);
-    assert_eq!(
-        run_until_idle(&mut session),
-        RunState::Paused { breakpoint: None }
-    );
+    assert_eq!(run_until_idle(&mut session), RunState::Paused { breakpoint: None });
     let told = session.run().len();
     // A million hypotheses are to come, most of which were not even scored.
     assert!(told < 500_000, "{told}");
@@ -255,10 +233,7 @@ fn a_session_pauses_and_stops_within_a_lattice() {
 
 #[test]
 fn references_that_are_ranked_can_be_stopped_too() {
-    let mut ranked = Job {
-        chosen: Default::default(),
-        ..job(1)
-    };
+    let mut ranked = Job { chosen: Default::default(), ..job(1) };
     let selection = "matches:2".parse().expect("a selection");
     ranked.task.protocol.select(selection);
     let mut stopped = UntilStopped(Arc::new(AtomicBool::new(true)));
@@ -326,13 +301,7 @@ fn a_second_run_on_frames_at_hand_reuses_what_it_can() {
         .filter(|bar| bar.depth == 2 && bar.reused)
         .map(|bar| bar.stage.name())
         .collect();
-    let direct = [
-        "color",
-        "position_coarse",
-        "position_fine",
-        "yaw_coarse",
-        "yaw_fine",
-    ];
+    let direct = ["color", "position_coarse", "position_fine", "yaw_coarse", "yaw_fine"];
     // FB detects nothing anew; PM and MI have all but their assessment.
     assert_eq!(reused[0], "detect");
     assert_eq!(reused[1..6], direct);
@@ -341,10 +310,7 @@ fn a_second_run_on_frames_at_hand_reuses_what_it_can() {
 
 #[test]
 fn several_references_are_fused_as_without_a_session() {
-    let mut several = Job {
-        chosen: vec![0, 2].into(),
-        ..job(1)
-    };
+    let mut several = Job { chosen: vec![0, 2].into(), ..job(1) };
     several.task.protocol.fusions = Fusion::all().collect();
     let task = several.task.clone();
     let mut expected = Vec::new();
@@ -361,27 +327,17 @@ fn several_references_are_fused_as_without_a_session() {
         Ok::<(), LocalizeError>(())
     };
     localizer
-        .localize(
-            0,
-            1,
-            &[request],
-            &task.protocol.methods,
-            &mut NoObserver,
-            keep,
-        )
+        .localize(0, 1, &[request], &task.protocol.methods, &mut NoObserver, keep)
         .expect("good data");
 
     let mut session = start(several, RunMode::Running, &["fusion"]);
-    let at_fusion = RunState::Paused {
-        breakpoint: Some("fusion".to_owned()),
-    };
+    let at_fusion = RunState::Paused { breakpoint: Some("fusion".to_owned()) };
     assert_eq!(run_until_idle(&mut session), at_fusion);
     session.set_breakpoints(Breakpoints::default());
     order(&mut session, RunMode::Running);
     assert_eq!(run_until_idle(&mut session), RunState::Finished);
-    let (fused, alone): (Vec<_>, Vec<_>) = results(&session)
-        .into_iter()
-        .partition(|result| result.fusion.is_some());
+    let (fused, alone): (Vec<_>, Vec<_>) =
+        results(&session).into_iter().partition(|result| result.fusion.is_some());
     assert_eq!(fused, expected);
     assert_eq!(alone.len(), 4 * 2);
     let run = session.run();

@@ -76,13 +76,10 @@ pub fn write(root: &Path, frames: &[usize]) {
     fs::create_dir_all(root.join("poses")).expect("writable");
     fs::write(folder.join("calib.txt"), CALIBRATION).expect("writable");
     let count = frames.iter().max().map_or(0, |last| last + 1);
-    let times: String = (0..count)
-        .map(|f| format!("{:.1}\n", f as f64 / 10.0))
-        .collect();
+    let times: String = (0..count).map(|f| format!("{:.1}\n", f as f64 / 10.0)).collect();
     fs::write(folder.join("times.txt"), times).expect("writable");
-    let poses: String = (0..count)
-        .map(|frame| format!("1 0 0 0 0 1 0 0 0 0 1 {frame}\n"))
-        .collect();
+    let poses: String =
+        (0..count).map(|frame| format!("1 0 0 0 0 1 0 0 0 0 1 {frame}\n")).collect();
     fs::write(root.join("poses/42.txt"), poses).expect("writable");
     for frame in frames {
         let image = folder.join(format!("image_0/{frame:06}.png"));

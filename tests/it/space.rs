@@ -60,11 +60,7 @@ fn drag(window: &mut Harness<'_, App>, from: egui::Pos2, by: egui::Vec2, held: e
 fn every_moment_of_a_run_is_drawn_and_the_cameras_come_one_by_one() {
     let mut window = finished();
     let run = app(&window).run().clone();
-    let ends: Vec<usize> = run
-        .spans()
-        .iter()
-        .map(|span| span.records.end - 1)
-        .collect();
+    let ends: Vec<usize> = run.spans().iter().map(|span| span.records.end - 1).collect();
     // Every hundredth record, and all around the ends of the estimators.
     let moments =
         (0..run.len()).filter(|at| at % 100 == 0 || ends.iter().any(|end| at.abs_diff(*end) <= 2));
@@ -73,10 +69,7 @@ fn every_moment_of_a_run_is_drawn_and_the_cameras_come_one_by_one() {
         assert!(headline(&window).contains("points"));
     }
     send(&mut window, Command::First);
-    assert!(
-        window.query_by_label_contains("FB: ").is_none(),
-        "FB has no pose yet"
-    );
+    assert!(window.query_by_label_contains("FB: ").is_none(), "FB has no pose yet");
     send(&mut window, Command::MoveCursor(ends[0]));
     assert!(window.query_by_label_contains("FB: ").is_some());
 }
@@ -111,12 +104,7 @@ fn one_looks_through_a_camera_and_leaves_it_by_turning() {
     choose(&mut window, "Through FB");
     assert!(headline(&window).contains("Through FB"));
     let pane = window.get_by_label_contains("3-D view of").rect();
-    drag(
-        &mut window,
-        pane.center(),
-        egui::vec2(30.0, 0.0),
-        egui::Modifiers::NONE,
-    );
+    drag(&mut window, pane.center(), egui::vec2(30.0, 0.0), egui::Modifiers::NONE);
     assert!(headline(&window).contains("Drag: turn"));
     // A click on a label does the same.
     choose(&mut window, "Whole scene");
@@ -141,19 +129,14 @@ fn shifting_takes_the_labels_along() {
     drag(&mut window, corner, by, egui::Modifiers::SHIFT);
     let moved = place(&window) - before;
     // The camera is nearer to the eye than the ground that the pointer holds.
-    assert!(
-        moved.x >= 20.0 && moved.y >= 12.0 && moved.length() < 60.0,
-        "{moved}"
-    );
+    assert!(moved.x >= 20.0 && moved.y >= 12.0 && moved.length() < 60.0, "{moved}");
 }
 
 /// The number that follows some words.
 fn number_after(text: &str, words: &str) -> f64 {
     let rest = text.split(words).nth(1).expect("the words are there");
-    let number: String = rest
-        .chars()
-        .take_while(|c| c.is_ascii_digit() || "-.".contains(*c))
-        .collect();
+    let number: String =
+        rest.chars().take_while(|c| c.is_ascii_digit() || "-.".contains(*c)).collect();
     number.parse().expect("a number")
 }
 
@@ -178,19 +161,13 @@ fn the_cost_under_the_pointer_is_the_recorded_one() {
         let right_m = number_after(&words, "at (");
         let forward_m = number_after(&words, &format!("at ({right_m:.1}, "));
         let run = app(&window).run();
-        let span = run
-            .spans()
-            .iter()
-            .rfind(|span| span.part.method() == Some(method))
-            .expect("MI ran");
+        let span =
+            run.spans().iter().rfind(|span| span.part.method() == Some(method)).expect("MI ran");
         let at_place = run
             .all_until::<PhaseSearched>(span.records.end - 1)
             .map(|(_, searched)| &searched.surface)
             .filter(|surface| {
-                matches!(
-                    surface.lattice.phase,
-                    Phase::PositionCoarse | Phase::PositionFine
-                )
+                matches!(surface.lattice.phase, Phase::PositionCoarse | Phase::PositionFine)
             })
             .flat_map(|surface| {
                 surface.lattice.hypotheses().filter_map(|(cell, offset)| {
@@ -201,17 +178,11 @@ fn the_cost_under_the_pointer_is_the_recorded_one() {
             })
             .collect::<Vec<_>>();
         assert!(
-            at_place
-                .iter()
-                .any(|recorded| (recorded - cost).abs() < 5.1e-5),
+            at_place.iter().any(|recorded| (recorded - cost).abs() < 5.1e-5),
             "{words}: {at_place:?}"
         );
     }
-    assert!(
-        found >= 2,
-        "the pointer met {found} cells: {}",
-        headline(&window)
-    );
+    assert!(found >= 2, "the pointer met {found} cells: {}", headline(&window));
 }
 
 #[test]
@@ -224,10 +195,7 @@ fn the_ground_has_the_colours_of_the_cost_map() {
     }
     let mut window = window(setup);
     run_until_idle(&mut window);
-    send(
-        &mut window,
-        Command::SelectMethod(posescope::method::Method::MI),
-    );
+    send(&mut window, Command::SelectMethod(posescope::method::Method::MI));
     let bar = |window: &mut Harness<'_, App>, view| {
         send(window, Command::Maximize(Some(view)));
         label(window, "Colours of cost")
@@ -239,14 +207,10 @@ fn the_ground_has_the_colours_of_the_cost_map() {
     let mut spans = run.spans().iter();
     let span = spans.find(|span| span.part.method() == Some(posescope::method::Method::MI));
     let end = span.expect("MI ran").records.end;
-    let surfaces: Vec<_> = run
-        .all_until::<PhaseSearched>(end - 1)
-        .map(|(_, searched)| &searched.surface)
-        .collect();
+    let surfaces: Vec<_> =
+        run.all_until::<PhaseSearched>(end - 1).map(|(_, searched)| &searched.surface).collect();
     let lowest = |phase| {
-        let of_phase = surfaces
-            .iter()
-            .filter(|surface| surface.lattice.phase == phase);
+        let of_phase = surfaces.iter().filter(|surface| surface.lattice.phase == phase);
         let costs = of_phase.flat_map(|surface| {
             (0..surface.scores.len()).filter_map(|cell| surface.eligible_cost(cell))
         });
@@ -254,10 +218,7 @@ fn the_ground_has_the_colours_of_the_cost_map() {
     };
     let (coarse, fine) = (lowest(Phase::PositionCoarse), lowest(Phase::PositionFine));
     assert!(fine < coarse, "{fine} {coarse}");
-    assert!(
-        on_ground.contains(&format!("{fine:.4} is bright")),
-        "{on_ground}"
-    );
+    assert!(on_ground.contains(&format!("{fine:.4} is bright")), "{on_ground}");
 }
 
 #[test]

@@ -34,10 +34,7 @@ fn a_run_of_an_earlier_program_is_resumed() {
     let file = |name: &str| sequence.path().join("run").join(name);
     let text = sequence.text("run/run.toml");
     let version = format!("version = \"{}\"", env!("CARGO_PKG_VERSION"));
-    write(
-        file("run.toml"),
-        text.replacen("version = \"0.1.0\"", &version, 1),
-    );
+    write(file("run.toml"), text.replacen("version = \"0.1.0\"", &version, 1));
     let results = sequence.text("run/results.jsonl");
     let first: String = results.split_inclusive('\n').take(2).collect();
     write(file("results.jsonl"), &first);
@@ -51,10 +48,7 @@ fn a_run_of_an_earlier_program_is_resumed() {
 fn a_run_of_an_earlier_program_serves_as_baseline_and_is_exported() {
     let sequence = earlier_run();
     sequence.run(&format!("{EVAL} now --baseline run")).ok();
-    has(
-        &sequence.run("compare run now").out,
-        "of 6 results in both runs",
-    );
+    has(&sequence.run("compare run now").out, "of 6 results in both runs");
     let line = "results run --as csv --where 'method = mi and fusion = r-wavg'";
     assert_eq!(sequence.run(line).ok().out.lines().count(), 4);
 }
@@ -103,10 +97,7 @@ fn what_is_wrong_in_a_result_is_told_with_its_line() {
         let bad = lines[3].replacen(from, to, 1);
         assert_ne!(bad, lines[3]);
         lines[3] = bad;
-        write(
-            sequence.path().join("run/results.jsonl"),
-            lines.join("\n") + "\n",
-        );
+        write(sequence.path().join("run/results.jsonl"), lines.join("\n") + "\n");
         for command in ["results run --as csv", "view run", "compare run run"] {
             let words = format!("results.jsonl:4:  ~ {words}");
             sequence.run(command).fails_in_one_line(3, &words);

@@ -14,10 +14,7 @@ use crate::window::{app, finish, finished, is_said, press, send, setup, wait};
 const MI: Part = Part::Reference(Method::MI, 0);
 
 fn grey() -> Harness<'static, App> {
-    finished(Setup {
-        query: GREY,
-        ..setup()
-    })
+    finished(Setup { query: GREY, ..setup() })
 }
 
 /// The last records of the stages right below a part of the run.
@@ -55,10 +52,7 @@ fn the_arrows_go_from_stage_to_stage_and_from_the_last_to_the_cause() {
 #[test]
 fn a_lecture_shows_no_cause_and_inspect_shows_it_again() {
     let mut window = grey();
-    send(
-        &mut window,
-        Command::ShowPart(Part::Reference(Method::FB, 0)),
-    );
+    send(&mut window, Command::ShowPart(Part::Reference(Method::FB, 0)));
     assert!(is_said(&window, "0 and 146 keypoints"));
     press(&mut window, Modifiers::NONE, Key::F3);
     assert!(!app(&window).options.shows_why);
@@ -123,15 +117,9 @@ fn a_click_on_a_small_picture_of_a_proof_makes_it_large() {
     let canvas = window.state().canvas();
     let pictures = |window: &Harness<'_, App>| -> Vec<(egui::Rect, String)> {
         let nodes = window.query_all_by_role(Role::Image);
-        let nodes = nodes.map(|node| {
-            (
-                node.rect(),
-                node.accesskit_node().label().unwrap_or_default(),
-            )
-        });
-        nodes
-            .filter(|(rect, _)| canvas.contains_rect(*rect))
-            .collect()
+        let nodes =
+            nodes.map(|node| (node.rect(), node.accesskit_node().label().unwrap_or_default()));
+        nodes.filter(|(rect, _)| canvas.contains_rect(*rect)).collect()
     };
     let before = pictures(&window);
     let (small, title) = before.last().expect("a small picture").clone();
@@ -148,10 +136,7 @@ fn a_click_on_a_small_picture_of_a_proof_makes_it_large() {
 #[test]
 fn without_the_truth_the_last_picture_is_what_decided() {
     let mut window = finished(setup());
-    assert!(
-        !is_said(&window, "MI why: "),
-        "a right pose needs no reason"
-    );
+    assert!(!is_said(&window, "MI why: "), "a right pose needs no reason");
     assert!(is_said(&window, "MI: ● right"));
     press(&mut window, Modifiers::NONE, Key::G);
     window.run_steps(3);
@@ -159,8 +144,5 @@ fn without_the_truth_the_last_picture_is_what_decided() {
     for grade in ["● right", "▲ wrong"] {
         assert!(!is_said(&window, grade), "{grade}");
     }
-    assert!(
-        is_said(&window, "likely right"),
-        "the confidence stands for the grade"
-    );
+    assert!(is_said(&window, "likely right"), "the confidence stands for the grade");
 }

@@ -26,11 +26,7 @@ fn a_sweep_has_a_run_per_value_a_table_and_curves_and_goes_on() {
     has(&sequence.text("sweep/median.svg"), "gamma");
 
     // One value is lost on the way; the others are as they were, and threads make no difference.
-    let files = [
-        "gamma=1.25/results.jsonl",
-        "gamma=2.00/results.jsonl",
-        "median.svg",
-    ];
+    let files = ["gamma=1.25/results.jsonl", "gamma=2.00/results.jsonl", "median.svg"];
     let texts = || files.map(|file| sequence.text(&format!("sweep/{file}")));
     let before = texts();
     fs::remove_dir_all(sequence.path().join("sweep/gamma=2.00")).expect("is there");
@@ -39,10 +35,7 @@ fn a_sweep_has_a_run_per_value_a_table_and_curves_and_goes_on() {
 
     let line = format!("{EVAL} ratio --sweep fb.ratio=0.6:0.8:0.2 --gate 'success@fb > 2'");
     sequence.run(&line).fails_with(1, "fb.ratio=0.8: gate");
-    has(
-        &sequence.text("ratio/fb.ratio=0.6/run.toml"),
-        "ratio = 0.6\n",
-    );
+    has(&sequence.text("ratio/fb.ratio=0.6/run.toml"), "ratio = 0.6\n");
 }
 
 #[test]
@@ -50,15 +43,10 @@ fn what_cannot_be_swept_is_one_line() {
     let sequence = SmallSequence::write();
     for (sweep, words) in [
         ("gamma=1", "KEY=FROM:TO:STEP expected"),
-        (
-            "fb.ratio=0.5:1.5:0.5",
-            "`fb.ratio` takes 0.1 … 1, not `1.5`",
-        ),
+        ("fb.ratio=0.5:1.5:0.5", "`fb.ratio` takes 0.1 … 1, not `1.5`"),
         ("fog=0:2:1", "`fog` takes 0 … 1, not `2`"),
     ] {
-        sequence
-            .run(&format!("{EVAL} nowhere --sweep {sweep}"))
-            .fails_with(2, words);
+        sequence.run(&format!("{EVAL} nowhere --sweep {sweep}")).fails_with(2, words);
     }
     assert!(!sequence.path().join("nowhere").exists());
 }
@@ -67,15 +55,11 @@ fn what_cannot_be_swept_is_one_line() {
 fn what_failed_is_asked_again_otherwise_and_compared() {
     let sequence = SmallSequence::of(&[0, 1, 2, 3]);
     sequence.blacken("000002");
-    sequence
-        .run(&format!("{EVAL} before --seed 3 --right 2m,10deg"))
-        .ok();
+    sequence.run(&format!("{EVAL} before --seed 3 --right 2m,10deg")).ok();
     let results = |run: &str| -> Vec<QueryResult> {
         objects(&sequence.text(&format!("{run}/results.jsonl")))
     };
-    let failed = results("before")
-        .into_iter()
-        .filter(|result| result.grade.is_failure());
+    let failed = results("before").into_iter().filter(|result| result.grade.is_failure());
     let failed: BTreeSet<String> = failed.map(|result| result.query).collect();
     assert!(failed.contains("000002") && !failed.contains("000000"));
 
@@ -94,8 +78,5 @@ fn what_failed_is_asked_again_otherwise_and_compared() {
     // Where nothing failed there is nothing to do.
     let line = format!("{EVAL} fine --query 0 --method fb --right 9m,90deg");
     sequence.run(&line).ok();
-    has(
-        &sequence.run("eval --rerun-failed fine").ok().err,
-        "No query failed in",
-    );
+    has(&sequence.run("eval --rerun-failed fine").ok().err, "No query failed in");
 }

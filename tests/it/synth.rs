@@ -42,9 +42,7 @@ fn in_memory(street: &Street, query: usize, reference: usize) -> Problem {
             photo: photo(reference),
             intrinsics,
             world_from_camera: drive.world_from_camera(reference),
-            cloud: Cloud {
-                points: scan.iter().map(|point| point.position).collect(),
-            },
+            cloud: Cloud { points: scan.iter().map(|point| point.position).collect() },
             memo: Memo::off(),
         }),
         uncertainty_radius_m: 15.0,
@@ -157,10 +155,7 @@ fn a_full_disk_leaves_no_half_file() {
     let said = Said::by(command.env("POSESCOPE_CACHE", ""));
     said.fails_in_one_line(3, ".bin: File too large");
     let left = contents(folder.path()).into_iter().map(|file| file.0);
-    let expected = [
-        "poses/overcast.txt",
-        "sequences/overcast/calib.txt",
-        "sequences/overcast/times.txt",
-    ];
+    let expected =
+        ["poses/overcast.txt", "sequences/overcast/calib.txt", "sequences/overcast/times.txt"];
     assert!(left.eq(expected.map(PathBuf::from)));
 }

@@ -41,10 +41,7 @@ fn the_tour_leads_from_a_failure_to_a_right_pose() {
     setup.task.scene = "street:snow".to_owned();
     setup.task.protocol.query_scene = vec!["street:night".to_owned()];
     setup.task.protocol.radii_m = vec![15.0];
-    setup
-        .task
-        .protocol
-        .select("nearest:1".parse().expect("a choice"));
+    setup.task.protocol.select("nearest:1".parse().expect("a choice"));
     setup.task.protocol.explain = 12;
     let Some(PaintedWindow { mut window, .. }) = painted(setup, SIZE) else {
         return;
@@ -56,16 +53,9 @@ fn the_tour_leads_from_a_failure_to_a_right_pose() {
         pictures.push((window.render().expect("a picture"), seconds));
     };
     send(&mut window, Command::RunAllQueries);
-    wait(&mut window, |app| {
-        app.app_state().results.len() == frames.len()
-    });
-    wait(&mut window, |app| {
-        app.app_state().queries.progress().is_none()
-    });
-    send(
-        &mut window,
-        Command::Arrange(posescope::app::Arrangement::Batch),
-    );
+    wait(&mut window, |app| app.app_state().results.len() == frames.len());
+    wait(&mut window, |app| app.app_state().queries.progress().is_none());
+    send(&mut window, Command::Arrange(posescope::app::Arrangement::Batch));
     take(&mut window, 2.5);
     let result = app(&window).results[&450]
         .iter()
@@ -76,13 +66,8 @@ fn the_tour_leads_from_a_failure_to_a_right_pose() {
     take(&mut window, 2.0);
     send(&mut window, Command::OpenSelected);
     take(&mut window, 3.5);
-    let explained = app(&window)
-        .run()
-        .results()
-        .find(|result| result.method == Method::MI);
-    let explanation = explained
-        .and_then(|result| result.explanation.clone())
-        .expect("explained");
+    let explained = app(&window).run().results().find(|result| result.method == Method::MI);
+    let explanation = explained.and_then(|result| result.explanation.clone()).expect("explained");
     let best = explanation.best().expect("something helped").args.clone();
     send(&mut window, Command::Try(best));
     finish(&mut window);

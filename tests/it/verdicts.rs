@@ -76,10 +76,8 @@ fn the_window_counts_the_failures_that_the_run_counts() {
         sequence.run(&line).ok();
         read_rows(&sequence.path().join(out)).expect("results")
     };
-    let mut errors: Vec<f64> = eval("1m,5deg", "first")
-        .iter()
-        .filter_map(|row| Some(row.error?.translation_m))
-        .collect();
+    let mut errors: Vec<f64> =
+        eval("1m,5deg", "first").iter().filter_map(|row| Some(row.error?.translation_m)).collect();
     errors.sort_by(f64::total_cmp);
     // Half of them are right.
     let right = format!("{}m,180deg", errors[errors.len() / 2]);
@@ -92,10 +90,8 @@ fn the_window_counts_the_failures_that_the_run_counts() {
     for (query, result) in read_results(&out).expect("a file").enumerate() {
         results.insert(query, vec![result.expect("a result")]);
     }
-    let setup = Setup {
-        offered: results.keys().copied().filter(|query| *query < 3).collect(),
-        ..setup()
-    };
+    let setup =
+        Setup { offered: results.keys().copied().filter(|query| *query < 3).collect(), ..setup() };
     let mut window = window_with_results(setup, results);
     run_until_idle(&mut window);
     send(&mut window, Command::Maximize(Some("queries")));

@@ -15,11 +15,7 @@ fn view(sequence: &SmallSequence, words: &str) -> Said {
 #[test]
 fn without_a_display_it_records_instead() {
     let sequence = SmallSequence::write();
-    let said = view(
-        &sequence,
-        "sequences/42 --query 5 --reference 4 --method fb",
-    )
-    .ok();
+    let said = view(&sequence, "sequences/42 --query 5 --reference 4 --method fb").ok();
     has(&said.err, "no display is set ~ instead");
     has(&said.out, "000005");
     assert!(sequence.path().join("recordings/000005.rrd").is_file());
@@ -43,11 +39,8 @@ fn the_options_beside_the_folder_of_a_run_are_obeyed_or_refused() {
     let said = view("--query 0 --method mi --right 0.000001m,1deg");
     has(&said.out, "▲ wrong");
     has(&view("--query 0 --reference 3 --method fb").out, "000003");
-    for (option, value) in [
-        ("--query-scene", "street"),
-        ("--camera", "1,1,1,1"),
-        ("--limit", "3"),
-    ] {
+    for (option, value) in [("--query-scene", "street"), ("--camera", "1,1,1,1"), ("--limit", "3")]
+    {
         view(&format!("--query 0 {option} {value}")).fails_with(2, option);
     }
 }

@@ -63,10 +63,7 @@ pub fn window_with_results(
 /// Draws frames until the worker needs somebody.
 pub fn run_until_idle(window: &mut Harness<'_, App>) -> RunState {
     wait(window, |app| {
-        !matches!(
-            app.app_state().run_state(),
-            RunState::Loading | RunState::Running
-        )
+        !matches!(app.app_state().run_state(), RunState::Loading | RunState::Running)
     });
     window.step();
     app(window).run_state().clone()
@@ -76,9 +73,7 @@ pub fn run_until_idle(window: &mut Harness<'_, App>) -> RunState {
 #[track_caller]
 pub fn finish(window: &mut Harness<'_, App>) {
     // After a key, the run counts as paused until its next message arrives.
-    wait(window, |app| {
-        *app.app_state().run_state() == RunState::Finished
-    });
+    wait(window, |app| *app.app_state().run_state() == RunState::Finished);
     assert_eq!(run_until_idle(window), RunState::Finished);
 }
 
@@ -108,10 +103,7 @@ pub fn wait(window: &mut Harness<'_, App>, is_so: impl Fn(&App) -> bool) {
 
 /// A window whose run is over.
 pub fn finished(setup: Setup) -> Harness<'static, App> {
-    let mut window = window(Setup {
-        mode: RunMode::Running,
-        ..setup
-    });
+    let mut window = window(Setup { mode: RunMode::Running, ..setup });
     finish(&mut window);
     window
 }
@@ -155,24 +147,13 @@ pub fn results(window: &Harness<'_, App>) -> Vec<QueryResult> {
 fn headless(params: &Params) -> Vec<QueryResult> {
     let scene = Walls::new();
     let mut results = Vec::new();
-    let request = Request {
-        radius_m: 3.0,
-        references: vec![0].into(),
-        fusions: Vec::new(),
-        setting: None,
-    };
+    let request =
+        Request { radius_m: 3.0, references: vec![0].into(), fusions: Vec::new(), setting: None };
     Localizer::new(&scene, &scene, params, 7)
-        .localize(
-            0,
-            1,
-            &[request],
-            &Method::PAPER,
-            &mut NoObserver,
-            |result, _| {
-                results.push(result);
-                Ok::<(), posescope::localize::LocalizeError>(())
-            },
-        )
+        .localize(0, 1, &[request], &Method::PAPER, &mut NoObserver, |result, _| {
+            results.push(result);
+            Ok::<(), posescope::localize::LocalizeError>(())
+        })
         .expect("readable");
     results
 }
@@ -180,10 +161,7 @@ fn headless(params: &Params) -> Vec<QueryResult> {
 #[test]
 fn the_window_waits_at_the_first_step_and_steps_by_keys_and_buttons() {
     let mut window = window(setup());
-    assert_eq!(
-        run_until_idle(&mut window),
-        RunState::Paused { breakpoint: None }
-    );
+    assert_eq!(run_until_idle(&mut window), RunState::Paused { breakpoint: None });
     assert_eq!(app(&window).run().len(), 1);
     window.get_by_label("Step").click();
     wait(&mut window, |app| app.app_state().run().len() == 2);
@@ -230,9 +208,7 @@ fn a_breakpoint_that_is_typed_stops_the_run_and_is_named() {
     window.run_steps(2);
     window.get_by_label("New breakpoint").focus();
     window.step();
-    window
-        .get_by_label("New breakpoint")
-        .type_text("mi.yaw_coarse");
+    window.get_by_label("New breakpoint").type_text("mi.yaw_coarse");
     window.step();
     window.get_by_label("Add").click();
     window.run_steps(2);
@@ -241,9 +217,7 @@ fn a_breakpoint_that_is_typed_stops_the_run_and_is_named() {
     assert_eq!(breakpoints.len(), 1);
     press(&mut window, Modifiers::NONE, Key::F5);
     wait(&mut window, |app| app.app_state().run().len() > 10);
-    let stopped = RunState::Paused {
-        breakpoint: Some("mi.yaw_coarse".to_owned()),
-    };
+    let stopped = RunState::Paused { breakpoint: Some("mi.yaw_coarse".to_owned()) };
     assert_eq!(run_until_idle(&mut window), stopped);
     assert!(is_said(&window, "mi.yaw_coarse"));
 }
@@ -260,14 +234,8 @@ fn what_went_wrong_is_explained_at_a_key_and_no_longer_at_the_next() {
     run_until_idle(&mut window);
     press(&mut window, Modifiers::NONE, Key::F9);
     finish(&mut window);
-    window
-        .get_all_by_label("Try what would help")
-        .next()
-        .expect("it is offered")
-        .click();
-    wait(&mut window, |app| {
-        app.app_state().setup.task.protocol.explain > 0
-    });
+    window.get_all_by_label("Try what would help").next().expect("it is offered").click();
+    wait(&mut window, |app| app.app_state().setup.task.protocol.explain > 0);
     finish(&mut window);
     let explanation = |window: &Harness<'_, App>| {
         let run = app(window).run();
@@ -310,10 +278,9 @@ fn a_wrong_breakpoint_is_refused_with_what_there_is() {
 fn a_changed_parameter_runs_again_only_what_depends_on_it_and_keeps_the_place() {
     let mut window = finished(setup());
     send(&mut window, Command::SelectMethod(Method::MI));
-    window.state_mut().send(Command::SetParam {
-        key: "grid.yaw_step".to_owned(),
-        value: "2".to_owned(),
-    });
+    window
+        .state_mut()
+        .send(Command::SetParam { key: "grid.yaw_step".to_owned(), value: "2".to_owned() });
     window.step();
     finish(&mut window);
     let state = app(&window);
@@ -322,9 +289,7 @@ fn a_changed_parameter_runs_again_only_what_depends_on_it_and_keeps_the_place() 
     assert_eq!(state.cursor() + 1, span.records.end);
     let reused = |name: &str| -> Vec<bool> {
         let bars = state.run().stages().iter();
-        bars.filter(|bar| bar.stage.name() == name)
-            .map(|bar| bar.reused)
-            .collect()
+        bars.filter(|bar| bar.stage.name() == name).map(|bar| bar.reused).collect()
     };
     assert_eq!(reused("detect"), [true, true]);
     assert!(reused("position_coarse").iter().all(|reused| *reused));
@@ -339,10 +304,7 @@ fn a_changed_parameter_runs_again_only_what_depends_on_it_and_keeps_the_place() 
 fn two_settings_are_compared_and_their_differences_marked() {
     let mut window = finished(setup());
     press(&mut window, Modifiers::NONE, Key::P);
-    window.state_mut().send(Command::SetParam {
-        key: "mi.bins".to_owned(),
-        value: "8".to_owned(),
-    });
+    window.state_mut().send(Command::SetParam { key: "mi.bins".to_owned(), value: "8".to_owned() });
     window.step();
     run_until_idle(&mut window);
     send(&mut window, Command::SelectMethod(Method::MI));
@@ -376,11 +338,8 @@ fn the_next_failure_is_found_once_all_queries_were_run() {
 #[test]
 fn the_run_over_all_queries_and_a_run_with_old_settings_stop_soon() {
     let scene: Arc<dyn Scene> = Arc::new(Walls::new());
-    let mut setup = Setup {
-        references: Arc::clone(&scene),
-        queries: Arc::clone(&scene),
-        ..setup()
-    };
+    let mut setup =
+        Setup { references: Arc::clone(&scene), queries: Arc::clone(&scene), ..setup() };
     setup.task.protocol.methods = vec![Method::PM];
     // A million hypotheses.
     for change in ["grid.fine_range=5", "grid.fine_step=0.01"] {
@@ -412,10 +371,7 @@ fn the_run_over_all_queries_and_a_run_with_old_settings_stop_soon() {
     // The first time there is nothing to stop but the session, which waits at its first event.
     stop_by(Command::SetSeed(8));
     stop_by(Command::RunAllQueries);
-    stop_by(Command::SetParam {
-        key: "grid.yaw_step".to_owned(),
-        value: "2".to_owned(),
-    });
+    stop_by(Command::SetParam { key: "grid.yaw_step".to_owned(), value: "2".to_owned() });
     stop_by(Command::SetReferences(vec![2]));
     assert!(is_said(&window, "its settings were changed"));
 }
@@ -445,10 +401,9 @@ fn a_session_is_saved_and_restored() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("session.json");
     let mut window = finished(setup());
-    window.state_mut().send(Command::SetParam {
-        key: "fb.ratio".to_owned(),
-        value: "0.8".to_owned(),
-    });
+    window
+        .state_mut()
+        .send(Command::SetParam { key: "fb.ratio".to_owned(), value: "0.8".to_owned() });
     window.step();
     run_until_idle(&mut window);
     window.state_mut().send(Command::MoveCursor(40));
@@ -458,9 +413,7 @@ fn a_session_is_saved_and_restored() {
     window.state_mut().send(Command::SelectQuery(2));
     window.step();
     run_until_idle(&mut window);
-    window
-        .state_mut()
-        .send(Command::RestoreSession(path.clone()));
+    window.state_mut().send(Command::RestoreSession(path.clone()));
     window.step();
     run_until_idle(&mut window);
     let state = app(&window);
@@ -614,9 +567,7 @@ fn the_camera_in_hand_has_costs_of_its_own() {
     for (method, comparison) in &probe.comparisons {
         let results = results(&window);
         let result = results.iter().find(|result| result.method == *method);
-        let report = result
-            .and_then(|result| result.cost.as_ref())
-            .expect("a cost");
+        let report = result.and_then(|result| result.cost.as_ref()).expect("a cost");
         assert_eq!(comparison.score.cost, report.truth);
     }
     press(&mut window, Modifiers::ALT, Key::ArrowUp);

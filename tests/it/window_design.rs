@@ -17,10 +17,7 @@ const SMALL: [f32; 2] = [1280.0, 800.0];
 
 /// A window of a size whose run is over, with so many pixels to a point.
 fn finished(size: [f32; 2], pixels_per_point: f32) -> Harness<'static, App> {
-    let setup = Setup {
-        mode: RunMode::Running,
-        ..setup()
-    };
+    let setup = Setup { mode: RunMode::Running, ..setup() };
     let mut window = Harness::builder()
         .with_size(size)
         .with_pixels_per_point(pixels_per_point)
@@ -54,10 +51,7 @@ struct Drawn {
 fn texts(shapes: &[ClippedShape]) -> Vec<Drawn> {
     let mut grounds: Vec<(Rect, Option<Color32>)> = Vec::new();
     let mut drawn = Vec::new();
-    for ClippedShape {
-        clip_rect, shape, ..
-    } in shapes
-    {
+    for ClippedShape { clip_rect, shape, .. } in shapes {
         take(shape, *clip_rect, &mut grounds, &mut drawn);
     }
     drawn
@@ -135,12 +129,8 @@ fn hides_number(galley: &egui::Galley) -> bool {
 fn first_row(text: &egui::epaint::TextShape) -> Rect {
     let rows = text.galley.rows.iter();
     let mut written = rows.filter(|row| !row.glyphs.is_empty());
-    let row = written
-        .next()
-        .map(egui::epaint::text::PlacedRow::rect_without_leading_space);
-    row.map_or(text.visual_bounding_rect(), |row| {
-        row.translate(text.pos.to_vec2())
-    })
+    let row = written.next().map(egui::epaint::text::PlacedRow::rect_without_leading_space);
+    row.map_or(text.visual_bounding_rect(), |row| row.translate(text.pos.to_vec2()))
 }
 
 /// The colour that was there at a place, as the rectangles that were drawn make it.
@@ -162,11 +152,7 @@ fn contrast(a: Color32, b: Color32) -> f64 {
     let luminance = |color: Color32| {
         let linear = |channel: u8| {
             let share = f64::from(channel) / 255.0;
-            if share <= 0.04045 {
-                share / 12.92
-            } else {
-                ((share + 0.055) / 1.055).powf(2.4)
-            }
+            if share <= 0.04045 { share / 12.92 } else { ((share + 0.055) / 1.055).powf(2.4) }
         };
         0.2126 * linear(color.r()) + 0.7152 * linear(color.g()) + 0.0722 * linear(color.b())
     };
@@ -253,9 +239,7 @@ fn no_word_is_cut_off_at_any_scale() {
                 let is_cut = missing > 3.0 && !SIDEWAYS.contains(&place);
                 if is_cut || text.loses_number {
                     let words: String = text.words.chars().take(60).collect();
-                    cut.insert(format!(
-                        "{size:?} at {scale}, {place}: {missing:.0} of {words}"
-                    ));
+                    cut.insert(format!("{size:?} at {scale}, {place}: {missing:.0} of {words}"));
                 }
             }
         });
@@ -288,11 +272,7 @@ fn a_long_line_of_the_log_is_broken_and_none_is_cut() {
     let log: Vec<Drawn> = texts(shapes);
     assert!(log.len() > 10);
     for text in log {
-        assert!(
-            text.rect.right() <= text.clip.right() + 1.0,
-            "{}",
-            text.words
-        );
+        assert!(text.rect.right() <= text.clip.right() + 1.0, "{}", text.words);
     }
 }
 

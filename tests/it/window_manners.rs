@@ -77,9 +77,7 @@ fn what_is_told_goes_by_itself_and_what_went_wrong_stays() {
     assert!(is_said(&window, "MI has not begun yet"));
     // The bar does not say that anything works while the run is paused.
     assert!(!is_said(&window, "at work"));
-    window
-        .state_mut()
-        .send(Command::SetBreakpoints(vec!["nonsense".to_owned()]));
+    window.state_mut().send(Command::SetBreakpoints(vec!["nonsense".to_owned()]));
     // A step is a quarter of a second.
     window.run_steps(60);
     assert!(!is_said(&window, "MI has not begun yet"));
@@ -111,9 +109,7 @@ fn any_action_is_found_by_its_words_and_done_with_enter() {
     run_until_idle(&mut window);
     press(&mut window, Modifiers::COMMAND, Key::K);
     window.run_steps(3);
-    window
-        .get_by_label("Search for an action")
-        .type_text("ground truth");
+    window.get_by_label("Search for an action").type_text("ground truth");
     window.run_steps(3);
     press(&mut window, Modifiers::NONE, Key::Enter);
     window.run_steps(3);

@@ -55,10 +55,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let reference =
         ReferenceTuple::new("reference", photo(walls::photo(0.0))?, CAMERA, start, cloud)?;
     // As if taken at dusk: darker, and with less contrast.
-    let dusk = walls::photo(1.0)
-        .iter()
-        .map(|value| 20 + value / 4)
-        .collect();
+    let dusk = walls::photo(1.0).iter().map(|value| 20 + value / 4).collect();
     let query = Query::new("query", photo(dusk)?, CAMERA)?;
     let problem = Problem::new(query, reference, 3.0)?;
 
@@ -66,10 +63,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let outcome = localize_by(&estimator, &problem, &mut Trace::off())?;
     let truth = Pose::translation(0.0, 0.0, 1.0);
     let error = PoseError::between(&truth, &outcome.pose?);
-    println!(
-        "{:.3} m and {:.2}° from the truth",
-        error.translation_m, error.rotation_deg
-    );
+    println!("{:.3} m and {:.2}° from the truth", error.translation_m, error.rotation_deg);
     if let Some(cost) = outcome.cost {
         println!(
             "cost {:.4} after {} poses; {:?} with shuffled pixels",

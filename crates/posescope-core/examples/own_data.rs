@@ -49,10 +49,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         if let Some(last) = history.last::<FeaturesClassified>() {
             let is_inlier = |state: &&FeatureState| matches!(state, FeatureState::Inlier { .. });
             let inliers = last.states.iter().filter(is_inlier).count();
-            println!(
-                "    {inliers} of {} features agree on it",
-                last.states.len()
-            );
+            println!("    {inliers} of {} features agree on it", last.states.len());
         }
         for (_, PhaseSearched { surface, .. }) in history.all() {
             let tried = surface.scores.iter().flatten().count();

@@ -23,14 +23,7 @@ pub struct Intrinsics {
     pub height: u32,
 }
 
-bits_of_fields!(Intrinsics {
-    fx,
-    fy,
-    cx,
-    cy,
-    width,
-    height
-});
+bits_of_fields!(Intrinsics { fx, fy, cx, cy, width, height });
 
 impl Intrinsics {
     /// The pixel at which a point of the camera frame \[m\] is seen, or `None` where it is not in
@@ -49,11 +42,7 @@ impl Intrinsics {
     /// The point at depth `z` \[m\] behind a pixel, in the camera frame.
     #[inline]
     pub fn unproject(&self, pixel: &Point2<f64>, z: f64) -> Point3<f64> {
-        Point3::new(
-            (pixel.x - self.cx) / self.fx * z,
-            (pixel.y - self.cy) / self.fy * z,
-            z,
-        )
+        Point3::new((pixel.x - self.cx) / self.fx * z, (pixel.y - self.cy) / self.fy * z, z)
     }
 
     /// The direction of unit length in which a pixel looks, in the camera frame.

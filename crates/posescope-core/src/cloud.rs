@@ -14,9 +14,7 @@ pub struct Cloud {
 /// From x right, y down, z forward of the camera that the cloud is registered with \[m\].
 impl FromIterator<[f32; 3]> for Cloud {
     fn from_iter<I: IntoIterator<Item = [f32; 3]>>(points: I) -> Self {
-        Self {
-            points: points.into_iter().map(Point3::from).collect(),
-        }
+        Self { points: points.into_iter().map(Point3::from).collect() }
     }
 }
 

@@ -68,9 +68,7 @@ pub fn shuffled(pairs: &[IntensityPair], seed: u64) -> Vec<IntensityPair> {
     let mut values: Vec<f32> = pairs.iter().map(|pair| pair.synthetic).collect();
     values.shuffle(&mut Pcg64::seed_from_u64(seed));
     let dealt = pairs.iter().zip(values);
-    dealt
-        .map(|(pair, synthetic)| IntensityPair { synthetic, ..*pair })
-        .collect()
+    dealt.map(|(pair, synthetic)| IntensityPair { synthetic, ..*pair }).collect()
 }
 
 /// A robust dissimilarity of two images over the pixels they share.
@@ -228,11 +226,7 @@ pub struct Entry {
 }
 
 /// Every cost.
-pub const ALL: &[Entry] = &[
-    photometric::ENTRY,
-    mutual_information::ENTRY,
-    orientation::ENTRY,
-];
+pub const ALL: &[Entry] = &[photometric::ENTRY, mutual_information::ENTRY, orientation::ENTRY];
 
 /// The parameters of every cost, in the order of [`ALL`].
 #[derive(Debug)]
@@ -281,10 +275,7 @@ mod tests {
     use proptest::prelude::*;
 
     fn pairs(values: &[(f32, f32)]) -> Vec<IntensityPair> {
-        values
-            .iter()
-            .map(|&(query, synthetic)| IntensityPair { query, synthetic })
-            .collect()
+        values.iter().map(|&(query, synthetic)| IntensityPair { query, synthetic }).collect()
     }
 
     /// The cost of the pairs as the grid search asks for it, after that of other pairs.

@@ -60,9 +60,7 @@ impl ProjectedCloudIndex {
             })
             .unzip();
         // The tree refuses only an empty set of points, which then has no depth anywhere.
-        let tree = ImmutableKdTree::new_from_slice(&pixels)
-            .ok()
-            .filter(|_| !pixels.is_empty());
+        let tree = ImmutableKdTree::new_from_slice(&pixels).ok().filter(|_| !pixels.is_empty());
         Self { tree, depths }
     }
 
@@ -79,29 +77,18 @@ impl ProjectedCloudIndex {
     /// The depths around a pixel, within `radius_px`.
     pub fn read(&self, pixel: &Point2<f64>, radius_px: f64) -> DepthReading {
         let Some(tree) = &self.tree else {
-            return DepthReading {
-                distance_px: f64::INFINITY,
-                within: None,
-            };
+            return DepthReading { distance_px: f64::INFINITY, within: None };
         };
         let at = [pixel.x, pixel.y];
-        let within = tree
-            .query(&at)
-            .within::<SquaredEuclidean<f64>>(radius_px * radius_px)
-            .execute();
+        let within =
+            tree.query(&at).within::<SquaredEuclidean<f64>>(radius_px * radius_px).execute();
         let nearest = within
             .iter()
             .map(|found| (found.distance, self.depths[found.item as usize]))
             .min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
         let Some((squared_distance, depth)) = nearest else {
-            let beyond = tree
-                .query(&at)
-                .nearest_one::<SquaredEuclidean<f64>>()
-                .execute();
-            return DepthReading {
-                distance_px: beyond.distance.sqrt(),
-                within: None,
-            };
+            let beyond = tree.query(&at).nearest_one::<SquaredEuclidean<f64>>().execute();
+            return DepthReading { distance_px: beyond.distance.sqrt(), within: None };
         };
         let depths = within.iter().map(|found| self.depths[found.item as usize]);
         DepthReading {
@@ -137,14 +124,8 @@ mod tests {
     use nalgebra::Point3;
     use proptest::prelude::*;
 
-    const CAMERA: Intrinsics = Intrinsics {
-        fx: 100.0,
-        fy: 100.0,
-        cx: 50.0,
-        cy: 40.0,
-        width: 101,
-        height: 81,
-    };
+    const CAMERA: Intrinsics =
+        Intrinsics { fx: 100.0, fy: 100.0, cx: 50.0, cy: 40.0, width: 101, height: 81 };
 
     fn cloud_at(pixels: &[(f64, f64, f64)]) -> Cloud {
         let points = pixels
@@ -186,9 +167,7 @@ mod tests {
 
     #[test]
     fn an_empty_view_has_no_depth_anywhere() {
-        let behind = Cloud {
-            points: vec![Point3::new(0.0, 0.0, -3.0)],
-        };
+        let behind = Cloud { points: vec![Point3::new(0.0, 0.0, -3.0)] };
         let index = ProjectedCloudIndex::new(&behind, &CAMERA);
         assert!(index.is_empty());
         let reading = index.read(&Point2::new(3.0, 3.0), 3.0);

@@ -38,12 +38,7 @@ parameters! {
 /// Five levels to σ = 16 px, which on a photo of 1241 px is what a copy of 40 px shows.
 impl Default for DescentParams {
     fn default() -> Self {
-        Self {
-            levels: 5,
-            sigma_px: 1.0,
-            most_steps: 40,
-            most_points: 6000,
-        }
+        Self { levels: 5, sigma_px: 1.0, most_steps: 40, most_points: 6000 }
     }
 }
 

@@ -171,11 +171,7 @@ pub fn set(
     name: &str,
     text: &str,
 ) -> Option<Result<(), Domain>> {
-    let mut setter = SetVisitor {
-        name,
-        text,
-        outcome: None,
-    };
+    let mut setter = SetVisitor { name, text, outcome: None };
     params.visit(&mut setter);
     setter.outcome
 }
@@ -187,12 +183,7 @@ struct ListVisitor {
 
 impl ListVisitor {
     fn push(&mut self, about: About, value: Value, domain: Domain) {
-        self.rows.push(Described {
-            key: about.name.to_owned(),
-            about,
-            value,
-            domain,
-        });
+        self.rows.push(Described { key: about.name.to_owned(), about, value, domain });
     }
 }
 
@@ -208,11 +199,7 @@ impl ParamVisitor for ListVisitor {
     }
     fn choice(&mut self, about: About, value: &mut dyn Choice) {
         let names = value.names();
-        self.push(
-            about,
-            Value::Choice(names[value.index()]),
-            Domain::Choice(names),
-        );
+        self.push(about, Value::Choice(names[value.index()]), Domain::Choice(names));
     }
 }
 
@@ -415,8 +402,7 @@ mod tests {
     impl RecordingVisitor {
         fn write(&mut self, about: About, rest: &str) {
             let About { name, unit, .. } = about;
-            self.0
-                .push(format!("{name} [{unit}] {}: {rest}", about.help()));
+            self.0.push(format!("{name} [{unit}] {}: {rest}", about.help()));
         }
     }
 
@@ -439,12 +425,8 @@ mod tests {
 
     #[test]
     fn every_field_is_shown_in_order_with_the_first_paragraph_of_its_doc_comment() {
-        let mut all = All {
-            reach_m: 1.5,
-            is_on: true,
-            inner: Inner { rounds: 3 },
-            side: Side::Right,
-        };
+        let mut all =
+            All { reach_m: 1.5, is_on: true, inner: Inner { rounds: 3 }, side: Side::Right };
         let mut visitor = RecordingVisitor::default();
         all.visit(&mut visitor);
         let shown = [

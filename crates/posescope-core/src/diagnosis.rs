@@ -110,11 +110,7 @@ impl<'a> Subject<'a> {
     /// The same, compared with the truth: right is what is within the tolerance of it.
     #[must_use]
     pub fn against(self, truth: Option<&'a Pose>, tolerance: Tolerance) -> Self {
-        Self {
-            truth,
-            tolerance,
-            ..self
-        }
+        Self { truth, tolerance, ..self }
     }
 
     /// What the pose is worth by the truth.
@@ -158,9 +154,7 @@ pub fn diagnose(subject: &Subject<'_>) -> Vec<Diagnosis> {
         tried(&Case::new(subject, family, None), grade)
     };
     // A method's own failure, unless a rule says more than that something else is suspect.
-    let is_explained = found
-        .iter()
-        .any(|one| one.code.is_failure() && one.code != Code::X1);
+    let is_explained = found.iter().any(|one| one.code.is_failure() && one.code != Code::X1);
     if let (Err(failure), false) = (&subject.outcome.pose, is_explained) {
         let place = found.iter().take_while(|one| one.code == Code::X1).count();
         let reported = Diagnosis::of_failure(failure);

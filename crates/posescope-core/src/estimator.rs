@@ -95,12 +95,7 @@ pub struct Outcome {
 impl Outcome {
     /// No pose, and nothing to say but why.
     pub fn failed(failure: Failure) -> Self {
-        Self {
-            pose: Err(failure),
-            counts: None,
-            cost: None,
-            fell_back: false,
-        }
+        Self { pose: Err(failure), counts: None, cost: None, fell_back: false }
     }
 }
 
@@ -201,10 +196,7 @@ const FEATURE: Entry = Entry {
 const HYBRID: Entry = Entry {
     method: Method::HY,
     about: "the feature-based pose, and mutual information where that has none",
-    parts: Parts::Hybrid(HybridParts {
-        first: Method::FB,
-        second: Method::MI,
-    }),
+    parts: Parts::Hybrid(HybridParts { first: Method::FB, second: Method::MI }),
 };
 
 /// Every estimator: those of the paper in its order, then the others. Each registered cost is one.
@@ -241,10 +233,7 @@ pub fn direct_methods(methods: &[Method]) -> Vec<Method> {
         })
     };
     let direct = all().iter().filter(|entry| entry.cost().is_some());
-    direct
-        .map(|entry| entry.method)
-        .filter(|&method| runs(method))
-        .collect()
+    direct.map(|entry| entry.method).filter(|&method| runs(method)).collect()
 }
 
 /// The registry's entry of a method; `None` for one that is in none, such as that of a cost of one's

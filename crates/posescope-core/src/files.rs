@@ -52,9 +52,7 @@ const CACHE_VARIABLE: &str = "POSESCOPE_CACHE";
 pub fn user_cache_folder(name: &str) -> Option<PathBuf> {
     let folder = match env::var_os(CACHE_VARIABLE) {
         Some(folder) => PathBuf::from(folder),
-        None => ProjectDirs::from("", "", "posescope")?
-            .cache_dir()
-            .to_owned(),
+        None => ProjectDirs::from("", "", "posescope")?.cache_dir().to_owned(),
     };
     (!folder.as_os_str().is_empty()).then(|| folder.join(name))
 }
@@ -92,12 +90,7 @@ mod tests {
         let (whole, plain) = (folder.path().join("whole"), folder.path().join("plain"));
         write_whole(&whole, b"").expect("writable");
         fs::write(&plain, b"").expect("writable");
-        let mode = |path| {
-            fs::metadata(path)
-                .expect("just written")
-                .permissions()
-                .mode()
-        };
+        let mode = |path| fs::metadata(path).expect("just written").permissions().mode();
         assert_eq!(mode(&whole), mode(&plain));
     }
 }

@@ -43,10 +43,7 @@ impl Foreign {
     /// The same, with matches that take the place of those of SURF.
     #[must_use]
     pub fn with_matches(self, matches: Arc<dyn MatchSource>) -> Self {
-        Self {
-            matches: Some(matches),
-            ..self
-        }
+        Self { matches: Some(matches), ..self }
     }
 
     /// The poses of a method, if it is another system.

@@ -56,13 +56,7 @@ pub enum Way {
 }
 
 /// Every fusion, those of the paper in its order first.
-pub const ALL: &[Entry] = &[
-    maxf::ENTRY,
-    avg::ENTRY,
-    wavg::ENTRY,
-    r_wavg::ENTRY,
-    joint::ENTRY,
-];
+pub const ALL: &[Entry] = &[maxf::ENTRY, avg::ENTRY, wavg::ENTRY, r_wavg::ENTRY, joint::ENTRY];
 
 /// A fusion of the registry, to be handed around. Two are equal that have the same name.
 #[derive(Clone, Copy)]
@@ -197,11 +191,7 @@ fn shares(weigh: Weigh, candidates: &[Candidate<'_>]) -> Vec<Share> {
             Share {
                 reference: candidate.reference.to_owned(),
                 matches: candidate.matches,
-                weight: if outcome == ShareOutcome::Kept {
-                    weight / kept
-                } else {
-                    0.0
-                },
+                weight: if outcome == ShareOutcome::Kept { weight / kept } else { 0.0 },
                 outcome,
                 pose: candidate.pose.ok().copied(),
                 support: None,
@@ -212,9 +202,7 @@ fn shares(weigh: Weigh, candidates: &[Candidate<'_>]) -> Vec<Share> {
 
 /// The reason names the reference that should have been the best.
 fn no_pose(shares: &[Share], candidates: &[Candidate<'_>]) -> Failure {
-    let failed = shares
-        .iter()
-        .filter(|share| share.outcome == ShareOutcome::Failed);
+    let failed = shares.iter().filter(|share| share.outcome == ShareOutcome::Failed);
     let weighed = failed.count();
     let best = shares
         .iter()
@@ -248,10 +236,7 @@ mod tests {
     }
 
     fn failure() -> Failure {
-        Failure::TooFewMatches {
-            unique: 2,
-            keypoints: 90,
-        }
+        Failure::TooFewMatches { unique: 2, keypoints: 90 }
     }
 
     fn fused(
@@ -304,10 +289,7 @@ mod tests {
             assert_eq!(serde_json::from_str::<Fusion>(&json).ok(), Some(fusion));
         }
         let error = "mean".parse::<Fusion>().expect_err("unknown").to_string();
-        assert_eq!(
-            error,
-            "`mean` is no fusion; maxf, avg, wavg, r-wavg or joint expected"
-        );
+        assert_eq!(error, "`mean` is no fusion; maxf, avg, wavg, r-wavg or joint expected");
     }
 
     #[test]
@@ -327,11 +309,8 @@ mod tests {
         assert!((x("wavg", &candidates) - 4.0).abs() < 1e-12);
         let (_, told) = fused("wavg", &candidates);
         let outcomes: Vec<_> = told.shares.iter().map(|s| (s.outcome, s.weight)).collect();
-        let expected = [
-            (ShareOutcome::Failed, 0.0),
-            (ShareOutcome::Kept, 0.25),
-            (ShareOutcome::Kept, 0.75),
-        ];
+        let expected =
+            [(ShareOutcome::Failed, 0.0), (ShareOutcome::Kept, 0.25), (ShareOutcome::Kept, 0.75)];
         assert_eq!(outcomes, expected);
         assert_eq!(told.shares[2].pose, Some(at(5.0)));
     }
@@ -360,15 +339,9 @@ mod tests {
             share_outcomes(&[(90, &coarse, true), (80, &good, false)]),
             [FallbackUnneeded, Kept]
         );
-        assert_eq!(
-            share_outcomes(&[(90, &coarse, true), (80, &coarse, true)]),
-            [Kept, Kept]
-        );
+        assert_eq!(share_outcomes(&[(90, &coarse, true), (80, &coarse, true)]), [Kept, Kept]);
         // What has no weight does not make the others' fallback unneeded.
-        assert_eq!(
-            share_outcomes(&[(90, &coarse, true), (10, &good, false)]),
-            [Kept, Dropped]
-        );
+        assert_eq!(share_outcomes(&[(90, &coarse, true), (10, &good, false)]), [Kept, Dropped]);
     }
 
     #[test]

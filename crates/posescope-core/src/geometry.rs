@@ -114,11 +114,7 @@ impl PoseError {
 impl fmt::Display for PoseError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let [translation, rotation] = [self.translation(), self.rotation()];
-        write!(
-            f,
-            "{translation}, {rotation} (max Euler {})",
-            self.max_euler()
-        )
+        write!(f, "{translation}, {rotation} (max Euler {})", self.max_euler())
     }
 }
 
@@ -168,10 +164,7 @@ mod tests {
 
         let mut sheared = rounded;
         sheared[(0, 1)] = 0.3;
-        assert!(matches!(
-            pose_from_matrix(&sheared),
-            Err(NotRigid::NotRotation { .. })
-        ));
+        assert!(matches!(pose_from_matrix(&sheared), Err(NotRigid::NotRotation { .. })));
         let mut broken = rounded;
         broken[(2, 3)] = f64::NAN;
         assert_eq!(pose_from_matrix(&broken), Err(NotRigid::NotFinite));

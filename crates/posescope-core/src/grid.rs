@@ -65,10 +65,7 @@ parameters! {
 
 impl Default for SurfaceParams {
     fn default() -> Self {
-        Self {
-            step_m: 0.1,
-            yaw_step_deg: 0.5,
-        }
+        Self { step_m: 0.1, yaw_step_deg: 0.5 }
     }
 }
 
@@ -121,11 +118,7 @@ fn in_degrees<S: Serializer>(angle_rad: &f64, serializer: S) -> Result<S::Ok, S:
     serializer.serialize_f64(angle_rad.to_degrees())
 }
 
-bits_of_fields!(Offset {
-    right_m,
-    forward_m,
-    yaw_rad
-});
+bits_of_fields!(Offset { right_m, forward_m, yaw_rad });
 
 impl Offset {
     /// The offset of a camera `reference_from_camera`. What no offset has is left out: height, pitch
@@ -133,11 +126,7 @@ impl Offset {
     pub fn of(reference_from_camera: &Pose) -> Self {
         let centre = &reference_from_camera.translation;
         let ahead = reference_from_camera.rotation * Vector3::z();
-        Self {
-            right_m: centre.x,
-            forward_m: centre.z,
-            yaw_rad: (-ahead.x).atan2(ahead.z),
-        }
+        Self { right_m: centre.x, forward_m: centre.z, yaw_rad: (-ahead.x).atan2(ahead.z) }
     }
 
     /// The camera's pose in the reference camera's frame.
@@ -176,12 +165,8 @@ impl Bits for Phase {
 
 impl Phase {
     /// The order of the search.
-    pub const ALL: [Self; 4] = [
-        Self::PositionCoarse,
-        Self::PositionFine,
-        Self::YawCoarse,
-        Self::YawFine,
-    ];
+    pub const ALL: [Self; 4] =
+        [Self::PositionCoarse, Self::PositionFine, Self::YawCoarse, Self::YawFine];
 
     /// Whether this phase turns the camera rather than moves it.
     pub fn is_yaw(self) -> bool {
@@ -219,11 +204,7 @@ mod tests {
     fn the_rim_is_the_last_step_of_positions_and_of_yaws() {
         let params = GridParams::default();
         let is_on_rim = |right_m, yaw_deg: f64| {
-            let offset = Offset {
-                right_m,
-                forward_m: 0.0,
-                yaw_rad: yaw_deg.to_radians(),
-            };
+            let offset = Offset { right_m, forward_m: 0.0, yaw_rad: yaw_deg.to_radians() };
             params.is_on_rim(&offset, 10.0)
         };
         assert!(is_on_rim(-9.6, 0.0) && is_on_rim(0.0, 9.8));
@@ -234,15 +215,9 @@ mod tests {
     fn a_camera_ahead_sees_a_point_nearer_and_one_turned_left_sees_it_to_the_right() {
         let point = Point3::new(0.0, 0.0, 10.0);
         let camera = |offset: Offset| offset.reference_from_camera().inverse() * point;
-        let ahead = camera(Offset {
-            forward_m: 4.0,
-            ..Default::default()
-        });
+        let ahead = camera(Offset { forward_m: 4.0, ..Default::default() });
         assert!((ahead.z - 6.0).abs() < 1e-12);
-        let left = camera(Offset {
-            yaw_rad: 0.1,
-            ..Default::default()
-        });
+        let left = camera(Offset { yaw_rad: 0.1, ..Default::default() });
         assert!(left.x > 0.0);
     }
 

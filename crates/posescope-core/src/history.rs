@@ -31,10 +31,7 @@ impl History {
     /// The latest event of a type at or before `cursor`, a position in [`Self::records`].
     pub fn latest<E: DebugEvent + 'static>(&self, cursor: usize) -> Option<&E> {
         let end = self.records.len().min(cursor.saturating_add(1));
-        self.records[..end]
-            .iter()
-            .rev()
-            .find_map(|record| E::from_event(&record.event))
+        self.records[..end].iter().rev().find_map(|record| E::from_event(&record.event))
     }
 
     /// The latest event of a type in the whole run.
@@ -73,10 +70,7 @@ mod tests {
                 .expect("not cancelled");
         }
         assert_eq!(history.latest::<ProjectedCloud>(0), None);
-        assert_eq!(
-            history.latest::<ProjectedCloud>(4).map(|e| e.in_view),
-            Some(2)
-        );
+        assert_eq!(history.latest::<ProjectedCloud>(4).map(|e| e.in_view), Some(2));
         assert_eq!(history.last::<ProjectedCloud>().map(|e| e.in_view), Some(3));
         let ends: Vec<_> = history.all::<StageEnded>().map(|(at, _)| at).collect();
         assert_eq!(ends, [2, 5, 8]);

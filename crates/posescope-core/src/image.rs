@@ -34,10 +34,7 @@ pub struct Photo {
 impl Photo {
     /// A photo with colours; its grey values are their luma (Rec. 709).
     pub fn from_color(color: RgbImage) -> Self {
-        Self {
-            gray: image::imageops::grayscale(&color),
-            color: Some(color),
-        }
+        Self { gray: image::imageops::grayscale(&color), color: Some(color) }
     }
 
     /// A photo of a grey camera from its values, row by row from the top left.
@@ -50,11 +47,7 @@ impl Photo {
         GrayImage::from_raw(width, height, values)
             .filter(|_| is_whole)
             .map(Self::from_gray)
-            .ok_or(InputError::PixelCount {
-                width,
-                height,
-                given,
-            })
+            .ok_or(InputError::PixelCount { width, height, given })
     }
 
     /// A photo of a grey camera.
@@ -67,9 +60,7 @@ impl Photo {
     /// # Errors
     /// When the file cannot be read or is not an image.
     pub fn read(path: &Path) -> image::ImageResult<Self> {
-        let image = image::ImageReader::open(path)?
-            .with_guessed_format()?
-            .decode()?;
+        let image = image::ImageReader::open(path)?.with_guessed_format()?.decode()?;
         Ok(if image.color().has_color() {
             Self::from_color(image.into_rgb8())
         } else {

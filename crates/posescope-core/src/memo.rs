@@ -71,10 +71,7 @@ impl Memo {
     /// A memo of at most `capacity` values.
     pub fn of(capacity: usize) -> Self {
         static NEXT: AtomicU64 = AtomicU64::new(0);
-        let limit = Limit {
-            count: capacity,
-            bytes: BYTES,
-        };
+        let limit = Limit { count: capacity, bytes: BYTES };
         Self(Some(Arc::new(Values {
             id: MemoId(NEXT.fetch_add(1, Ordering::Relaxed)),
             recent: Recent::within(limit, |entry: &Entry| entry.bytes, |_| false),
@@ -124,10 +121,7 @@ impl Memo {
         if let Some(entry) = values.recent.get(&key)
             && let Ok(value) = entry.value.downcast()
         {
-            return Ok(Recalled {
-                value,
-                reused: true,
-            });
+            return Ok(Recalled { value, reused: true });
         }
         let made = Arc::new(make()?);
         let entry = values.recent.insert(
@@ -144,10 +138,7 @@ impl Memo {
 impl<T> Recalled<T> {
     /// A value that was made for this call.
     pub fn made(value: Arc<T>) -> Self {
-        Self {
-            value,
-            reused: false,
-        }
+        Self { value, reused: false }
     }
 }
 
@@ -162,11 +153,7 @@ impl Clone for Memo {
 
 impl fmt::Debug for Memo {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(if self.0.is_some() {
-            "Memo"
-        } else {
-            "Memo(off)"
-        })
+        f.write_str(if self.0.is_some() { "Memo" } else { "Memo(off)" })
     }
 }
 

@@ -71,9 +71,7 @@ impl Method {
     /// Position among those of the paper; all others come behind.
     fn rank(self) -> usize {
         let mut paper = Self::PAPER.iter();
-        paper
-            .position(|known| *known == self)
-            .unwrap_or(Self::PAPER.len())
+        paper.position(|known| *known == self).unwrap_or(Self::PAPER.len())
     }
 }
 
@@ -133,10 +131,7 @@ mod tests {
         let method = Method::called("superglue-2").expect("a plain name");
         assert_eq!(method, Method::named("superglue-2"));
         assert_eq!(Method::called("mi"), Ok(Method::MI));
-        assert_eq!(
-            serde_json::from_str::<Method>("\"superglue-2\"").ok(),
-            Some(method)
-        );
+        assert_eq!(serde_json::from_str::<Method>("\"superglue-2\"").ok(), Some(method));
         let long = "x".repeat(25);
         for wrong in ["", "Mi", "2d", "a b", "a/b", "a@b", "a,b", "é", &long] {
             assert!(Method::called(wrong).is_err(), "{wrong}");

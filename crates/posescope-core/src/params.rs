@@ -81,10 +81,11 @@ impl Params {
     pub fn list(&self) -> Vec<Described> {
         let mut rows = Vec::new();
         self.clone().visit_groups(|group, params| {
-            rows.extend(list(params).into_iter().map(|row| Described {
-                key: format!("{group}.{}", row.key),
-                ..row
-            }));
+            rows.extend(
+                list(params)
+                    .into_iter()
+                    .map(|row| Described { key: format!("{group}.{}", row.key), ..row }),
+            );
         });
         rows
     }
@@ -119,10 +120,9 @@ impl Params {
                 expected: expected.to_string(),
                 given: value.to_owned(),
             }),
-            None => Err(ParamError::Unknown {
-                key: key.to_owned(),
-                nearest: self.nearest_key(key),
-            }),
+            None => {
+                Err(ParamError::Unknown { key: key.to_owned(), nearest: self.nearest_key(key) })
+            }
         }
     }
 
@@ -131,9 +131,8 @@ impl Params {
     /// # Errors
     /// [`ParamError`] for the first key that cannot be set.
     pub fn merge_toml(&mut self, text: &str) -> Result<(), ParamError> {
-        let table: toml::Table = text
-            .parse()
-            .map_err(|error: toml::de::Error| ParamError::Syntax(error.to_string()))?;
+        let table: toml::Table =
+            text.parse().map_err(|error: toml::de::Error| ParamError::Syntax(error.to_string()))?;
         for (group, entries) in &table {
             let Some(entries) = entries.as_table() else {
                 return Err(ParamError::Syntax(format!(
@@ -210,14 +209,8 @@ mod tests {
         let mut params = Params::default();
         let rows = params.list();
         for row in &rows {
-            params
-                .set(&row.key, &row.value.to_string())
-                .unwrap_or_else(|error| panic!("{error}"));
-            assert!(
-                !row.about.help().is_empty(),
-                "{} needs a help text",
-                row.key
-            );
+            params.set(&row.key, &row.value.to_string()).unwrap_or_else(|error| panic!("{error}"));
+            assert!(!row.about.help().is_empty(), "{} needs a help text", row.key);
         }
         assert_eq!(params, Params::default());
         let mut keys: Vec<_> = rows.iter().map(|row| &row.key).collect();
@@ -238,12 +231,7 @@ mod tests {
         assert_eq!(read, params);
         assert_eq!(
             params.changes(),
-            [
-                "surf.upright=false",
-                "fb.ratio=0.7",
-                "fb.accept=paper",
-                "mi.bins=32"
-            ]
+            ["surf.upright=false", "fb.ratio=0.7", "fb.accept=paper", "mi.bins=32"]
         );
     }
 
@@ -251,10 +239,7 @@ mod tests {
     fn a_wrong_assignment_says_what_is_expected() {
         let mut params = Params::default();
         let message = |outcome: Result<(), ParamError>| outcome.expect_err("wrong").to_string();
-        assert_eq!(
-            message(params.assign("fb.ratio=1.7")),
-            "`fb.ratio` takes 0.1 … 1, not `1.7`"
-        );
+        assert_eq!(message(params.assign("fb.ratio=1.7")), "`fb.ratio` takes 0.1 … 1, not `1.7`");
         assert_eq!(
             message(params.assign("fb.ratoi=0.7")),
             "`fb.ratoi` is not a parameter (did you mean `fb.ratio`?); `posescope params` lists all"

@@ -36,12 +36,7 @@ impl Query {
     ) -> Result<Self, InputError> {
         let name = name.into();
         check_camera(&name, &photo, &intrinsics)?;
-        Ok(Self {
-            name,
-            photo: Arc::new(photo),
-            intrinsics,
-            memo: Memo::off(),
-        })
+        Ok(Self { name, photo: Arc::new(photo), intrinsics, memo: Memo::off() })
     }
 }
 
@@ -77,11 +72,7 @@ impl ReferenceTuple {
     ) -> Result<Self, InputError> {
         let name = name.into();
         check_camera(&name, &photo, &intrinsics)?;
-        if !world_from_camera
-            .to_homogeneous()
-            .iter()
-            .all(|x| x.is_finite())
-        {
+        if !world_from_camera.to_homogeneous().iter().all(|x| x.is_finite()) {
             return Err(InputError::Pose { frame: name });
         }
         Ok(Self {
@@ -102,14 +93,7 @@ impl ReferenceTuple {
 }
 
 fn check_camera(name: &str, photo: &Photo, intrinsics: &Intrinsics) -> Result<(), InputError> {
-    let Intrinsics {
-        fx,
-        fy,
-        cx,
-        cy,
-        width,
-        height,
-    } = *intrinsics;
+    let Intrinsics { fx, fy, cx, cy, width, height } = *intrinsics;
     let is_focal = |length: f64| length.is_finite() && length > 0.0;
     if !is_focal(fx)
         || !is_focal(fy)
@@ -118,9 +102,7 @@ fn check_camera(name: &str, photo: &Photo, intrinsics: &Intrinsics) -> Result<()
         || width == 0
         || height == 0
     {
-        return Err(InputError::Camera {
-            frame: name.to_owned(),
-        });
+        return Err(InputError::Camera { frame: name.to_owned() });
     }
     if photo.dimensions() != (width, height) {
         return Err(InputError::PhotoSize {
@@ -164,9 +146,7 @@ impl Problem {
         uncertainty_radius_m: f64,
     ) -> Result<Self, InputError> {
         if !(uncertainty_radius_m.is_finite() && uncertainty_radius_m > 0.0) {
-            return Err(InputError::Radius {
-                radius_m: uncertainty_radius_m,
-            });
+            return Err(InputError::Radius { radius_m: uncertainty_radius_m });
         }
         Ok(Self {
             query: query.into(),
@@ -190,9 +170,7 @@ impl Problem {
 
     /// A seed for one random choice: it depends on the problem and the purpose, and on nothing else.
     pub fn random_seed(&self, purpose: &str) -> u64 {
-        let Self {
-            query, reference, ..
-        } = self;
+        let Self { query, reference, .. } = self;
         let text = format!("{}/{}/{}/{purpose}", self.seed, query.name, reference.name);
         xxhash_rust::xxh3::xxh3_64(text.as_bytes())
     }
@@ -208,14 +186,8 @@ mod tests {
     use super::*;
     use crate::image::GrayImage;
 
-    const CAMERA: Intrinsics = Intrinsics {
-        fx: 30.0,
-        fy: 30.0,
-        cx: 15.5,
-        cy: 11.5,
-        width: 32,
-        height: 24,
-    };
+    const CAMERA: Intrinsics =
+        Intrinsics { fx: 30.0, fy: 30.0, cx: 15.5, cy: 11.5, width: 32, height: 24 };
 
     fn photo(width: u32, height: u32) -> Photo {
         Photo::from_gray(GrayImage::new(width, height))
@@ -224,10 +196,7 @@ mod tests {
     #[test]
     fn a_photo_of_another_size_than_its_camera_is_refused_by_name() {
         let refused = Query::new("a", photo(24, 32), CAMERA).expect_err("turned");
-        assert_eq!(
-            refused.to_string(),
-            "the photo of a has 24x32 px, its camera 32x24"
-        );
+        assert_eq!(refused.to_string(), "the photo of a has 24x32 px, its camera 32x24");
         let pose = Pose::identity();
         let cloud = Cloud::default();
         let refused = ReferenceTuple::new("b", photo(31, 24), CAMERA, pose, cloud);
@@ -238,20 +207,11 @@ mod tests {
     fn what_is_no_camera_no_pose_or_no_radius_is_refused() {
         for wrong in [
             Intrinsics { fx: 0.0, ..CAMERA },
-            Intrinsics {
-                fy: f64::NAN,
-                ..CAMERA
-            },
-            Intrinsics {
-                cx: f64::INFINITY,
-                ..CAMERA
-            },
+            Intrinsics { fy: f64::NAN, ..CAMERA },
+            Intrinsics { cx: f64::INFINITY, ..CAMERA },
         ] {
             let refused = Query::new("a", photo(32, 24), wrong);
-            assert!(
-                matches!(refused, Err(InputError::Camera { .. })),
-                "{wrong:?}"
-            );
+            assert!(matches!(refused, Err(InputError::Camera { .. })), "{wrong:?}");
         }
         let empty = Intrinsics { width: 0, ..CAMERA };
         let refused = Query::new("a", photo(0, 24), empty);
@@ -266,10 +226,7 @@ mod tests {
         let reference = Arc::new(reference(Pose::identity()).expect("fits"));
         for radius in [0.0, -1.0, f64::NAN, f64::INFINITY] {
             let refused = Problem::new(Arc::clone(&query), Arc::clone(&reference), radius);
-            assert!(
-                matches!(refused, Err(InputError::Radius { .. })),
-                "{radius}"
-            );
+            assert!(matches!(refused, Err(InputError::Radius { .. })), "{radius}");
         }
         assert!(Problem::new(query, reference, 3.0).is_ok());
     }

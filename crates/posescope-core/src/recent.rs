@@ -36,12 +36,7 @@ impl<K: Eq, V: Clone> Recent<K, V> {
     /// Values within the limit, as far as they are not held by others. `bytes` says what a value
     /// takes, `is_held` whether somebody else holds it, so that letting it go would free nothing.
     pub fn within(limit: Limit, bytes: fn(&V) -> usize, is_held: fn(&V) -> bool) -> Self {
-        Self {
-            limit,
-            bytes,
-            is_held,
-            entries: Mutex::default(),
-        }
+        Self { limit, bytes, is_held, entries: Mutex::default() }
     }
 
     /// How much is kept.
@@ -55,9 +50,7 @@ impl<K: Eq, V: Clone> Recent<K, V> {
         K: Borrow<Q>,
     {
         let mut entries = self.entries();
-        let at = entries
-            .iter()
-            .position(|(known, _)| known.borrow() == key)?;
+        let at = entries.iter().position(|(known, _)| known.borrow() == key)?;
         entries[at..].rotate_left(1);
         entries.last().map(|(_, value)| value.clone())
     }
@@ -152,15 +145,9 @@ mod tests {
 
     #[test]
     fn values_stay_within_their_bytes_but_for_the_latest_and_those_that_others_hold() {
-        let limit = Limit {
-            count: 9,
-            bytes: 10,
-        };
-        let recent: Recent<u8, Arc<Vec<u8>>> = Recent::within(
-            limit,
-            |value| value.len(),
-            |value| Arc::strong_count(value) > 1,
-        );
+        let limit = Limit { count: 9, bytes: 10 };
+        let recent: Recent<u8, Arc<Vec<u8>>> =
+            Recent::within(limit, |value| value.len(), |value| Arc::strong_count(value) > 1);
         let held = recent.insert(0, Arc::new(vec![0; 6]));
         recent.insert(1, Arc::new(vec![0; 4]));
         assert_eq!(recent.bytes(), 10);

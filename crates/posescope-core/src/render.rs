@@ -44,24 +44,12 @@ parameters! {
 
 impl Default for RenderParams {
     fn default() -> Self {
-        Self {
-            splat_px: 1,
-            visibility: true,
-            visibility_margin: 0.10,
-            visibility_window_px: 5,
-        }
+        Self { splat_px: 1, visibility: true, visibility_margin: 0.10, visibility_window_px: 5 }
     }
 }
 
 /// The camera that the tests of this room look through.
 #[cfg(test)]
 fn small_camera() -> crate::camera::Intrinsics {
-    crate::camera::Intrinsics {
-        fx: 10.0,
-        fy: 10.0,
-        cx: 4.0,
-        cy: 3.0,
-        width: 9,
-        height: 7,
-    }
+    crate::camera::Intrinsics { fx: 10.0, fy: 10.0, cx: 4.0, cy: 3.0, width: 9, height: 7 }
 }

@@ -39,8 +39,7 @@ pub trait Scene: Send + Sync {
     /// Where references of the frame are sought \[m\], in the world: at its pose, where that is known,
     /// unless something else says roughly where it was taken.
     fn position(&self, frame: usize) -> Option<Point3<f64>> {
-        self.pose(frame)
-            .map(|pose| Point3::from(pose.translation.vector))
+        self.pose(frame).map(|pose| Point3::from(pose.translation.vector))
     }
 
     /// When the frame was taken \[s\], where it is known.
@@ -134,9 +133,8 @@ pub fn fingerprint(scene: &(impl Scene + ?Sized), more: &[u8]) -> u64 {
     let frames = scene.frames();
     let cameras = (0..frames.len()).map(|frame| (frame, scene.intrinsics(frame)));
     let mut last = None;
-    let changes: Vec<_> = cameras
-        .filter(|(_, camera)| last.replace(*camera) != Some(*camera))
-        .collect();
+    let changes: Vec<_> =
+        cameras.filter(|(_, camera)| last.replace(*camera) != Some(*camera)).collect();
     add(scene.name());
     if let Some((_, first)) = changes.first() {
         add(&format!("{first:?}"));
@@ -163,9 +161,7 @@ impl dyn Scene + '_ {
             .iter()
             .position(|frame| frame == name)
             .or_else(|| {
-                frames
-                    .iter()
-                    .position(|frame| number.is_some() && frame.parse().ok() == number)
+                frames.iter().position(|frame| number.is_some() && frame.parse().ok() == number)
             })
             .ok_or_else(|| SceneError::UnknownFrame {
                 scene: self.name().to_owned(),
@@ -207,14 +203,7 @@ mod tests {
             &self.0
         }
         fn intrinsics(&self, frame: usize) -> Intrinsics {
-            Intrinsics {
-                fx: self.1[frame],
-                fy: 1.5,
-                cx: 2.0,
-                cy: 1.0,
-                width: 5,
-                height: 3,
-            }
+            Intrinsics { fx: self.1[frame], fy: 1.5, cx: 2.0, cy: 1.0, width: 5, height: 3 }
         }
         fn pose(&self, _frame: usize) -> Option<Pose> {
             None
@@ -248,13 +237,8 @@ mod tests {
 
     #[test]
     fn a_fingerprint_tells_which_frame_has_which_camera() {
-        let all = [
-            [1.5, 1.5, 1.5],
-            [1.5, 1.5, 2.0],
-            [1.5, 2.0, 1.5],
-            [1.5, 2.0, 2.0],
-            [2.0, 1.5, 1.5],
-        ];
+        let all =
+            [[1.5, 1.5, 1.5], [1.5, 1.5, 2.0], [1.5, 2.0, 1.5], [1.5, 2.0, 2.0], [2.0, 1.5, 1.5]];
         let mut sums = all.map(|lengths| bare(lengths).fingerprint());
         sums.sort_unstable();
         assert!(sums.windows(2).all(|two| two[0] != two[1]));

@@ -31,11 +31,7 @@ impl UnknownWord {
             Some((last, rest)) if !rest.is_empty() => format!("{} or {last}", rest.join(", ")),
             _ => names.concat(),
         };
-        Self {
-            found: found.to_owned(),
-            kind,
-            expected,
-        }
+        Self { found: found.to_owned(), kind, expected }
     }
 }
 
@@ -132,10 +128,7 @@ mod tests {
     #[test]
     fn an_unknown_word_is_told_which_there_are() {
         let unknown = UnknownWord::among("xx", "method", ["fb", "pm", "mi"]);
-        assert_eq!(
-            unknown.to_string(),
-            "`xx` is no method; fb, pm or mi expected"
-        );
+        assert_eq!(unknown.to_string(), "`xx` is no method; fb, pm or mi expected");
         assert_eq!(UnknownWord::among("xx", "fusion", ["avg"]).expected, "avg");
     }
 }

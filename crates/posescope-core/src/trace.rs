@@ -151,9 +151,7 @@ impl<'a> Trace<'a> {
     /// Whether anybody wants this kind of event now. For what is kept to be told again: what is told
     /// at once asks [`Self::emit`], which runs its closure only then.
     pub fn wants<E: DebugEvent>(&self) -> bool {
-        self.observer
-            .as_ref()
-            .is_some_and(|observer| observer.wanted.contains(E::KIND))
+        self.observer.as_ref().is_some_and(|observer| observer.wanted.contains(E::KIND))
     }
 
     /// For long loops that tell nothing: lets the observer pause or stop the run.
@@ -242,12 +240,7 @@ impl Sink for Onward<'_, '_> {
     }
 
     fn accept(&mut self, record: &Record) -> Result<(), Cancelled> {
-        let Observer {
-            sink,
-            depth,
-            methods,
-            ..
-        } = self.observer;
+        let Observer { sink, depth, methods, .. } = self.observer;
         let methods = methods.iter().chain(&record.methods).copied();
         sink.accept(&Record {
             index: self.first + record.index,
@@ -293,11 +286,7 @@ impl Observer<'_> {
     /// Tells the end of the innermost stage, and closes it whatever the sink says. That many estimators are
     /// open `around` it.
     fn end_stage(&mut self, stage: Stage, succeeded: bool, around: usize) -> Result<(), Cancelled> {
-        let ended = StageEnded {
-            stage,
-            succeeded,
-            reused: std::mem::take(&mut self.reused),
-        };
+        let ended = StageEnded { stage, succeeded, reused: std::mem::take(&mut self.reused) };
         let delivered = self.deliver(ended.into());
         self.depth -= 1;
         self.methods.truncate(around);
@@ -305,12 +294,8 @@ impl Observer<'_> {
     }
 
     fn deliver(&mut self, event: Event) -> Result<(), Cancelled> {
-        let record = Record {
-            index: self.next,
-            depth: self.depth,
-            methods: self.methods.clone(),
-            event,
-        };
+        let record =
+            Record { index: self.next, depth: self.depth, methods: self.methods.clone(), event };
         self.next += 1;
         self.sink.accept(&record)
     }
@@ -331,12 +316,7 @@ mod tests {
 
     impl RecordingSink {
         fn wanting(wanted: KindSet) -> Self {
-            Self {
-                wanted,
-                records: Vec::new(),
-                stop_at: None,
-                attended: 0,
-            }
+            Self { wanted, records: Vec::new(), stop_at: None, attended: 0 }
         }
     }
 
@@ -346,11 +326,7 @@ mod tests {
         }
         fn accept(&mut self, record: &Record) -> Result<(), Cancelled> {
             self.records.push(record.clone());
-            if self.stop_at == Some(record.index) {
-                Err(Cancelled)
-            } else {
-                Ok(())
-            }
+            if self.stop_at == Some(record.index) { Err(Cancelled) } else { Ok(()) }
         }
         fn attend(&mut self) -> Result<(), Cancelled> {
             self.attended += 1;
@@ -360,10 +336,7 @@ mod tests {
 
     fn two_stages(trace: &mut Trace<'_>) -> Result<(), Cancelled> {
         trace.stage(Stage::DepthLift, |trace| {
-            trace.emit(|| ProjectedCloud {
-                points: 2,
-                in_view: 1,
-            })?;
+            trace.emit(|| ProjectedCloud { points: 2, in_view: 1 })?;
             trace.stage(Stage::Consensus, |_| Ok(()))
         })
     }
@@ -372,9 +345,7 @@ mod tests {
     fn an_unwanted_event_is_not_even_built_but_stages_are_told() {
         let mut sink = RecordingSink::wanting(KindSet::NONE);
         let mut trace = Trace::to(&mut sink);
-        trace
-            .emit(|| -> ProjectedCloud { panic!("nobody wants this") })
-            .expect("not cancelled");
+        trace.emit(|| -> ProjectedCloud { panic!("nobody wants this") }).expect("not cancelled");
         two_stages(&mut trace).expect("not cancelled");
         let depths: Vec<_> = sink.records.iter().map(|r| r.depth).collect();
         assert_eq!(depths, [1, 2, 2, 1]);
@@ -389,11 +360,7 @@ mod tests {
         let last = sink.records.last().expect("some were told");
         assert!(matches!(
             last.event,
-            Event::StageEnded(StageEnded {
-                stage: Stage::DepthLift,
-                succeeded: false,
-                ..
-            })
+            Event::StageEnded(StageEnded { stage: Stage::DepthLift, succeeded: false, .. })
         ));
     }
 
@@ -426,27 +393,16 @@ mod tests {
         let mut second = RecordingSink::wanting(KindSet::of(&[Kind::ProjectedCloud]));
         let mut trace = Trace::to(&mut first);
         trace
-            .stage(Stage::Match, |trace| {
-                trace.heard_by(&mut second, two_stages)
-            })
+            .stage(Stage::Match, |trace| trace.heard_by(&mut second, two_stages))
             .expect("not cancelled");
         let places = |sink: &RecordingSink| {
-            let places = sink
-                .records
-                .iter()
-                .map(|r| (r.index, r.depth, r.event.kind()));
+            let places = sink.records.iter().map(|r| (r.index, r.depth, r.event.kind()));
             places.collect::<Vec<_>>()
         };
         assert_eq!(places(&first), places(&alone));
-        assert_eq!(
-            second.records.len(),
-            5,
-            "four stage events and one that it wants"
-        );
+        assert_eq!(second.records.len(), 5, "four stage events and one that it wants");
         let mut unheard = RecordingSink::wanting(KindSet::ALL);
-        Trace::off()
-            .heard_by(&mut unheard, two_stages)
-            .expect("not cancelled");
+        Trace::off().heard_by(&mut unheard, two_stages).expect("not cancelled");
         assert_eq!(unheard.records.len(), 5);
     }
 
@@ -475,10 +431,7 @@ mod tests {
             sink.records.iter().map(|r| r.index).collect::<Vec<_>>()
         };
         for second in [None, Some(KindSet::ALL), Some(KindSet::NONE)] {
-            assert_eq!(
-                indices(KindSet::ALL, second),
-                [0, 1, 2, 3, 4, 5, 6, 7, 8, 9]
-            );
+            assert_eq!(indices(KindSet::ALL, second), [0, 1, 2, 3, 4, 5, 6, 7, 8, 9]);
             assert_eq!(indices(KindSet::NONE, second), [0, 2, 3, 4, 5, 7, 8, 9]);
         }
     }

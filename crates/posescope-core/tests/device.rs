@@ -22,14 +22,8 @@ use posescope_core::render::{
 use posescope_core::trace::{Cancelled, Record, Sink, Trace};
 
 /// Powers of two, so that poses in whole metres are exact in single precision.
-const CAMERA: Intrinsics = Intrinsics {
-    fx: 64.0,
-    fy: 64.0,
-    cx: 48.0,
-    cy: 16.0,
-    width: 96,
-    height: 32,
-};
+const CAMERA: Intrinsics =
+    Intrinsics { fx: 64.0, fy: 64.0, cx: 48.0, cy: 16.0, width: 96, height: 32 };
 
 /// Hypotheses of the coarse positions: a disc of 6 m in steps of 1 m.
 const COARSE: usize = 113;
@@ -146,9 +140,7 @@ fn problem(memo: fn() -> Memo) -> Problem {
             photo: photo(0.0).into(),
             intrinsics: CAMERA,
             world_from_camera: Pose::identity(),
-            cloud: Cloud {
-                points: points.collect(),
-            },
+            cloud: Cloud { points: points.collect() },
             memo: memo(),
         }),
         matches: None,
@@ -168,9 +160,7 @@ fn coarse(problem: &Problem) -> ScoredLattice {
 #[test]
 fn a_score_that_was_corrected_stays_corrected_in_the_next_run() {
     let on_threads = coarse(&problem(Memo::off));
-    let cells: Vec<usize> = (on_threads.lattice.hypotheses())
-        .map(|(cell, _)| cell)
-        .collect();
+    let cells: Vec<usize> = (on_threads.lattice.hypotheses()).map(|(cell, _)| cell).collect();
     assert_eq!(cells.len(), COARSE);
     // A minimum, which is reported, and not one of those that each batch is checked by.
     let checked: Vec<usize> = (0..COARSE).step_by(COARSE / 4).collect();
@@ -187,10 +177,7 @@ fn a_score_that_was_corrected_stays_corrected_in_the_next_run() {
 
     let problem = problem(|| Memo::of(256));
     let (first, again) = (coarse(&problem), coarse(&problem));
-    assert!(
-        sly.loaded.load(Ordering::Relaxed) > 0,
-        "the device was asked"
-    );
+    assert!(sly.loaded.load(Ordering::Relaxed) > 0, "the device was asked");
     assert_eq!(first.scores, on_threads.scores);
     assert_eq!(again.scores, on_threads.scores);
 }

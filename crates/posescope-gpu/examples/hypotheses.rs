@@ -32,9 +32,7 @@ const STEPS_M: [f64; 6] = [0.1, 0.25, 0.5, 1.0, 2.0, 4.0];
 
 fn main() -> Result<(), Box<dyn Error>> {
     if let Ok(threads) = std::env::var("POSESCOPE_THREADS") {
-        rayon::ThreadPoolBuilder::new()
-            .num_threads(threads.parse()?)
-            .build_global()?;
+        rayon::ThreadPoolBuilder::new().num_threads(threads.parse()?).build_global()?;
     }
     let gpu = Arc::new(Gpu::requested()?);
     let card = gpu.name().unwrap_or_default();
@@ -54,15 +52,8 @@ fn main() -> Result<(), Box<dyn Error>> {
             let colored = visible.colored_by(channel);
             let points = resized(&colored.points, count);
             let channel = Arc::new(cost.query_channel(&query.photo.gray));
-            let scorer = || {
-                Scorer::new(
-                    &points,
-                    Arc::clone(&channel),
-                    &query.intrinsics,
-                    1,
-                    cost.as_ref(),
-                )
-            };
+            let scorer =
+                || Scorer::new(&points, Arc::clone(&channel), &query.intrinsics, 1, cost.as_ref());
             let on_threads = scorer().on(None);
             let on_card = scorer().on(Some(Arc::clone(&gpu) as Arc<dyn Device>));
             // Both have made what they make once before anything is timed.
@@ -77,10 +68,7 @@ fn main() -> Result<(), Box<dyn Error>> {
                 by_threads.push(per_second(&on_threads, &poses));
                 by_card.push(per_second(&on_card, &poses));
             }
-            let ratios = by_card
-                .iter()
-                .zip(&by_threads)
-                .map(|(card, threads)| card / threads);
+            let ratios = by_card.iter().zip(&by_threads).map(|(card, threads)| card / threads);
             let ratio = median(ratios.collect());
             let hypotheses = poses.len();
             let [threads, card] = [median(by_threads), median(by_card)];
@@ -115,15 +103,10 @@ fn resized(points: &[ColoredPoint], count: usize) -> Vec<ColoredPoint> {
 
 /// The positions of the 10 m disc, in steps \[m\].
 fn poses(step_m: f64) -> Result<Vec<Pose>, Box<dyn Error>> {
-    let params = GridParams {
-        coarse_step_m: step_m,
-        ..GridParams::default()
-    };
+    let params = GridParams { coarse_step_m: step_m, ..GridParams::default() };
     let lattice = Lattice::new(Phase::PositionCoarse, Offset::default(), 10.0, &params)?;
     let hypotheses = lattice.hypotheses();
-    Ok(hypotheses
-        .map(|(_, offset)| offset.reference_from_camera())
-        .collect())
+    Ok(hypotheses.map(|(_, offset)| offset.reference_from_camera()).collect())
 }
 
 /// As many positions of the 10 m disc as that, at most.

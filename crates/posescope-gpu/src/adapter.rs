@@ -61,21 +61,9 @@ pub(crate) fn described(info: &AdapterInfo) -> String {
 /// A requirement of the shaders that a card does not meet.
 fn lacking(limits: &Limits) -> Option<String> {
     let needed = [
-        (
-            "threads in a workgroup",
-            LANES,
-            limits.max_compute_invocations_per_workgroup,
-        ),
-        (
-            "buffers in a shader",
-            BUFFERS,
-            limits.max_storage_buffers_per_shader_stage,
-        ),
-        (
-            "bytes of workgroup memory",
-            SHARED,
-            limits.max_compute_workgroup_storage_size,
-        ),
+        ("threads in a workgroup", LANES, limits.max_compute_invocations_per_workgroup),
+        ("buffers in a shader", BUFFERS, limits.max_storage_buffers_per_shader_stage),
+        ("bytes of workgroup memory", SHARED, limits.max_compute_workgroup_storage_size),
     ];
     let missing = needed.into_iter().find(|(_, needed, there)| there < needed);
     missing.map(|(what, needed, there)| format!("{needed} {what} needed, {there} available"))
@@ -90,13 +78,7 @@ mod tests {
         assert!(rank(DeviceType::DiscreteGpu) < rank(DeviceType::IntegratedGpu));
         assert!(rank(DeviceType::IntegratedGpu) < rank(DeviceType::Cpu));
         assert_eq!(lacking(&Limits::default()), None);
-        let small = Limits {
-            max_storage_buffers_per_shader_stage: 4,
-            ..Limits::default()
-        };
-        assert_eq!(
-            lacking(&small).as_deref(),
-            Some("8 buffers in a shader needed, 4 available")
-        );
+        let small = Limits { max_storage_buffers_per_shader_stage: 4, ..Limits::default() };
+        assert_eq!(lacking(&small).as_deref(), Some("8 buffers in a shader needed, 4 available"));
     }
 }

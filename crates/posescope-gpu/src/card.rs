@@ -37,10 +37,8 @@ impl Card {
             ..wgpu::DeviceDescriptor::default()
         };
         let opened = pollster::block_on(adapter.request_device(&descriptor));
-        let (device, queue) = opened.map_err(|why| GpuError::NotOpened {
-            name: name.clone(),
-            why: one_line(&why),
-        })?;
+        let (device, queue) = opened
+            .map_err(|why| GpuError::NotOpened { name: name.clone(), why: one_line(&why) })?;
         let failure = Arc::new(Mutex::new(None));
         watch(&device, &name, &failure);
         Ok(Self {
@@ -119,17 +117,12 @@ impl Card {
             // Fails only if the card was lost meanwhile.
             let _ = sender.send(mapped);
         });
-        let wait = wgpu::PollType::Wait {
-            submission_index: Some(submitted),
-            timeout: Some(PATIENCE),
-        };
+        let wait =
+            wgpu::PollType::Wait { submission_index: Some(submitted), timeout: Some(PATIENCE) };
         self.device.poll(wait).map_err(|why| self.lost(&why)).ok()?;
         let mapped = receiver.recv().map_err(|why| self.lost(&why)).ok()?;
         mapped.map_err(|why| self.lost(&why)).ok()?;
-        let view = answer
-            .get_mapped_range()
-            .map_err(|why| self.lost(&why))
-            .ok()?;
+        let view = answer.get_mapped_range().map_err(|why| self.lost(&why)).ok()?;
         let answer = bytemuck::pod_collect_to_vec(&view);
         drop(view);
         staging.unmap();
@@ -137,10 +130,7 @@ impl Card {
     }
 
     fn lost(&self, why: &dyn Display) {
-        self.fail(GpuError::Lost {
-            name: self.name.clone(),
-            why: one_line(why),
-        });
+        self.fail(GpuError::Lost { name: self.name.clone(), why: one_line(why) });
     }
 }
 

@@ -28,10 +28,6 @@ impl Engine {
         if !is_exact {
             return Err(GpuError::Inexact(card.name().to_owned()));
         }
-        Ok(Self {
-            card,
-            kernels,
-            slots: Mutex::default(),
-        })
+        Ok(Self { card, kernels, slots: Mutex::default() })
     }
 }

@@ -84,11 +84,7 @@ impl Kernels {
             .map(|(binding, ty)| wgpu::BindGroupLayoutEntry {
                 binding,
                 visibility: ShaderStages::COMPUTE,
-                ty: BindingType::Buffer {
-                    ty,
-                    has_dynamic_offset: false,
-                    min_binding_size: None,
-                },
+                ty: BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None },
                 count: None,
             })
             .collect();
@@ -101,11 +97,7 @@ impl Kernels {
             bind_group_layouts: &[Some(&bindings)],
             immediate_size: 0,
         });
-        Self {
-            bindings,
-            layout,
-            compiled: Mutex::default(),
-        }
+        Self { bindings, layout, compiled: Mutex::default() }
     }
 
     /// A shader, ready to run.
@@ -115,16 +107,14 @@ impl Kernels {
                 label: Some(kernel.entry_point()),
                 source: wgpu::ShaderSource::Wgsl(kernel.source().into()),
             });
-            Arc::new(
-                device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-                    label: Some(kernel.entry_point()),
-                    layout: Some(&self.layout),
-                    module: &module,
-                    entry_point: Some(kernel.entry_point()),
-                    compilation_options: wgpu::PipelineCompilationOptions::default(),
-                    cache: None,
-                }),
-            )
+            Arc::new(device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+                label: Some(kernel.entry_point()),
+                layout: Some(&self.layout),
+                module: &module,
+                entry_point: Some(kernel.entry_point()),
+                compilation_options: wgpu::PipelineCompilationOptions::default(),
+                cache: None,
+            }))
         };
         let mut compiled = lock(&self.compiled);
         Arc::clone(compiled.entry(kernel).or_insert_with(compile))
@@ -152,9 +142,8 @@ impl Kernels {
             entries: &entries,
         });
         let pipeline = self.get(device, kernel);
-        let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor {
-            label: Some("hypotheses"),
-        });
+        let mut encoder = device
+            .create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("hypotheses") });
         let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
             label: Some("hypotheses"),
             timestamp_writes: None,

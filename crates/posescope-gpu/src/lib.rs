@@ -51,11 +51,7 @@ pub struct Gpu {
 impl Gpu {
     /// A card of this computer for large searches, opened on the first of them. Software emulations are not used.
     pub fn if_any() -> Self {
-        Self {
-            engine: OnceLock::new(),
-            is_requested: false,
-            left_out: Mutex::default(),
-        }
+        Self { engine: OnceLock::new(), is_requested: false, left_out: Mutex::default() }
     }
 
     /// A card of this computer, or a software emulation with a warning.
@@ -109,11 +105,7 @@ impl fmt::Debug for Gpu {
 
 impl Device for Gpu {
     fn batch(&self, hypotheses: usize) -> Option<usize> {
-        let least = if self.is_requested {
-            LEAST_REQUESTED
-        } else {
-            LEAST_AUTOMATIC
-        };
+        let least = if self.is_requested { LEAST_REQUESTED } else { LEAST_AUTOMATIC };
         if hypotheses < least {
             return None;
         }

@@ -36,10 +36,7 @@ impl OnCard {
     /// Copies a query and its points.
     pub fn new(engine: &Arc<Engine>, workload: &Workload<'_>) -> Result<Self, GpuError> {
         let card = &engine.card;
-        let too_small = |what: String| GpuError::TooSmall {
-            name: card.name().to_owned(),
-            what,
-        };
+        let too_small = |what: String| GpuError::TooSmall { name: card.name().to_owned(), what };
         let count = workload.points.len();
         let most_bytes = card.limits.max_storage_buffer_binding_size;
         if count >= MOST_POINTS || 16 * count as u64 > most_bytes {
@@ -53,9 +50,7 @@ impl OnCard {
                 )));
             }
             Tallying::Counts { bins, .. } => {
-                (Kernel::Counts { bins: bins as u32 }, &move |value| {
-                    bin(value, bins) as u32
-                })
+                (Kernel::Counts { bins: bins as u32 }, &move |value| bin(value, bins) as u32)
             }
             Tallying::LesserHalf => (Kernel::LesserHalf, &f32::to_bits),
         };
@@ -107,16 +102,10 @@ impl OnCard {
     /// Hypotheses that are drawn at once.
     fn at_once(&self) -> usize {
         let card = &self.engine.card;
-        let work = if card.is_software {
-            MOST_WORK_OF_SOFTWARE
-        } else {
-            MOST_WORK
-        };
+        let work = if card.is_software { MOST_WORK_OF_SOFTWARE } else { MOST_WORK };
         let most_bytes = card.limits.max_storage_buffer_binding_size as usize;
         let by_work = work / (self.shape.points as usize).max(1);
-        by_work
-            .min(most_bytes / (4 * self.words()))
-            .clamp(1, card.most_at_a_time())
+        by_work.min(most_bytes / (4 * self.words())).clamp(1, card.most_at_a_time())
     }
 
     fn draw(&self, projections: &[ProjectionRows]) -> Option<Vec<u32>> {
@@ -139,15 +128,9 @@ impl OnCard {
             }
         };
         let groups = batch.drawing.count.min(poses);
-        let shape = Shape {
-            poses,
-            rounds: poses.div_ceil(groups),
-            ..self.shape
-        };
-        card.queue
-            .write_buffer(&self.uniform, 0, bytemuck::bytes_of(&shape));
-        card.queue
-            .write_buffer(batch.projections, 0, bytemuck::cast_slice(projections));
+        let shape = Shape { poses, rounds: poses.div_ceil(groups), ..self.shape };
+        card.queue.write_buffer(&self.uniform, 0, bytemuck::bytes_of(&shape));
+        card.queue.write_buffer(batch.projections, 0, bytemuck::cast_slice(projections));
         let encoder = self.encode(&batch, groups);
         card.run_and_read(encoder, batch.answer, batch.staging, words)
     }
@@ -179,10 +162,8 @@ impl OnCard {
                 let places = limbs.iter().zip([0, 16, 32, 48]);
                 let sum: u128 = places.map(|(&limb, place)| u128::from(limb) << place).sum();
                 let sum = u64::try_from(sum).ok()?;
-                (sum < LesserHalf::MOST_UNITS).then_some(Tally::LesserHalf {
-                    covered,
-                    half: LesserHalf { counted, sum },
-                })
+                (sum < LesserHalf::MOST_UNITS)
+                    .then_some(Tally::LesserHalf { covered, half: LesserHalf { counted, sum } })
             }
             (_, counts) => Some(Tally::Counts(counts.to_vec())),
         }

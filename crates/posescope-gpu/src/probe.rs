@@ -39,9 +39,7 @@ fn questions() -> Vec<Question> {
     // A multiplicative generator, of which the upper bits are used.
     let mut state = 0x9e37_79b9_7f4a_7c15_u64;
     let mut drawn = |least: f32, most: f32| {
-        state = state
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1);
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
         let share = (state >> 40) as f32 / (1_u64 << 24) as f32;
         least + (most - least) * share
     };
@@ -57,25 +55,14 @@ fn questions() -> Vec<Question> {
             // Near and far, and now and then at powers of two, whose inverses are exact.
             let reach = [1.0, 10.0, 80.0, 4000.0][place % 4];
             // A street is flat: of points all around hardly any would be in view.
-            let mut point = [
-                drawn(-reach, reach),
-                drawn(-0.1 * reach, 0.1 * reach),
-                drawn(-reach, reach),
-            ];
+            let mut point =
+                [drawn(-reach, reach), drawn(-0.1 * reach, 0.1 * reach), drawn(-reach, reach)];
             let mut rows = [row(across), row(along), depth];
             if place % 64 == 0 {
-                point = [
-                    drawn(-1.0, 1.0),
-                    drawn(-1.0, 1.0),
-                    (1 << (place / 64 % 8)) as f32,
-                ];
+                point = [drawn(-1.0, 1.0), drawn(-1.0, 1.0), (1 << (place / 64 % 8)) as f32];
                 rows[2] = [0.0, 0.0, 1.0, 0.0];
             }
-            Question {
-                point,
-                rows,
-                values: [drawn(0.0, 255.0), drawn(0.0, 255.0)],
-            }
+            Question { point, rows, values: [drawn(0.0, 255.0), drawn(0.0, 255.0)] }
         })
         .collect()
 }
@@ -117,10 +104,7 @@ fn answers_to(card: &Card, kernels: &Kernels, questions: &[Question]) -> Option<
             [x, y, z, question.values[1]].map(f32::to_bits)
         })
         .collect();
-    let values: Vec<f32> = questions
-        .iter()
-        .map(|question| question.values[0])
-        .collect();
+    let values: Vec<f32> = questions.iter().map(|question| question.values[0]).collect();
     let rows: Vec<_> = questions.iter().map(|question| question.rows).collect();
     let shape = Shape {
         points: questions.len() as u32,
@@ -135,11 +119,7 @@ fn answers_to(card: &Card, kernels: &Kernels, questions: &[Question]) -> Option<
     let words = WORDS * questions.len();
     let bytes = 4 * words as u64;
     let answer = card.buffer("probe", bytes, storage | BufferUsages::COPY_SRC);
-    let staging = card.buffer(
-        "probe",
-        bytes,
-        BufferUsages::MAP_READ | BufferUsages::COPY_DST,
-    );
+    let staging = card.buffer("probe", bytes, BufferUsages::MAP_READ | BufferUsages::COPY_DST);
     let unused = [0; 4].map(|bytes| card.buffer("unused", bytes, storage));
     let [nearest, first, errors, ages] = &unused;
     let buffers = [

@@ -60,31 +60,13 @@ impl Slots {
         }
         let (to_card, from_card) = (BufferUsages::COPY_DST, BufferUsages::COPY_SRC);
         let storage = BufferUsages::STORAGE;
-        grow(
-            card,
-            &mut self.projections,
-            projection_bytes,
-            storage | to_card,
-        );
+        grow(card, &mut self.projections, projection_bytes, storage | to_card);
         grow(card, &mut self.answer, answer_bytes, storage | from_card);
-        grow(
-            card,
-            &mut self.staging,
-            answer_bytes,
-            BufferUsages::MAP_READ | to_card,
-        );
-        match (
-            &self.drawing,
-            &self.projections,
-            &self.answer,
-            &self.staging,
-        ) {
-            (Some(drawing), Some(projections), Some(answer), Some(staging)) => Ok(Batch {
-                drawing,
-                projections,
-                answer,
-                staging,
-            }),
+        grow(card, &mut self.staging, answer_bytes, BufferUsages::MAP_READ | to_card);
+        match (&self.drawing, &self.projections, &self.answer, &self.staging) {
+            (Some(drawing), Some(projections), Some(answer), Some(staging)) => {
+                Ok(Batch { drawing, projections, answer, staging })
+            }
             _ => unreachable!("they were made above"),
         }
     }
@@ -101,14 +83,8 @@ impl Drawing {
     /// As many slots as are of use and fit.
     fn new(card: &Card, pixels: u64, has_errors: bool) -> Result<Self, GpuError> {
         let limits = &card.limits;
-        let bytes = limits
-            .max_storage_buffer_binding_size
-            .min(limits.max_buffer_size);
-        let most = if card.is_software {
-            MOST_SLOTS_OF_SOFTWARE
-        } else {
-            MOST_SLOTS
-        };
+        let bytes = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
+        let most = if card.is_software { MOST_SLOTS_OF_SOFTWARE } else { MOST_SLOTS };
         let mut count = (bytes.min(MOST_BYTES) / (4 * pixels)).min(most);
         while count > 0 {
             match Self::with(card, pixels, has_errors, count) {

@@ -26,14 +26,7 @@ fn gpu() -> Option<Arc<Gpu>> {
 }
 
 fn camera() -> Intrinsics {
-    Intrinsics {
-        fx: 80.0,
-        fy: 81.0,
-        cx: 59.7,
-        cy: 30.2,
-        width: 121,
-        height: 60,
-    }
+    Intrinsics { fx: 80.0, fy: 81.0, cx: 59.7, cy: 30.2, width: 121, height: 60 }
 }
 
 struct World {
@@ -58,10 +51,7 @@ fn world(seed: u64, points: usize, poses: usize) -> World {
         })
         .collect();
     for place in (0..points).step_by(7) {
-        let twin = ColoredPoint {
-            intensity: 255.0 - cloud[place].intensity,
-            ..cloud[place]
-        };
+        let twin = ColoredPoint { intensity: 255.0 - cloud[place].intensity, ..cloud[place] };
         cloud.push(twin);
     }
     let values: Vec<f32> = (0..121 * 60).map(|_| drawn(0.0, 255.0) as f32).collect();
@@ -74,11 +64,7 @@ fn world(seed: u64, points: usize, poses: usize) -> World {
             Pose::from_parts(Translation3::from(centre), turn.into())
         })
         .collect();
-    World {
-        points: cloud,
-        query: Arc::new(query),
-        poses,
-    }
+    World { points: cloud, query: Arc::new(query), poses }
 }
 
 fn cost_of(name: &str, setting: &str) -> Box<dyn Cost> {
@@ -108,15 +94,8 @@ fn scores_are_those_of_the_threads_to_the_last_bit() {
         for (name, setting, splat_px) in asked {
             let cost = cost_of(name, setting);
             let query = Arc::clone(&world.query);
-            let scorer = || {
-                Scorer::new(
-                    &world.points,
-                    query.clone(),
-                    &camera(),
-                    splat_px,
-                    cost.as_ref(),
-                )
-            };
+            let scorer =
+                || Scorer::new(&world.points, query.clone(), &camera(), splat_px, cost.as_ref());
             let expected = scorer().on(None).score(&world.poses);
             let device = Arc::clone(&gpu) as Arc<dyn Device>;
             let found = scorer().on(Some(device)).score(&world.poses);
@@ -125,22 +104,13 @@ fn scores_are_those_of_the_threads_to_the_last_bit() {
             assert_eq!(gpu.complaint(), None);
         }
         let costs = expected_costs(&world);
-        assert!(
-            points == 1 || costs > poses / 2,
-            "{costs} of {poses} see something"
-        );
+        assert!(points == 1 || costs > poses / 2, "{costs} of {poses} see something");
     }
 }
 
 fn expected_costs(world: &World) -> usize {
     let cost = cost_of("mi", "");
-    let scorer = Scorer::new(
-        &world.points,
-        world.query.clone(),
-        &camera(),
-        1,
-        cost.as_ref(),
-    );
+    let scorer = Scorer::new(&world.points, world.query.clone(), &camera(), 1, cost.as_ref());
     let scores = scorer.on(None).score(&world.poses);
     scores.iter().filter(|score| score.cost.is_some()).count()
 }
@@ -150,13 +120,7 @@ fn what_is_too_large_is_left_to_the_processor_and_said() {
     let Some(gpu) = gpu() else { return };
     let world = world(4, 500, 50);
     let cost = cost_of("mi", "mi.bins=61");
-    let scorer = Scorer::new(
-        &world.points,
-        world.query.clone(),
-        &camera(),
-        1,
-        cost.as_ref(),
-    );
+    let scorer = Scorer::new(&world.points, world.query.clone(), &camera(), 1, cost.as_ref());
     let device = Arc::clone(&gpu) as Arc<dyn Device>;
     let scores = scorer.on(Some(device)).score(&world.poses);
     assert_eq!(scores.len(), 50);

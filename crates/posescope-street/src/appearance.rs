@@ -36,10 +36,7 @@ pub(super) struct Appearance {
 impl Appearance {
     /// A matt surface.
     pub(super) fn matt(albedo: Rgb) -> Self {
-        Self {
-            albedo,
-            ..Self::default()
-        }
+        Self { albedo, ..Self::default() }
     }
 
     /// This with `share` of it covered by `over`.

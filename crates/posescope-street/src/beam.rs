@@ -16,21 +16,14 @@ impl Beam {
     /// in the directions between them.
     pub(super) fn around(origin: Point3<f64>, directions: &[Vector3<f64>]) -> Self {
         let axis: Vector3<f64> = directions.iter().sum::<Vector3<f64>>().normalize();
-        let right = axis
-            .cross(&Vector3::y())
-            .try_normalize(1e-6)
-            .unwrap_or_else(Vector3::x);
+        let right = axis.cross(&Vector3::y()).try_normalize(1e-6).unwrap_or_else(Vector3::x);
         let [aside, above] = [right, right.cross(&axis)].map(|across| {
             let slopes = directions.iter().map(|d| d.dot(&across) / d.dot(&axis));
-            let (low, high) = slopes.fold((f64::MAX, f64::MIN), |(low, high), slope| {
-                (low.min(slope), high.max(slope))
-            });
+            let (low, high) = slopes
+                .fold((f64::MAX, f64::MIN), |(low, high), slope| (low.min(slope), high.max(slope)));
             [across - axis * low, axis * high - across]
         });
-        Self {
-            origin,
-            sides: [aside[0], aside[1], above[0], above[1]],
-        }
+        Self { origin, sides: [aside[0], aside[1], above[0], above[1]] }
     }
 
     /// Whether any part of a box may be inside.

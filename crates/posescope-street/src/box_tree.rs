@@ -35,11 +35,7 @@ impl Node {
     #[inline]
     fn children(&self, backwards: [bool; 3]) -> [u32; 2] {
         let [first, second] = self.links;
-        if backwards[usize::from(self.axis)] {
-            [second, first]
-        } else {
-            [first, second]
-        }
+        if backwards[usize::from(self.axis)] { [second, first] } else { [first, second] }
     }
 }
 
@@ -66,10 +62,8 @@ impl BoxTree {
     /// Adds the tree over some of the items; returns the index of its root.
     fn split(&mut self, boxes: &[[Point3<f64>; 2]], begin: usize, end: usize) -> u32 {
         let items = &mut self.items[begin..end];
-        let empty = [
-            Point3::from(Vector3::repeat(f64::MAX)),
-            Point3::from(Vector3::repeat(f64::MIN)),
-        ];
+        let empty =
+            [Point3::from(Vector3::repeat(f64::MAX)), Point3::from(Vector3::repeat(f64::MIN))];
         let [low, high] = items.iter().fold(empty, |[low, high], &i| {
             let [a, b] = boxes[i as usize];
             [low.inf(&a), high.sup(&b)]
@@ -88,12 +82,7 @@ impl BoxTree {
         let (axis, middle) = cheapest_split(items, boxes, (high - low).imax());
         let first = self.split(boxes, begin, begin + middle);
         let second = self.split(boxes, begin + middle, end);
-        self.push(Node {
-            corners,
-            links: [first, second],
-            count: 0,
-            axis: axis as u16,
-        })
+        self.push(Node { corners, links: [first, second], count: 0, axis: axis as u16 })
     }
 
     fn push(&mut self, node: Node) -> u32 {
@@ -112,10 +101,7 @@ impl BoxTree {
 
     /// The tree of what a beam reaches, in the same order.
     pub(super) fn part(&self, beam: &Beam) -> Self {
-        let mut part = Self {
-            nodes: Vec::new(),
-            items: Vec::new(),
-        };
+        let mut part = Self { nodes: Vec::new(), items: Vec::new() };
         if let Some(root) = self.root() {
             part.copy(self, root, beam);
         }
@@ -131,16 +117,10 @@ impl BoxTree {
         if node.count > 0 {
             let first = self.items.len() as u32;
             self.items.extend(whole.items_of(&node));
-            return Some(self.push(Node {
-                links: [first; 2],
-                ..node
-            }));
+            return Some(self.push(Node { links: [first; 2], ..node }));
         }
         match node.links.map(|child| self.copy(whole, child, beam)) {
-            [Some(first), Some(second)] => Some(self.push(Node {
-                links: [first, second],
-                ..node
-            })),
+            [Some(first), Some(second)] => Some(self.push(Node { links: [first, second], ..node })),
             [first, second] => first.or(second),
         }
     }
@@ -192,10 +172,7 @@ impl BoxTree {
             let leaf = &self.nodes[index as usize];
             self.items_of(leaf).iter().any(|&item| is_met(item))
         };
-        if leaf
-            .get()
-            .is_some_and(|leaf| is_entered(leaf) && holds_met(leaf))
-        {
+        if leaf.get().is_some_and(|leaf| is_entered(leaf) && holds_met(leaf)) {
             return true;
         }
         let mut stack: ArrayVec<u32, 64> = self.root().into_iter().collect();
@@ -307,17 +284,12 @@ mod tests {
     fn random_boxes(count: u32) -> Vec<[Point3<f64>; 2]> {
         let random = |i, row: usize| 100.0 * unit(derive(i, row as u32)) - 50.0;
         let corner = |i| Point3::from(Vector3::from_fn(|row, _| random(i, row)));
-        (0..count)
-            .map(|i| [corner(i), corner(i) + Vector3::repeat(5.0)])
-            .collect()
+        (0..count).map(|i| [corner(i), corner(i) + Vector3::repeat(5.0)]).collect()
     }
 
     fn random_ray(i: u32) -> Ray {
         let direction = Vector3::from_fn(|r, _| unit(derive(i, 50 + r as u32)) - 0.5);
-        Ray {
-            origin: Point3::origin(),
-            direction: direction.normalize(),
-        }
+        Ray { origin: Point3::origin(), direction: direction.normalize() }
     }
 
     #[test]

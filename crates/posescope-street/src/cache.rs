@@ -28,10 +28,7 @@ pub(crate) struct Cache<T> {
 impl<T: Stored> Cache<T> {
     /// Keeps `in_memory` values in memory, and all on disk if there is one.
     pub(crate) fn new(in_memory: usize, disk: Option<Arc<DiskCache>>) -> Self {
-        Self {
-            recent: Recent::new(in_memory),
-            disk,
-        }
+        Self { recent: Recent::new(in_memory), disk }
     }
 
     /// The value of a key. Two threads that ask at the same time may both make it: no lock is held

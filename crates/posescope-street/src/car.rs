@@ -47,10 +47,7 @@ impl CarShape {
         let width = 1.74 + 0.1 * unit(derive(seed, 3));
         let belt = 0.62 * height.min(1.55);
         let mirrored = |x, y, z, offset| {
-            [
-                plane(Vector3::new(x, y, z), offset),
-                plane(Vector3::new(-x, y, z), offset),
-            ]
+            [plane(Vector3::new(x, y, z), offset), plane(Vector3::new(-x, y, z), offset)]
         };
         let (side, nose) = (0.5 * width, 0.5 * length);
         let [side_right, side_left] = mirrored(1.0, 0.06, 0.0, side + 0.06 * 0.5);
@@ -79,26 +76,12 @@ impl CarShape {
             pane_left,
             edge_right,
             edge_left,
-            plane(
-                Vector3::new(0.0, front_run, 1.0),
-                windscreen + front_run * belt,
-            ),
-            plane(
-                Vector3::new(0.0, rear_run, -1.0),
-                rear * stretch + rear_run * belt,
-            ),
+            plane(Vector3::new(0.0, front_run, 1.0), windscreen + front_run * belt),
+            plane(Vector3::new(0.0, rear_run, -1.0), rear * stretch + rear_run * belt),
             plane(Vector3::y(), height),
             plane(-Vector3::y(), -belt),
         ];
-        Self {
-            length,
-            width,
-            height,
-            belt,
-            axles: [0.78 - nose, nose - 0.82],
-            body,
-            cabin,
-        }
+        Self { length, width, height, belt, axles: [0.78 - nose, nose - 0.82], body, cabin }
     }
 
     /// Half width, height, half length.

@@ -17,13 +17,7 @@ pub enum Condition {
 
 impl Condition {
     /// All of them.
-    pub const ALL: [Self; 5] = [
-        Self::Overcast,
-        Self::Sun,
-        Self::Night,
-        Self::Rain,
-        Self::Snow,
-    ];
+    pub const ALL: [Self; 5] = [Self::Overcast, Self::Sun, Self::Night, Self::Rain, Self::Snow];
 
     /// Its name, in lower case.
     pub fn name(self) -> &'static str {

@@ -45,11 +45,7 @@ impl Layer {
 
     /// What is seen where this lies on something.
     pub(super) fn over(&self, below: Appearance) -> Appearance {
-        if self.share > 0.0 {
-            below.covered(self.snow, self.share)
-        } else {
-            below
-        }
+        if self.share > 0.0 { below.covered(self.snow, self.share) } else { below }
     }
 }
 
@@ -68,16 +64,10 @@ impl Cover {
         let p = Point2::new(point.x, point.z);
         let white = fresh(p, footprint, seed);
         let Some(place) = &contact.place else {
-            return Layer {
-                snow: Appearance::matt(white),
-                share: 1.0,
-            };
+            return Layer { snow: Appearance::matt(white), share: 1.0 };
         };
         if contact.normal.y < 0.5 {
-            return Layer {
-                snow: Appearance::matt(white * 0.8),
-                share: 0.75 * self.snow,
-            };
+            return Layer { snow: Appearance::matt(white * 0.8), share: 0.75 * self.snow };
         }
         // Cars have driven to and fro in two pairs of ruts, pressed and soiled the snow between them.
         let from_rut = (((place.lateral - LANE).abs() - HALF_TRACK).abs() - 0.16)
@@ -108,10 +98,7 @@ impl Cover {
             return bare;
         }
         if !paved {
-            return Appearance {
-                albedo: bare.albedo * (1.0 - 0.35 * self.wet),
-                ..bare
-            };
+            return Appearance { albedo: bare.albedo * (1.0 - 0.35 * self.wet), ..bare };
         }
         let p = Point2::new(point.x, point.z);
         let puddle = step(octaves(p, 2.3, 3, 0.6, footprint, seed ^ 95) - 0.15, 0.5);
@@ -134,10 +121,7 @@ impl Cover {
         if self.wet > 0.0 {
             let soaks = !matches!(solid.material, Material::Car(_) | Material::Lamp(_));
             let share = if soaks { 0.3 * self.wet } else { 0.0 };
-            return Appearance {
-                albedo: bare.albedo * (1.0 - share * (1.0 - bare.glass)),
-                ..bare
-            };
+            return Appearance { albedo: bare.albedo * (1.0 - share * (1.0 - bare.glass)), ..bare };
         }
         if self.snow == 0.0 {
             return bare;
@@ -191,10 +175,7 @@ mod tests {
 
     #[test]
     fn the_carriageway_is_slush_and_the_pavement_is_white() {
-        let cover = Cover {
-            snow: 1.0,
-            wet: 0.0,
-        };
+        let cover = Cover { snow: 1.0, wet: 0.0 };
         let footprint = Footprint {
             along: nalgebra::Vector2::repeat(0.02),
             slant: nalgebra::Vector2::zeros(),
@@ -207,12 +188,7 @@ mod tests {
                 let contact = GroundContact {
                     distance: 10.0,
                     normal: Vector3::y(),
-                    place: Some(Place {
-                        from_kerb,
-                        street: 0,
-                        station,
-                        lateral: from_kerb + 4.4,
-                    }),
+                    place: Some(Place { from_kerb, street: 0, station, lateral: from_kerb + 4.4 }),
                 };
                 let point = Point3::new(from_kerb, 0.0, station);
                 let layer = cover.hides_ground(&contact, &point, &footprint, 5);

@@ -77,12 +77,12 @@ impl Street {
     }
 
     fn with_cache(wanted: &str, size: Size, cache: Arc<FrameCache>) -> Result<Self, SceneError> {
-        let &(name, condition) = CONDITIONS
-            .iter()
-            .find(|(name, _)| *name == wanted)
-            .ok_or_else(|| SceneError::UnknownCondition {
-                argument: format!("{NAME}:{wanted}"),
-                known: Self::conditions().collect::<Vec<_>>().join(", "),
+        let &(name, condition) =
+            CONDITIONS.iter().find(|(name, _)| *name == wanted).ok_or_else(|| {
+                SceneError::UnknownCondition {
+                    argument: format!("{NAME}:{wanted}"),
+                    known: Self::conditions().collect::<Vec<_>>().join(", "),
+                }
             })?;
         let size_name = SIZES.iter().find(|(_, known)| *known == size);
         let size_name = size_name.map_or("other", |(name, _)| name);
@@ -121,8 +121,7 @@ impl Street {
 
     /// What makes the frames, past the cache.
     pub fn traversal(&self) -> &Traversal {
-        self.traversal
-            .get_or_init(|| Traversal::new(WORLD_SEED, self.condition, self.size))
+        self.traversal.get_or_init(|| Traversal::new(WORLD_SEED, self.condition, self.size))
     }
 
     fn poses(&self) -> &[Pose] {
@@ -132,9 +131,7 @@ impl Street {
             Poses(frames.map(|i| traversal.world_from_camera(i)).collect())
         };
         let key = || format!("{}-poses", self.key);
-        let poses = self
-            .poses
-            .get_or_init(|| self.cache.poses.get_or_make(&key(), make));
+        let poses = self.poses.get_or_init(|| self.cache.poses.get_or_make(&key(), make));
         &poses.0
     }
 
@@ -179,9 +176,7 @@ impl Scene for Street {
     }
 
     fn cloud(&self, frame: usize) -> Result<Cloud, SceneError> {
-        let make = || Cloud {
-            points: positions(&self.traversal().cloud(frame)),
-        };
+        let make = || Cloud { points: positions(&self.traversal().cloud(frame)) };
         let key = self.frame_key(frame, "cloud");
         let cloud = self.cache.clouds.get_or_make(&key, make);
         Ok(Cloud::clone(&cloud))
@@ -218,14 +213,9 @@ mod tests {
         let street = Street::open("street").unwrap_or_else(|error| panic!("{error}"));
         let at = |frame| street.pose(frame).map(|pose| pose.translation.vector);
         let step = at(101).zip(at(100)).map(|(a, b)| (a - b).norm());
-        assert!(
-            step.is_some_and(|step| (0.5..1.5).contains(&step)),
-            "{step:?}"
-        );
+        assert!(step.is_some_and(|step| (0.5..1.5).contains(&step)), "{step:?}");
         let scene: &dyn Scene = &street;
-        let tuple = scene
-            .reference(100)
-            .unwrap_or_else(|error| panic!("{error}"));
+        let tuple = scene.reference(100).unwrap_or_else(|error| panic!("{error}"));
         assert_eq!(tuple.photo.dimensions(), (1241, 376));
         assert!(tuple.cloud.len() > 50_000);
     }
@@ -249,9 +239,8 @@ mod tests {
         let fresh = Photo::from_color(drive.image(frame));
         assert_eq!((photo.color, photo.gray), (fresh.color, fresh.gray));
         assert_eq!(cloud.points, positions(&drive.cloud(frame)));
-        let poses: Vec<_> = (0..drive.frame_count())
-            .map(|frame| drive.world_from_camera(frame))
-            .collect();
+        let poses: Vec<_> =
+            (0..drive.frame_count()).map(|frame| drive.world_from_camera(frame)).collect();
         assert_eq!(street.poses(), poses);
     }
 

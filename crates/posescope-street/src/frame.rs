@@ -36,31 +36,20 @@ pub(super) struct Frame {
 impl Frame {
     /// A frame at a point of the plan.
     pub(super) fn new(plan: Point2<f64>, height: f64, ahead: Vector2<f64>) -> Self {
-        Self {
-            origin: Point3::new(plan.x, height, plan.y),
-            ahead,
-        }
+        Self { origin: Point3::new(plan.x, height, plan.y), ahead }
     }
 
     #[inline]
     fn vector_to_local(&self, v: &Vector3<f64>) -> Vector3<f64> {
         let right = right_of(self.ahead);
-        Vector3::new(
-            v.x * right.x + v.z * right.y,
-            v.y,
-            v.x * self.ahead.x + v.z * self.ahead.y,
-        )
+        Vector3::new(v.x * right.x + v.z * right.y, v.y, v.x * self.ahead.x + v.z * self.ahead.y)
     }
 
     /// A vector of the frame in town coordinates.
     #[inline]
     pub(super) fn vector_to_town(&self, v: &Vector3<f64>) -> Vector3<f64> {
         let right = right_of(self.ahead);
-        Vector3::new(
-            v.x * right.x + v.z * self.ahead.x,
-            v.y,
-            v.x * right.y + v.z * self.ahead.y,
-        )
+        Vector3::new(v.x * right.x + v.z * self.ahead.x, v.y, v.x * right.y + v.z * self.ahead.y)
     }
 
     /// A ray of the town in the frame's coordinates.

@@ -84,9 +84,7 @@ impl Stored for Cloud {
             return None;
         };
         let point = |point: &[[u8; 4]; 3]| Point3::from(point.map(f32::from_le_bytes));
-        Some(Self {
-            points: points.iter().map(point).collect(),
-        })
+        Some(Self { points: points.iter().map(point).collect() })
     }
 }
 
@@ -131,9 +129,8 @@ mod tests {
         let read = Photo::from_bytes(&bytes).expect("just written");
         assert_eq!((read.color, read.gray), (photo.color, photo.gray));
 
-        let cloud = Cloud {
-            points: vec![Point3::new(1.5, -0.1, 1e-20), Point3::new(0.3, 7.0, -80.25)],
-        };
+        let cloud =
+            Cloud { points: vec![Point3::new(1.5, -0.1, 1e-20), Point3::new(0.3, 7.0, -80.25)] };
         let bytes = cloud.to_bytes().expect("always");
         assert_eq!(bytes.len(), 2 * 12);
         let read = Cloud::from_bytes(&bytes).expect("just written");

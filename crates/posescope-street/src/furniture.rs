@@ -56,14 +56,7 @@ fn boundaries(builder: &mut Builder, street: usize, side: f64, traversal: u32) {
                 half: Vector2::new(1.02, 0.12),
             };
             if builder.is_free(&plot, PAVEMENT + 0.05) {
-                boundary(
-                    builder,
-                    plot,
-                    kind,
-                    height,
-                    seed.wrapping_add(piece),
-                    traversal,
-                );
+                boundary(builder, plot, kind, height, seed.wrapping_add(piece), traversal);
             }
             match builder.rng.random_range(0..10_u32) {
                 0..=3 => bush(builder, plot.at(0.0, -1.2), traversal),
@@ -81,11 +74,8 @@ fn boundary(builder: &mut Builder, plot: Plot, kind: u32, height: f64, seed: u32
     match kind {
         0 | 1 => {
             let green = Rgb::new(0.035, 0.06, 0.02);
-            let thick = Plot {
-                half: Vector2::new(1.02, 0.35),
-                centre: plot.at(0.0, -0.25),
-                ..plot
-            };
+            let thick =
+                Plot { half: Vector2::new(1.02, 0.35), centre: plot.at(0.0, -0.25), ..plot };
             builder.add_block(&thick, [0.0, height], Material::Hedge(green), seed);
             // Shoots that the shears have missed since.
             for k in 0..3 {
@@ -101,23 +91,14 @@ fn boundary(builder: &mut Builder, plot: Plot, kind: u32, height: f64, seed: u32
         }
         2 => {
             let colour = Rgb::new(0.36, 0.33, 0.28);
-            let material = Material::Wall {
-                colour,
-                brick: seed & 64 == 0,
-            };
+            let material = Material::Wall { colour, brick: seed & 64 == 0 };
             builder.add_block(&plot, [0.0, 0.75 * height], material, seed);
-            let coping = Plot {
-                half: plot.half + Vector2::new(0.0, 0.05),
-                ..plot
-            };
+            let coping = Plot { half: plot.half + Vector2::new(0.0, 0.05), ..plot };
             let top = [0.75 * height, 0.75 * height + 0.07];
             builder.add_block(&coping, top, Material::Plain(grey(0.25)), seed);
         }
         _ => {
-            let thin = Plot {
-                half: Vector2::new(1.0, 0.02),
-                ..plot
-            };
+            let thin = Plot { half: Vector2::new(1.0, 0.02), ..plot };
             let brown = Rgb::new(0.13, 0.09, 0.06);
             builder.add_block(&thin, [0.1, 1.1], Material::Fence(brown), seed);
         }
@@ -169,16 +150,9 @@ fn lamp(builder: &mut Builder, foot: Point2<f64>, towards_road: Vector2<f64>) {
         ahead: towards_road,
         half: Vector2::new(0.13, 0.75),
     };
-    builder.add_block(
-        &head,
-        [height, height + 0.13],
-        Material::Lamp(lamps::COLOUR * 12.0),
-        0,
-    );
+    builder.add_block(&head, [height, height + 0.13], Material::Lamp(lamps::COLOUR * 12.0), 0);
     let light = foot + towards_road * 1.1;
-    builder
-        .lamps
-        .push(Point3::new(light.x, height - 0.05, light.y));
+    builder.lamps.push(Point3::new(light.x, height - 0.05, light.y));
 }
 
 fn sign(builder: &mut Builder, foot: Point2<f64>, facing: Vector2<f64>) {
@@ -187,11 +161,8 @@ fn sign(builder: &mut Builder, foot: Point2<f64>, facing: Vector2<f64>) {
     let height = builder.rng.random_range(2.0..2.5);
     let seed = builder.rng.random();
     builder.add_post(foot, 0.032, height + 0.7, grey(0.25));
-    let face = Plot {
-        centre: foot + facing * 0.05,
-        ahead: facing,
-        half: Vector2::new(0.35, 0.012),
-    };
+    let face =
+        Plot { centre: foot + facing * 0.05, ahead: facing, half: Vector2::new(0.35, 0.012) };
     builder.add_block(&face, [height, height + 0.7], Material::Sign(kind), seed);
 }
 
@@ -203,11 +174,7 @@ fn bollards(builder: &mut Builder, here: &Station, side: f64) {
             let seed = builder.rng.random();
             builder.add_post(foot, 0.055, 0.95, grey(0.3));
             let base = Point3::new(foot.x, 0.7, foot.y);
-            let band = Shape::Pole {
-                base,
-                radius: 0.06,
-                height: 0.22,
-            };
+            let band = Shape::Pole { base, radius: 0.06, height: 0.22 };
             builder.add(band, Material::Banded, seed);
         }
     }
@@ -217,23 +184,13 @@ fn bin(builder: &mut Builder, at: Point2<f64>) {
     if builder.network.kerb_distance(at) < 1.0 {
         return;
     }
-    let colour = [
-        grey(0.03),
-        Rgb::new(0.02, 0.06, 0.14),
-        Rgb::new(0.05, 0.04, 0.025),
-    ][builder.rng.random_range(0..3_usize)];
+    let colour = [grey(0.03), Rgb::new(0.02, 0.06, 0.14), Rgb::new(0.05, 0.04, 0.025)]
+        [builder.rng.random_range(0..3_usize)];
     let seed = builder.rng.random();
-    let plot = Plot {
-        centre: at,
-        ahead: Vector2::y(),
-        half: Vector2::new(0.28, 0.33),
-    };
+    let plot = Plot { centre: at, ahead: Vector2::y(), half: Vector2::new(0.28, 0.33) };
     builder.shade(plot, 0.35, 0.5);
     builder.add_block(&plot, [0.05, 1.0], Material::Plain(colour), seed);
-    let lid = Plot {
-        half: plot.half + Vector2::repeat(0.03),
-        ..plot
-    };
+    let lid = Plot { half: plot.half + Vector2::repeat(0.03), ..plot };
     builder.add_block(&lid, [1.0, 1.08], Material::Plain(colour * 1.6), seed);
 }
 
@@ -254,11 +211,7 @@ fn tree(builder: &mut Builder, foot: Point2<f64>, size: f64, traversal: u32) {
         height: trunk + 0.8 * spread,
     };
     builder.add(shape, Material::Bark, seed);
-    let below = |half: f64| Plot {
-        centre: foot,
-        ahead: Vector2::y(),
-        half: Vector2::repeat(half),
-    };
+    let below = |half: f64| Plot { centre: foot, ahead: Vector2::y(), half: Vector2::repeat(half) };
     builder.shade(below(0.1), 0.6, 0.4);
     builder.shade(below(0.5 * spread), 1.4 * spread, 0.3);
     for k in 0..CLUMPS {
@@ -273,22 +226,12 @@ fn tree(builder: &mut Builder, foot: Point2<f64>, size: f64, traversal: u32) {
             trunk + 0.3 * spread + 1.9 * spread * level,
             foot.y + ring * sin,
         );
-        clump(
-            builder,
-            centre,
-            radius,
-            green,
-            seed.wrapping_add(k) ^ traversal,
-        );
+        clump(builder, centre, radius, green, seed.wrapping_add(k) ^ traversal);
     }
 }
 
 fn clump(builder: &mut Builder, centre: Point3<f64>, radius: f64, green: Rgb, seed: u32) {
-    let shape = Shape::Clump {
-        centre,
-        radius,
-        half_height: 0.8 * radius,
-    };
+    let shape = Shape::Clump { centre, radius, half_height: 0.8 * radius };
     let (colour, density) = match builder.season {
         Season::Summer => (green, 1.0),
         Season::Winter => (Rgb::new(0.075, 0.062, 0.05), 0.42),
@@ -297,11 +240,7 @@ fn clump(builder: &mut Builder, centre: Point3<f64>, radius: f64, green: Rgb, se
 }
 
 fn bush(builder: &mut Builder, foot: Point2<f64>, traversal: u32) {
-    let plot = Plot {
-        centre: foot,
-        ahead: Vector2::y(),
-        half: Vector2::repeat(0.4),
-    };
+    let plot = Plot { centre: foot, ahead: Vector2::y(), half: Vector2::repeat(0.4) };
     if !builder.is_free(&plot, PAVEMENT + 0.4) {
         return;
     }
@@ -312,23 +251,13 @@ fn bush(builder: &mut Builder, foot: Point2<f64>, traversal: u32) {
         let shift: [f64; 2] = std::array::from_fn(|_| builder.rng.random_range(-0.5..0.5));
         let radius = builder.rng.random_range(0.5..0.9);
         let centre = Point3::new(foot.x + shift[0], 0.7 * radius, foot.y + shift[1]);
-        clump(
-            builder,
-            centre,
-            radius,
-            green,
-            seed.wrapping_add(k) ^ traversal,
-        );
+        clump(builder, centre, radius, green, seed.wrapping_add(k) ^ traversal);
     }
 }
 
 /// A small tree behind the fence of a garden.
 fn garden_tree(builder: &mut Builder, foot: Point2<f64>, traversal: u32) {
-    let plot = Plot {
-        centre: foot,
-        ahead: Vector2::y(),
-        half: Vector2::repeat(0.5),
-    };
+    let plot = Plot { centre: foot, ahead: Vector2::y(), half: Vector2::repeat(0.5) };
     if builder.is_free(&plot, PAVEMENT + 0.4) {
         tree(builder, foot, 0.75, traversal);
     }
@@ -345,11 +274,7 @@ fn background(builder: &mut Builder, traversal: u32) {
                 f64::from(column) * STEP + jitter[0],
                 f64::from(row) * STEP + jitter[1],
             );
-            let plot = Plot {
-                centre: foot,
-                ahead: Vector2::y(),
-                half: Vector2::repeat(2.0),
-            };
+            let plot = Plot { centre: foot, ahead: Vector2::y(), half: Vector2::repeat(2.0) };
             let keep = builder.rng.random_bool(0.3);
             if keep && builder.is_free(&plot, PAVEMENT + 2.5) {
                 tree(builder, foot, size, traversal);

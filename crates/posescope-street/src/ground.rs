@@ -38,11 +38,7 @@ pub(super) fn meet(network: &Network, ray: &Ray, limit: f64) -> Option<GroundCon
     }
     let place_at = |distance| network.place(plan(&ray.at(distance)));
     let raised = |place: &Option<Place>| place.is_none_or(|p| p.from_kerb >= 0.0);
-    let contact = |distance, normal, place| GroundContact {
-        distance,
-        normal,
-        place,
-    };
+    let contact = |distance, normal, place| GroundContact { distance, normal, place };
     let above = place_at(upper);
     let found = if raised(&above) {
         contact(upper, Vector3::y(), above)
@@ -81,14 +77,9 @@ fn kerb_face(network: &Network, ray: &Ray, mut outside: f64, mut inside: f64) ->
 fn away_from_kerb(network: &Network, p: &Point3<f64>) -> Vector3<f64> {
     const STEP: f64 = 0.01;
     let at = |dx: f64, dz: f64| network.kerb_distance(Point2::new(p.x + dx, p.z + dz));
-    let gradient = Vector3::new(
-        at(STEP, 0.0) - at(-STEP, 0.0),
-        0.0,
-        at(0.0, STEP) - at(0.0, -STEP),
-    );
-    gradient
-        .try_normalize(1e-12)
-        .map_or_else(Vector3::y, |outward| -outward)
+    let gradient =
+        Vector3::new(at(STEP, 0.0) - at(-STEP, 0.0), 0.0, at(0.0, STEP) - at(0.0, -STEP));
+    gradient.try_normalize(1e-12).map_or_else(Vector3::y, |outward| -outward)
 }
 
 /// The look of the ground at a point.
@@ -242,11 +233,7 @@ fn marking(network: &Network, place: &Place, blur: f64) -> f64 {
     let beyond = step(to_crossing - 15.0, blur);
     let dashes = stripes(place.station, 6.0, 3.0, blur);
     let dashed_here = place.street.is_multiple_of(2) || to_crossing < 40.0;
-    let middle = if dashed_here {
-        bar(l, -0.06, 0.06, blur) * dashes
-    } else {
-        0.0
-    };
+    let middle = if dashed_here { bar(l, -0.06, 0.06, blur) * dashes } else { 0.0 };
     let edge = bar(l.abs(), BAY_LINE - 0.05, BAY_LINE + 0.05, blur);
     let bays = bar(l.abs(), BAY_LINE, HALF_WIDTH, blur) * stripes(place.station, 6.2, 0.1, blur);
     (zebra + stop + beyond * (middle + edge + bays)).min(1.0)

@@ -51,11 +51,7 @@ fn line_street(builder: &mut Builder, street: usize, side: f64, length: f64) {
     while station < length {
         if station >= row_end {
             row_end = station + builder.rng.random_range(35.0..75.0);
-            row = if builder.rng.random_bool(0.55) {
-                Row::Terrace
-            } else {
-                Row::Villas
-            };
+            row = if builder.rng.random_bool(0.55) { Row::Terrace } else { Row::Villas };
             setback = match row {
                 Row::Terrace => 0.1,
                 Row::Villas => builder.rng.random_range(2.5..4.5),
@@ -65,11 +61,7 @@ fn line_street(builder: &mut Builder, street: usize, side: f64, length: f64) {
             Row::Terrace => (
                 builder.rng.random_range(8.5..14.0),
                 builder.rng.random_range(9.0..12.0),
-                if builder.rng.random_bool(0.25) {
-                    3.5
-                } else {
-                    0.02
-                },
+                if builder.rng.random_bool(0.25) { 3.5 } else { 0.02 },
             ),
             Row::Villas => (
                 builder.rng.random_range(9.0..13.0),
@@ -100,12 +92,7 @@ fn house(builder: &mut Builder, plot: Plot, row: Row) {
     let facade = design(builder, &plot, row);
     builder.shade(plot, 1.3, 0.5);
     let eaves = facade.eaves;
-    builder.add_block(
-        &plot,
-        [0.0, eaves],
-        Material::Facade(Box::new(facade.clone())),
-        facade.seed,
-    );
+    builder.add_block(&plot, [0.0, eaves], Material::Facade(Box::new(facade.clone())), facade.seed);
     roof(builder, &plot, eaves);
     if row == Row::Terrace {
         balconies(builder, &plot, &facade);
@@ -159,17 +146,10 @@ fn design(builder: &mut Builder, plot: &Plot, row: Row) -> Facade {
         storey,
         sill,
         bay,
-        window: [
-            rng.random_range(0.85..1.3_f64).min(bay - 0.7),
-            window_height,
-        ],
+        window: [rng.random_range(0.85..1.3_f64).min(bay - 0.7), window_height],
         wall,
         colour,
-        trim: if rng.random_bool(0.6) {
-            grey(0.6)
-        } else {
-            Rgb::new(0.33, 0.27, 0.21)
-        },
+        trim: if rng.random_bool(0.6) { grey(0.6) } else { Rgb::new(0.33, 0.27, 0.21) },
         plinth,
         ground,
         door: rng.random_range(0..bays),
@@ -179,12 +159,8 @@ fn design(builder: &mut Builder, plot: &Plot, row: Row) -> Facade {
 }
 
 fn roof(builder: &mut Builder, plot: &Plot, eaves: f64) {
-    const TILES: [[f64; 3]; 4] = [
-        [0.20, 0.075, 0.045],
-        [0.13, 0.055, 0.040],
-        [0.065, 0.065, 0.070],
-        [0.16, 0.10, 0.075],
-    ];
+    const TILES: [[f64; 3]; 4] =
+        [[0.20, 0.075, 0.045], [0.13, 0.055, 0.040], [0.065, 0.065, 0.070], [0.16, 0.10, 0.075]];
     let rng = &mut builder.rng;
     let colour = TILES[rng.random_range(0..TILES.len())].into();
     let pitch = rng.random_range(0.6..1.05);
@@ -210,15 +186,8 @@ fn roof(builder: &mut Builder, plot: &Plot, eaves: f64) {
 fn chimney(builder: &mut Builder, plot: &Plot, ridge: f64) {
     let x = builder.rng.random_range(-0.6..0.6) * plot.half.x;
     let seed = builder.rng.random();
-    let stack = Plot {
-        centre: plot.at(x, 0.4),
-        ahead: plot.ahead,
-        half: Vector2::new(0.4, 0.3),
-    };
-    let material = Material::Wall {
-        colour: Rgb::new(0.2, 0.1, 0.07),
-        brick: true,
-    };
+    let stack = Plot { centre: plot.at(x, 0.4), ahead: plot.ahead, half: Vector2::new(0.4, 0.3) };
+    let material = Material::Wall { colour: Rgb::new(0.2, 0.1, 0.07), brick: true };
     builder.add_block(&stack, [ridge - 1.0, ridge + 0.8], material, seed);
 }
 
@@ -251,22 +220,9 @@ fn dormers(builder: &mut Builder, plot: &Plot, eaves: f64, pitch: f64) {
             seed,
         };
         let base = eaves + 0.55 * pitch;
-        builder.add_block(
-            &box_plot,
-            [base, base + 1.75],
-            Material::Facade(Box::new(facade)),
-            seed,
-        );
-        let lid = Plot {
-            half: box_plot.half + Vector2::new(0.12, 0.15),
-            ..box_plot
-        };
-        builder.add_block(
-            &lid,
-            [base + 1.75, base + 1.87],
-            Material::Plain(grey(0.09)),
-            seed,
-        );
+        builder.add_block(&box_plot, [base, base + 1.75], Material::Facade(Box::new(facade)), seed);
+        let lid = Plot { half: box_plot.half + Vector2::new(0.12, 0.15), ..box_plot };
+        builder.add_block(&lid, [base + 1.75, base + 1.87], Material::Plain(grey(0.09)), seed);
     }
 }
 
@@ -277,11 +233,7 @@ fn balconies(builder: &mut Builder, plot: &Plot, facade: &Facade) {
     }
     let bays = ((facade.width - 0.5) / facade.bay).floor().max(1.0);
     let at = 0.5 * facade.width - 0.5 * (facade.width - bays * facade.bay);
-    let columns: &[f64] = if bays >= 4.0 {
-        &[1.0, bays - 2.0]
-    } else {
-        &[1.0]
-    };
+    let columns: &[f64] = if bays >= 4.0 { &[1.0, bays - 2.0] } else { &[1.0] };
     let storeys = ((facade.eaves - 0.5) / facade.storey).floor() as u32;
     for &column in columns {
         let x = at - (column + 0.5) * facade.bay;
@@ -292,12 +244,7 @@ fn balconies(builder: &mut Builder, plot: &Plot, facade: &Facade) {
         };
         for floor in 1..storeys {
             let base = facade.plinth.min(0.4) + f64::from(floor) * facade.storey;
-            builder.add_block(
-                &slab,
-                [base - 0.18, base],
-                Material::Plain(grey(0.3)),
-                facade.seed,
-            );
+            builder.add_block(&slab, [base - 0.18, base], Material::Plain(grey(0.3)), facade.seed);
             balustrade(builder, &slab, base, facade.seed);
         }
     }
@@ -307,10 +254,7 @@ fn balustrade(builder: &mut Builder, slab: &Plot, base: f64, seed: u32) {
     let material = if seed & 8 == 0 {
         Material::Fence(grey(0.06))
     } else {
-        Material::Wall {
-            colour: grey(0.55),
-            brick: false,
-        }
+        Material::Wall { colour: grey(0.55), brick: false }
     };
     let front = Plot {
         centre: slab.at(0.0, slab.half.y - 0.03),
@@ -331,12 +275,7 @@ fn balustrade(builder: &mut Builder, slab: &Plot, base: f64, seed: u32) {
 /// Drain pipes, door steps, awnings and hanging signs.
 fn attachments(builder: &mut Builder, plot: &Plot, facade: &Facade) {
     let front = plot.half.y;
-    builder.add_post(
-        plot.at(plot.half.x - 0.2, front + 0.07),
-        0.05,
-        facade.eaves,
-        grey(0.16),
-    );
+    builder.add_post(plot.at(plot.half.x - 0.2, front + 0.07), 0.05, facade.eaves, grey(0.16));
     let bays = ((facade.width - 0.5) / facade.bay).floor().max(1.0);
     let margin = 0.5 * (facade.width - bays * facade.bay);
     let door_x = 0.5 * facade.width - margin - (f64::from(facade.door) + 0.5) * facade.bay;
@@ -349,11 +288,8 @@ fn attachments(builder: &mut Builder, plot: &Plot, facade: &Facade) {
     match facade.ground {
         GroundFloor::Shop => {
             let blade = on_front(-0.7 * plot.half.x, 0.05, 0.15, 0.85);
-            let turned = Plot {
-                ahead: right_of(blade.ahead),
-                half: Vector2::new(0.35, 0.05),
-                ..blade
-            };
+            let turned =
+                Plot { ahead: right_of(blade.ahead), half: Vector2::new(0.35, 0.05), ..blade };
             builder.add_block(&turned, [3.1, 3.8], Material::Sign(Sign::Board), seed);
             if seed & 2 == 0 {
                 let awning = on_front(0.0, plot.half.x - 0.6, 0.0, 1.1);
@@ -373,11 +309,7 @@ fn attachments(builder: &mut Builder, plot: &Plot, facade: &Facade) {
 }
 
 fn wall_lamp(builder: &mut Builder, at: Point2<f64>) {
-    let lamp = Plot {
-        centre: at,
-        ahead: Vector2::y(),
-        half: Vector2::repeat(0.09),
-    };
+    let lamp = Plot { centre: at, ahead: Vector2::y(), half: Vector2::repeat(0.09) };
     let glow = lamps::COLOUR * 4.0;
     builder.add_block(&lamp, [2.1, 2.4], Material::Lamp(glow), 0);
 }

@@ -43,11 +43,7 @@ pub(super) fn clip<'a>(
 /// Of the two ends of an interval inside a convex solid, the first beyond `from`.
 #[inline]
 pub(super) fn first_beyond<T: Copy>([enter, leave]: [(f64, T); 2], from: f64) -> Option<(f64, T)> {
-    if enter.0 > from {
-        Some(enter)
-    } else {
-        (leave.0 > from).then_some(leave)
-    }
+    if enter.0 > from { Some(enter) } else { (leave.0 > from).then_some(leave) }
 }
 
 /// Where a ray meets a box of half width, height and half depth `half`.
@@ -88,12 +84,7 @@ pub(super) fn meet_block(
         (_, true) => (half.x - p.x, p.y, Part::Front),
         (_, false) => (half.x + p.x, p.y, Part::Back),
     };
-    Some(Contact {
-        distance,
-        normal: frame.vector_to_town(&normal),
-        uv: Vector2::new(u, v),
-        part,
-    })
+    Some(Contact { distance, normal: frame.vector_to_town(&normal), uv: Vector2::new(u, v), part })
 }
 
 /// Where a ray meets a roof of half ridge, rise and half depth `half`.
@@ -119,12 +110,7 @@ pub(super) fn meet_gable(
         2 | 3 => (Vector2::new(half.z + p.z, p.y), Part::Side),
         _ => (Vector2::new(half.x + p.x, half.z + p.z), Part::Flat),
     };
-    Some(Contact {
-        distance,
-        normal: frame.vector_to_town(&planes[plane].0),
-        uv,
-        part,
-    })
+    Some(Contact { distance, normal: frame.vector_to_town(&planes[plane].0), uv, part })
 }
 
 /// Where a ray meets an upright cylinder.
@@ -153,10 +139,7 @@ pub(super) fn meet_pole(
     let leave_skin = ((-b + root) / a, false);
     let later = |a: (f64, bool), b: (f64, bool)| if a.0 > b.0 { a } else { b };
     let sooner = |a: (f64, bool), b: (f64, bool)| if a.0 < b.0 { a } else { b };
-    let interval = [
-        later(enter_skin, enter_caps),
-        sooner(leave_skin, leave_caps),
-    ];
+    let interval = [later(enter_skin, enter_caps), sooner(leave_skin, leave_caps)];
     if interval[0].0 > interval[1].0 {
         return None;
     }

@@ -41,11 +41,7 @@ impl Lamps {
                 }
             }
         }
-        Self {
-            origin,
-            columns,
-            cells,
-        }
+        Self { origin, columns, cells }
     }
 
     /// Irradiance of a surface by all lamps.

@@ -43,11 +43,7 @@ impl Plane {
     /// The plane of rows of `columns` pixels.
     pub(super) fn new(levels: Vec<Levels>, columns: usize) -> Self {
         let rows = levels.len() / columns;
-        Self {
-            levels,
-            columns,
-            rows,
-        }
+        Self { levels, columns, rows }
     }
 
     /// Size of a pixel of full size in pixels of this image.
@@ -169,10 +165,7 @@ fn mixed(a: Levels, b: Levels, share: f32) -> Levels {
 
 /// A number in 0 … 1 for the `stream`-th trait of the `index`-th particle.
 fn draw(seed: u32, index: u32, stream: u32) -> f32 {
-    unit(derive(
-        seed.wrapping_add(index.wrapping_mul(0x9E37_79B1)),
-        stream,
-    )) as f32
+    unit(derive(seed.wrapping_add(index.wrapping_mul(0x9E37_79B1)), stream)) as f32
 }
 
 impl Lens {
@@ -215,16 +208,12 @@ impl Lens {
         }
         let columns = plane.columns;
         let to_coarse = |i: usize| (i as f32 + 0.5) / COARSE as f32 - 0.5;
-        plane
-            .levels
-            .par_chunks_mut(columns)
-            .enumerate()
-            .for_each(|(row, line)| {
-                for (column, levels) in line.iter_mut().enumerate() {
-                    let glow = spread.bilinear(to_coarse(column), to_coarse(row));
-                    *levels = std::array::from_fn(|k| levels[k] + self.glare * 4.0 * glow[k]);
-                }
-            });
+        plane.levels.par_chunks_mut(columns).enumerate().for_each(|(row, line)| {
+            for (column, levels) in line.iter_mut().enumerate() {
+                let glow = spread.bilinear(to_coarse(column), to_coarse(row));
+                *levels = std::array::from_fn(|k| levels[k] + self.glare * 4.0 * glow[k]);
+            }
+        });
     }
 }
 

@@ -46,16 +46,9 @@ pub(super) fn scan(town: &Town, look: &Look, pose: &Pose, seed: u32) -> Vec<Scan
     let circle: Vec<(f64, f64)> = (0..STEPS)
         .map(|step| libm::sincos(f64::from(step) / f64::from(STEPS) * std::f64::consts::TAU))
         .collect();
-    let shooter = Shooter {
-        town,
-        look,
-        pose,
-        seed,
-    };
-    let sides: Vec<Side> = circle
-        .par_chunks(TILE[1] as usize)
-        .map(|steps| shooter.side(steps))
-        .collect();
+    let shooter = Shooter { town, look, pose, seed };
+    let sides: Vec<Side> =
+        circle.par_chunks(TILE[1] as usize).map(|steps| shooter.side(steps)).collect();
     (0..BEAMS)
         .into_par_iter()
         .step_by(TILE[0] as usize)
@@ -66,19 +59,13 @@ pub(super) fn scan(town: &Town, look: &Look, pose: &Pose, seed: u32) -> Vec<Scan
 /// Directions of the shots of a beam in the camera frame.
 fn bearings(beam: u32, steps: &[(f64, f64)]) -> impl Iterator<Item = Vector3<f64>> {
     let (up, level) = libm::sincos(elevation(beam).to_radians());
-    steps
-        .iter()
-        .map(move |(sin, cos)| Vector3::new(level * sin, -up, level * cos))
+    steps.iter().map(move |(sin, cos)| Vector3::new(level * sin, -up, level * cos))
 }
 
 /// Elevation of a beam \[°\]: the upper 32 a third of a degree apart, the lower 32 half a degree.
 fn elevation(beam: u32) -> f64 {
     let (block, index) = (beam / 32, f64::from(beam % 32) / 31.0);
-    if block == 0 {
-        2.0 - 10.4 * index
-    } else {
-        -8.9 - 15.9 * index
-    }
+    if block == 0 { 2.0 - 10.4 * index } else { -8.9 - 15.9 * index }
 }
 
 /// A scanner at a place.
@@ -99,10 +86,7 @@ struct Side<'a> {
 impl Shooter<'_> {
     fn side<'a>(&self, steps: &'a [(f64, f64)]) -> Side<'a> {
         let solids = self.town.solids_in(&self.beam(steps, &(0..BEAMS)));
-        Side {
-            steps,
-            solids: Arc::new(solids),
-        }
+        Side { steps, solids: Arc::new(solids) }
     }
 
     /// The points that a full turn of some beams yields, beam after beam.
@@ -124,9 +108,8 @@ impl Shooter<'_> {
     fn beam(&self, steps: &[(f64, f64)], beams: &Range<u32>) -> Beam {
         let outer = [beams.start, beams.end - 1].into_iter();
         let bearings = outer.flat_map(|beam| bearings(beam, steps));
-        let directions: Vec<Vector3<f64>> = bearings
-            .map(|bearing| town_ray(self.pose, &SCANNER, &bearing).direction)
-            .collect();
+        let directions: Vec<Vector3<f64>> =
+            bearings.map(|bearing| town_ray(self.pose, &SCANNER, &bearing).direction).collect();
         let origin = town_ray(self.pose, &SCANNER, &Vector3::z()).origin;
         Beam::around(origin, &directions)
     }

@@ -89,11 +89,7 @@ impl Look {
         let roofs = 0.28 + 0.16 * value2(0.2 * there.x, 0.2 * there.z, 0x0FF6);
         let above = ((direction.y - roofs) * 14.0).clamp(0.0, 1.0);
         let street = self.opposite * (1.0 + 2.2 * patch).clamp(0.15, 2.6);
-        if above == 0.0 {
-            street
-        } else {
-            blend(street, self.sky(direction, seed), above)
-        }
+        if above == 0.0 { street } else { blend(street, self.sky(direction, seed), above) }
     }
 
     /// Irradiance of a surface by the sky and what it lights; `open` is the share of the
@@ -145,9 +141,7 @@ impl Look {
     pub(super) fn infrared(&self, appearance: &Appearance) -> f64 {
         let [red, green, blue] = appearance.albedo.into();
         let leafy = (green - 0.5 * (red + blue)).max(0.0);
-        (0.4 * red + 0.4 * green + 0.2 * blue + 10.0 * leafy)
-            .clamp(0.0, 1.0)
-            .sqrt()
+        (0.4 * red + 0.4 * green + 0.2 * blue + 10.0 * leafy).clamp(0.0, 1.0).sqrt()
     }
 
     /// The sensor's response to a radiance, in grey levels 0 … 255: the square root, steepened

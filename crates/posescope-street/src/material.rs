@@ -106,10 +106,9 @@ impl Solid {
         match &self.material {
             Material::Facade(facade) => walls::appearance(facade, contact.part, uv, footprint),
             Material::Tiles(colour) => tiles(*colour, contact.part, uv, footprint, self.seed),
-            Material::Wall {
-                colour,
-                brick: false,
-            } => Appearance::matt(walls::plaster(*colour, uv, footprint, self.seed)),
+            Material::Wall { colour, brick: false } => {
+                Appearance::matt(walls::plaster(*colour, uv, footprint, self.seed))
+            }
             Material::Wall { colour, .. } => {
                 Appearance::matt(walls::brick(*colour, uv, footprint, self.seed))
             }
@@ -118,18 +117,12 @@ impl Solid {
             }
             Material::Bark => Appearance::matt(bark(uv, footprint, self.seed)),
             Material::Plain(colour) => plain(*colour, uv, footprint, self.seed),
-            Material::Lamp(radiance) => Appearance {
-                emission: *radiance,
-                ..plain(grey(0.4), uv, footprint, self.seed)
-            },
+            Material::Lamp(radiance) => {
+                Appearance { emission: *radiance, ..plain(grey(0.4), uv, footprint, self.seed) }
+            }
             Material::Banded => {
                 let red = stripes(uv.y, 0.5, 0.25, footprint.along.y);
-                plain(
-                    blend(grey(0.7), Rgb::new(0.5, 0.03, 0.03), red),
-                    uv,
-                    footprint,
-                    self.seed,
-                )
+                plain(blend(grey(0.7), Rgb::new(0.5, 0.03, 0.03), red), uv, footprint, self.seed)
             }
             Material::Fence(colour) => Appearance::matt(
                 colour * (0.9 + 0.3 * octaves(uv.into(), 0.4, 3, 0.7, footprint, self.seed)),
@@ -165,11 +158,7 @@ fn leaves(
 ) -> Appearance {
     let tone = |grain: f64, stream| {
         let contrast = footprint.contrast(grain);
-        if contrast > 0.0 {
-            contrast * value3(&(p / grain), derive(seed, stream))
-        } else {
-            0.0
-        }
+        if contrast > 0.0 { contrast * value3(&(p / grain), derive(seed, stream)) } else { 0.0 }
     };
     // Leaves have edges: the noise is steepened.
     let leaf = |grain, stream| (2.2 * tone(grain, stream)).clamp(-1.0, 1.0);
@@ -245,12 +234,7 @@ fn rim(sign: Sign, u: f64, v: f64) -> f64 {
 fn sign_face(sign: Sign, contact: &Contact, footprint: &Footprint, seed: u32) -> Appearance {
     let (u, v) = (contact.uv.x, contact.uv.y);
     let (du, dv) = (footprint.along.x, footprint.along.y);
-    let enamel = |albedo| Appearance {
-        albedo,
-        gloss: 0.2,
-        glass: 0.0,
-        ..Appearance::default()
-    };
+    let enamel = |albedo| Appearance { albedo, gloss: 0.2, glass: 0.0, ..Appearance::default() };
     if contact.part != Part::Front {
         return enamel(grey(0.22));
     }
@@ -266,11 +250,7 @@ fn sign_face(sign: Sign, contact: &Contact, footprint: &Footprint, seed: u32) ->
         }
         Sign::Square => {
             let blue = Rgb::new(0.02, 0.08, 0.32);
-            enamel(blend(
-                white,
-                blend(blue, white, ink),
-                step(rim(sign, u, v) - 0.03, du),
-            ))
+            enamel(blend(white, blend(blue, white, ink), step(rim(sign, u, v) - 0.03, du)))
         }
         Sign::Board => {
             let frame = 1.0 - step(rim(sign, u, v) - 0.03, du.max(dv));
@@ -280,13 +260,7 @@ fn sign_face(sign: Sign, contact: &Contact, footprint: &Footprint, seed: u32) ->
                 0.1 + 0.5 * unit(derive(seed, 3)),
             );
             let lines = (0..4_u32).map(|k| {
-                glyphs(
-                    u - 0.06,
-                    0.62 - 0.15 * f64::from(k) - v,
-                    0.1,
-                    dv,
-                    derive(seed, 10 + k),
-                )
+                glyphs(u - 0.06, 0.62 - 0.15 * f64::from(k) - v, 0.1, dv, derive(seed, 10 + k))
             });
             let text = lines.sum::<f64>().min(1.0) * bar(u, 0.06, 0.62, du);
             let picture = 0.25 * value2(u * 5.0, v * 5.0, seed);

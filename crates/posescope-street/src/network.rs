@@ -161,11 +161,7 @@ impl Network {
     /// Lists for every cell the segments that matter there.
     fn index(&mut self) {
         let margin = HALF_WIDTH + REACH;
-        let ends = || {
-            self.segments
-                .iter()
-                .flat_map(|s| [s.from, s.from + s.heading * s.length])
-        };
+        let ends = || self.segments.iter().flat_map(|s| [s.from, s.from + s.heading * s.length]);
         let low = ends().fold(Point2::new(f64::MAX, f64::MAX), |a, b| a.inf(&b));
         let high = ends().fold(Point2::new(f64::MIN, f64::MIN), |a, b| a.sup(&b));
         self.origin = low - Vector2::repeat(margin);
@@ -204,32 +200,23 @@ fn corners(seed: u64) -> Vec<Vertex> {
     let mut rng = Pcg32::seed_from_u64(seed);
     let vertex = |(i, &(x, z, radius)): (usize, &(f64, f64, f64))| {
         // The first side stays where it is: the journey begins on it, at the origin.
-        let slack = if i == 0 || i + 1 == PLAN.len() {
-            0.0
-        } else {
-            4.0
-        };
+        let slack = if i == 0 || i + 1 == PLAN.len() { 0.0 } else { 4.0 };
         let jitter: [f64; 2] = std::array::from_fn(|_| rng.random_range(-1.0..1.0) * slack);
-        Vertex {
-            position: Point2::new(x + jitter[0], z + jitter[1]),
-            radius,
-        }
+        Vertex { position: Point2::new(x + jitter[0], z + jitter[1]), radius }
     };
     PLAN.iter().enumerate().map(vertex).collect()
 }
 
 /// One street for every stretch of the circuit between two crossings.
 fn streets(corners: &[Vertex]) -> Vec<Street> {
-    let crossings: Vec<usize> = (0..corners.len())
-        .filter(|&i| corners[i].radius == TURN_RADIUS)
-        .collect();
+    let crossings: Vec<usize> =
+        (0..corners.len()).filter(|&i| corners[i].radius == TURN_RADIUS).collect();
     let between = |k: usize| {
         let begin = crossings[k];
         let end = crossings[(k + 1) % crossings.len()];
         let count = (end + corners.len() - begin) % corners.len();
-        let mut chain: Vec<Vertex> = (0..=count)
-            .map(|i| corners[(begin + i) % corners.len()])
-            .collect();
+        let mut chain: Vec<Vertex> =
+            (0..=count).map(|i| corners[(begin + i) % corners.len()]).collect();
         let outward = |from: &Vertex, to: &Vertex| Vertex {
             position: to.position + (to.position - from.position).normalize() * SIDE_STREET,
             radius: 0.0,
@@ -270,9 +257,7 @@ mod tests {
         let network = Network::new(3);
         for (index, street) in network.streets.iter().enumerate() {
             let station = 0.5 * street.axis.length();
-            let place = network
-                .place(street.axis.at(station).beside(3.0))
-                .expect("near a street");
+            let place = network.place(street.axis.at(station).beside(3.0)).expect("near a street");
             assert_eq!(place.street, index);
             assert!((place.station - station).abs() < 0.2);
             assert!((place.lateral - 3.0).abs() < 0.02);
@@ -291,11 +276,7 @@ mod tests {
                 let out = at(i + 2).position - at(i + 1).position;
                 let turn = out.dot(&right_of(into)).atan2(out.dot(&into)).to_degrees();
                 let sharp = at(i + 1).radius == TURN_RADIUS;
-                assert!(if sharp {
-                    turn.abs() >= 60.0
-                } else {
-                    turn.abs() < 40.0
-                });
+                assert!(if sharp { turn.abs() >= 60.0 } else { turn.abs() < 40.0 });
                 turns.push(turn);
             }
             assert!(turns.iter().any(|&t| t > 60.0) && turns.iter().any(|&t| t < -60.0));
@@ -312,10 +293,7 @@ mod tests {
             let mut along = 0.0;
             while along < length {
                 let station = network.circuit.at(along);
-                assert!(
-                    network.kerb_distance(station.position) < -2.5,
-                    "at {along} m"
-                );
+                assert!(network.kerb_distance(station.position) < -2.5, "at {along} m");
                 along += 1.0;
             }
         }
@@ -326,9 +304,6 @@ mod tests {
         let network = Network::new(3);
         assert!(network.place(Point2::new(1e4, 0.0)).is_none());
         assert!(network.place(Point2::new(-1e4, 0.0)).is_none());
-        assert_eq!(
-            network.kerb_distance(Point2::new(60.0, 40.0)),
-            f64::INFINITY
-        );
+        assert_eq!(network.kerb_distance(Point2::new(60.0, 40.0)), f64::INFINITY);
     }
 }

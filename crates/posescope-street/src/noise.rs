@@ -90,11 +90,7 @@ fn terms(coordinate: i32, factor: u32) -> [u32; 2] {
 /// Smooth noise along a line, −1 … 1, lattice spacing 1.
 pub(super) fn value1(x: f64, seed: u32) -> f64 {
     let (i, t) = cell(x);
-    lerp(
-        signed(hash2(i, 0, seed)),
-        signed(hash2(i + 1, 0, seed)),
-        ease(t),
-    )
+    lerp(signed(hash2(i, 0, seed)), signed(hash2(i + 1, 0, seed)), ease(t))
 }
 
 /// Smooth noise in the plane, −1 … 1, lattice spacing 1.
@@ -145,11 +141,7 @@ impl Footprint {
     #[inline]
     pub(super) fn contrast(&self, grain: f64) -> f64 {
         let resolved = (2.0 - 2.0 * self.minor / grain).clamp(0.0, 1.0);
-        if self.major > grain {
-            resolved * (grain / self.major).sqrt()
-        } else {
-            resolved
-        }
+        if self.major > grain { resolved * (grain / self.major).sqrt() } else { resolved }
     }
 }
 

@@ -72,12 +72,7 @@ impl Spot {
     /// What one sees through this spot at a distance behind the wall \[m\].
     fn behind(&self, depth: f64) -> Self {
         let shift = self.slant * depth;
-        Self {
-            x: self.x + shift.x,
-            y: self.y + shift.y,
-            u: self.u + shift.x,
-            ..*self
-        }
+        Self { x: self.x + shift.x, y: self.y + shift.y, u: self.u + shift.x, ..*self }
     }
 
     fn rectangle(&self, half_width: f64, low: f64, high: f64) -> f64 {
@@ -119,15 +114,11 @@ fn glazing(spot: &Spot, half: f64, low: f64, high: f64) -> Appearance {
     };
     let slats = 0.3 + 0.14 * stripes(y, 0.08, 0.06, dv);
     let blind = Appearance::matt(grey(slats));
-    let frame = Appearance::matt(grey(if derive(spot.seed >> 9, 7).is_multiple_of(4) {
-        0.1
-    } else {
-        0.6
-    }));
+    let frame =
+        Appearance::matt(grey(if derive(spot.seed >> 9, 7).is_multiple_of(4) { 0.1 } else { 0.6 }));
     let border = 1.0 - spot.rectangle(half - 0.07, low + 0.07, high - 0.07);
     let mullion = bar(x, -0.04, 0.04, du);
-    pane.covered(frame, border.max(mullion))
-        .covered(blind, step(y - (high - blind_height), dv))
+    pane.covered(frame, border.max(mullion)).covered(blind, step(y - (high - blind_height), dv))
 }
 
 /// Radiance of a room behind a window when lights are on; every third room is dark.
@@ -144,11 +135,7 @@ fn room_light(seed: u32) -> Rgb {
 pub(super) fn window(facade: &Facade, wall: Appearance, spot: &Spot) -> Appearance {
     let [width, height] = facade.window;
     let (low, high, half) = (facade.sill, facade.sill + height, 0.5 * width);
-    let reach = if facade.shutters {
-        1.2 + width
-    } else {
-        0.3 + half
-    };
+    let reach = if facade.shutters { 1.2 + width } else { 0.3 + half };
     if spot.rectangle(reach, low - 0.3, high + 0.3) == 0.0 {
         return wall;
     }
@@ -174,17 +161,8 @@ pub(super) fn window(facade: &Facade, wall: Appearance, spot: &Spot) -> Appearan
     let (flowers, planted) = flower_box(facade, spot);
     shuttered
         .covered(Appearance::matt(wall.albedo * 0.45), 0.8 * sill_shadow)
-        .covered(
-            Appearance {
-                ledge: 1.0,
-                ..Appearance::matt(grey(0.42))
-            },
-            sill,
-        )
-        .covered(
-            reveal.covered(glazing(&inner, half, low, high), glazed),
-            opening,
-        )
+        .covered(Appearance { ledge: 1.0, ..Appearance::matt(grey(0.42)) }, sill)
+        .covered(reveal.covered(glazing(&inner, half, low, high), glazed), opening)
         .covered(Appearance::matt(grey(0.02)), 0.8 * lintel)
         .covered(flowers, planted)
 }
@@ -217,33 +195,16 @@ pub(super) fn door(facade: &Facade, wall: Appearance, spot: &Spot) -> Appearance
     let leaf = spot.rectangle(half, -0.5, high);
     let panels = spot.rectangle(0.32, 0.25, 0.85) + spot.rectangle(0.32, 1.0, 1.85);
     let edges = spot.rectangle(0.27, 0.3, 0.8) + spot.rectangle(0.27, 1.05, 1.8);
-    let pane = Appearance {
-        albedo: grey(0.02),
-        gloss: 0.9,
-        glass: 1.0,
-        ..Appearance::default()
-    };
+    let pane = Appearance { albedo: grey(0.02), gloss: 0.9, glass: 1.0, ..Appearance::default() };
     let lintel = spot.rectangle(half, high - 0.12, high);
     let plate = rectangle(spot.x, spot.y, [0.72, 1.3, 0.95, 1.6], spot.width);
-    let number = glyphs(
-        spot.x - 0.75,
-        1.52 - spot.y,
-        0.16,
-        spot.width.1,
-        facade.seed,
-    );
+    let number = glyphs(spot.x - 0.75, 1.52 - spot.y, 0.16, spot.width.1, facade.seed);
     wall.covered(Appearance::matt(facade.trim), surround)
         .covered(Appearance::matt(paint), leaf)
-        .covered(
-            Appearance::matt(paint * 0.4),
-            (panels - edges).clamp(0.0, 1.0),
-        )
+        .covered(Appearance::matt(paint * 0.4), (panels - edges).clamp(0.0, 1.0))
         .covered(pane, spot.rectangle(0.24, 1.1, 1.75))
         .covered(Appearance::matt(grey(0.015)), lintel)
-        .covered(
-            Appearance::matt(blend(grey(0.6), grey(0.03), number)),
-            plate,
-        )
+        .covered(Appearance::matt(blend(grey(0.6), grey(0.03), number)), plate)
 }
 
 /// A shop: large panes with posters, and a sign with letters above them.
@@ -256,18 +217,9 @@ pub(super) fn shop(facade: &Facade, wall: Appearance, spot: &Spot) -> Appearance
         0.04 + 0.3 * unit(derive(facade.seed, 42)),
         0.04 + 0.4 * unit(derive(facade.seed, 43)),
     );
-    let letters = glyphs(
-        spot.u - 0.9,
-        facade.storey - 0.2 - spot.y,
-        0.42,
-        dv,
-        facade.seed,
-    ) * bar(spot.u, 0.9, facade.width - 1.2, du);
-    let ink = if base.sum() > 0.8 {
-        grey(0.03)
-    } else {
-        grey(0.7)
-    };
+    let letters = glyphs(spot.u - 0.9, facade.storey - 0.2 - spot.y, 0.42, dv, facade.seed)
+        * bar(spot.u, 0.9, facade.width - 1.2, du);
+    let ink = if base.sum() > 0.8 { grey(0.03) } else { grey(0.7) };
     let board = Appearance::matt(blend(base, ink, letters));
     let sign = bar(spot.y, top + 0.08, facade.storey - 0.1, dv);
     shop_window(facade, wall, spot, half, top).covered(board, sign)
@@ -318,13 +270,7 @@ fn poster(spot: &Spot) -> (Appearance, f64) {
     let picture = value2(spot.x * 7.0, spot.y * 7.0, spot.seed);
     let line = |k: u32| {
         let top = low + 0.8 - 0.2 * f64::from(k);
-        glyphs(
-            spot.x - left - 0.05,
-            top - spot.y,
-            0.14,
-            spot.width.1,
-            derive(spot.seed, k),
-        )
+        glyphs(spot.x - left - 0.05, top - spot.y, 0.14, spot.width.1, derive(spot.seed, k))
     };
     let words = line(0) + line(1);
     let printed = blend(paper * (1.0 + 0.6 * picture), grey(0.03), words.min(1.0));

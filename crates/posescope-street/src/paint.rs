@@ -32,19 +32,10 @@ pub(super) fn appearance(
         }
         Part::Tread => rubber(),
         Part::Wheel => wheel(contact, footprint, seed),
-        Part::Flank => flank(
-            above_skirt(paint, contact, footprint),
-            car,
-            contact,
-            footprint,
-        ),
-        Part::Nose | Part::Tail => face(
-            above_skirt(paint, contact, footprint),
-            car,
-            contact,
-            footprint,
-            seed,
-        ),
+        Part::Flank => flank(above_skirt(paint, contact, footprint), car, contact, footprint),
+        Part::Nose | Part::Tail => {
+            face(above_skirt(paint, contact, footprint), car, contact, footprint, seed)
+        }
         _ => paint,
     }
 }
@@ -70,12 +61,7 @@ fn black() -> Appearance {
 }
 
 fn trim() -> Appearance {
-    Appearance {
-        albedo: grey(0.03),
-        gloss: 0.2,
-        glass: 0.0,
-        ..Appearance::default()
-    }
+    Appearance { albedo: grey(0.03), gloss: 0.2, glass: 0.0, ..Appearance::default() }
 }
 
 fn rubber() -> Appearance {
@@ -136,20 +122,12 @@ fn face(
         rectangle(u.abs(), v, [edge - inner, low, edge - 0.04, high], widths)
     };
     let lamp = Appearance {
-        albedo: if nose {
-            grey(0.35)
-        } else {
-            Rgb::new(0.3, 0.012, 0.012)
-        },
+        albedo: if nose { grey(0.35) } else { Rgb::new(0.3, 0.012, 0.012) },
         gloss: 0.8,
         glass: 0.0,
         ..Appearance::default()
     };
-    let low = if nose {
-        0.36
-    } else {
-        0.5 + 0.2 * unit(derive(seed, 7))
-    };
+    let low = if nose { 0.36 } else { 0.5 + 0.2 * unit(derive(seed, 7)) };
     let plate = rectangle(u, v, [-0.26, low, 0.26, low + 0.11], widths);
     let letters = glyphs(0.22 - u, low + 0.095 - v, 0.085, widths.1, derive(seed, 8))
         * bar(u, -0.22, 0.22, widths.0);

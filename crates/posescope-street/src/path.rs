@@ -49,10 +49,7 @@ impl Piece {
     fn at(&self, along: f64) -> Station {
         let Station { position, heading } = self.from;
         if self.curvature == 0.0 {
-            return Station {
-                position: position + heading * along,
-                heading,
-            };
+            return Station { position: position + heading * along, heading };
         }
         let (sin, cos) = libm::sincos(self.curvature * along);
         let right = right_of(heading);
@@ -128,10 +125,7 @@ impl Path {
         self.pieces.push(Piece {
             start: self.length(),
             length: side.norm(),
-            from: Station {
-                position: from,
-                heading: side.normalize(),
-            },
+            from: Station { position: from, heading: side.normalize() },
             curvature: 0.0,
         });
     }
@@ -153,10 +147,7 @@ impl Path {
         self.pieces.push(Piece {
             start: self.length(),
             length: vertex.radius * turn.abs(),
-            from: Station {
-                position: arc_begin,
-                heading,
-            },
+            from: Station { position: arc_begin, heading },
             curvature: turn.signum() / vertex.radius,
         });
         vertex.position + onward * tangent
@@ -168,10 +159,7 @@ mod tests {
     use super::*;
 
     fn square() -> Path {
-        let vertex = |x, z| Vertex {
-            position: Point2::new(x, z),
-            radius: 10.0,
-        };
+        let vertex = |x, z| Vertex { position: Point2::new(x, z), radius: 10.0 };
         Path::closed(&[
             vertex(0.0, 100.0),
             vertex(100.0, 100.0),

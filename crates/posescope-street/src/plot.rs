@@ -102,29 +102,17 @@ impl<'a> Builder<'a> {
 
     /// Adds a solid.
     pub(super) fn add(&mut self, shape: Shape, material: Material, seed: u32) {
-        self.solids.push(Solid {
-            shape,
-            material,
-            seed,
-        });
+        self.solids.push(Solid { shape, material, seed });
     }
 
     /// Adds an upright cylinder in one colour, with its contact shade.
     pub(super) fn add_post(&mut self, foot: Point2<f64>, radius: f64, height: f64, colour: Rgb) {
         let base = Point3::new(foot.x, 0.0, foot.y);
         let seed = self.solids.len() as u32;
-        let shape = Shape::Pole {
-            base,
-            radius,
-            height,
-        };
+        let shape = Shape::Pole { base, radius, height };
         self.add(shape, Material::Plain(colour), seed);
         self.shade(
-            Plot {
-                centre: foot,
-                ahead: Vector2::y(),
-                half: Vector2::repeat(radius * 0.7),
-            },
+            Plot { centre: foot, ahead: Vector2::y(), half: Vector2::repeat(radius * 0.7) },
             0.25 + radius,
             0.45,
         );
@@ -158,8 +146,7 @@ impl<'a> Builder<'a> {
 
     /// Whether a plot is nowhere nearer to a kerb than `clearance` and on no plot taken before.
     pub(super) fn is_free(&self, plot: &Plot, clearance: f64) -> bool {
-        plot.outline()
-            .all(|p| self.network.kerb_distance(p) >= clearance)
+        plot.outline().all(|p| self.network.kerb_distance(p) >= clearance)
             && !self.taken.iter().any(|other| plot.overlaps(other))
     }
 

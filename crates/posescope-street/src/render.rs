@@ -74,20 +74,15 @@ impl View<'_> {
     pub(super) fn image(&self) -> RgbImage {
         let (width, height) = (self.intrinsics.width, self.intrinsics.height);
         let columns = width as usize;
-        let bands: Vec<Band> = (0..height.div_ceil(TILE[1]))
-            .into_par_iter()
-            .map(|band| self.band(band))
-            .collect();
+        let bands: Vec<Band> =
+            (0..height.div_ceil(TILE[1])).into_par_iter().map(|band| self.band(band)).collect();
         let mut levels: Vec<Levels> = vec![[0.0; 3]; columns * height as usize];
         levels
             .par_chunks_mut(columns * TILE[1] as usize)
             .enumerate()
             .for_each(|(band, levels)| self.refine(&bands, band, levels));
         let plane = Plane::new(levels, columns);
-        let plane = self
-            .look
-            .lens
-            .project(plane, self.frame_seed, self.lens_seed);
+        let plane = self.look.lens.project(plane, self.frame_seed, self.lens_seed);
         let mut bytes = vec![0; plane.levels.len() * 3];
         bytes
             .par_chunks_mut(3 * columns)
@@ -149,10 +144,8 @@ impl View<'_> {
             .map(|begin| {
                 let columns = begin..(begin + TILE[0]).min(width);
                 let sector = Sector::new(&solids, self.beam(&columns, &rows));
-                for ((y, left), line) in rows
-                    .clone()
-                    .zip(&mut left)
-                    .zip(samples.chunks_exact_mut(width as usize))
+                for ((y, left), line) in
+                    rows.clone().zip(&mut left).zip(samples.chunks_exact_mut(width as usize))
                 {
                     for x in columns.clone() {
                         let sample =
@@ -202,9 +195,8 @@ impl View<'_> {
         let columns = self.intrinsics.width as usize;
         let here = &bands[band];
         let rows: Vec<&[Sample]> = here.samples.chunks_exact(columns).collect();
-        let before = band
-            .checked_sub(1)
-            .and_then(|band| bands[band].samples.rchunks_exact(columns).next());
+        let before =
+            band.checked_sub(1).and_then(|band| bands[band].samples.rchunks_exact(columns).next());
         let after = bands.get(band + 1).map(|band| &band.samples[..columns]);
         for (i, line) in levels.chunks_exact_mut(columns).enumerate() {
             let above = i.checked_sub(1).map(|above| rows[above]).or(before);
@@ -260,10 +252,8 @@ impl View<'_> {
     /// What the sensor makes of the levels: vignetting, noise, eight bits.
     fn sensed(&self, levels: &Levels, x: u32, y: u32) -> [u8; 3] {
         let from_centre = |at: u32, size: u32| 2.0 * f64::from(at) / f64::from(size) - 1.0;
-        let (u, v) = (
-            from_centre(x, self.intrinsics.width),
-            from_centre(y, self.intrinsics.height),
-        );
+        let (u, v) =
+            (from_centre(x, self.intrinsics.width), from_centre(y, self.intrinsics.height));
         let gain = 1.0 - 0.5 * self.look.vignetting * (u * u + 0.3 * v * v);
         std::array::from_fn(|channel| {
             let seed = derive(self.frame_seed, channel as u32);

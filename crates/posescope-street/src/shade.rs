@@ -50,11 +50,8 @@ pub(super) struct ContactShade {
 impl ContactShade {
     /// An index of blots.
     pub(super) fn new(blots: Vec<Blot>) -> Self {
-        let corner = |sign: f64| {
-            blots
-                .iter()
-                .map(move |b| b.centre + Vector2::repeat(sign * b.radius()))
-        };
+        let corner =
+            |sign: f64| blots.iter().map(move |b| b.centre + Vector2::repeat(sign * b.radius()));
         let start = Point2::new(f64::MAX, f64::MAX);
         let origin = corner(-1.0).fold(start, |a, b| a.inf(&b));
         let extent = corner(1.0).fold(origin, |a, b| a.sup(&b)) - origin;
@@ -70,11 +67,7 @@ impl ContactShade {
                 }
             }
         }
-        Self {
-            origin,
-            columns,
-            cells,
-        }
+        Self { origin, columns, cells }
     }
 
     /// Share of the light that reaches a point of the ground.
@@ -84,9 +77,9 @@ impl ContactShade {
             return 1.0;
         }
         let index = cell.y as usize * self.columns + cell.x as usize;
-        self.cells.get(index).map_or(1.0, |blots| {
-            blots.iter().map(|blot| blot.openness(p)).product()
-        })
+        self.cells
+            .get(index)
+            .map_or(1.0, |blots| blots.iter().map(|blot| blot.openness(p)).product())
     }
 }
 

@@ -98,19 +98,15 @@ impl Shading<'_> {
         let facing = -tilt.dot(&ray.direction);
         let mut direction = ray.direction + tilt * (2.0 * facing);
         direction.y = direction.y.abs().max(0.01);
-        let reflected = Ray {
-            origin: sight.point + Vector3::y() * 0.01,
-            direction: direction.normalize(),
-        };
+        let reflected =
+            Ray { origin: sight.point + Vector3::y() * 0.01, direction: direction.normalize() };
         let met = self.town.look(&reflected, 0.02);
         let Some(met) = met else {
             return self.look.sky(&reflected.direction, self.sky_seed);
         };
         // The mirror image is as far from the eye as the whole way of the light.
         let width = MIRROR_BLUR * (1.0 + sight.distance / met.distance.max(0.5)).min(20.0);
-        let appearance = self
-            .town
-            .appearance(&met, &reflected, width, &self.look.cover);
+        let appearance = self.town.appearance(&met, &reflected, width, &self.look.cover);
         let surface = self.surface(&reflected, &met, &appearance);
         self.look.through_air(surface, met.distance)
     }

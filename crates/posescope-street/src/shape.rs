@@ -59,26 +59,15 @@ impl Shape {
             let right = right_of(frame.ahead);
             let reach = |r: f64, a: f64| half.x * r.abs() + half.z * a.abs();
             let (x, z) = (reach(right.x, frame.ahead.x), reach(right.y, frame.ahead.y));
-            [
-                frame.origin - Vector3::new(x, 0.0, z),
-                frame.origin + Vector3::new(x, half.y, z),
-            ]
+            [frame.origin - Vector3::new(x, 0.0, z), frame.origin + Vector3::new(x, half.y, z)]
         };
         match self {
             Self::Block { frame, half } | Self::Gable { frame, half } => around(frame, *half),
-            Self::Pole {
-                base,
-                radius,
-                height,
-            } => [
+            Self::Pole { base, radius, height } => [
                 base - Vector3::new(*radius, 0.0, *radius),
                 base + Vector3::new(*radius, *height, *radius),
             ],
-            Self::Clump {
-                centre,
-                radius,
-                half_height,
-            } => {
+            Self::Clump { centre, radius, half_height } => {
                 let reach = Vector3::new(*radius, *half_height, *radius);
                 [centre - reach, centre + reach]
             }
@@ -92,16 +81,10 @@ impl Shape {
         let contact = match self {
             Self::Block { frame, half } => meet_block(frame, *half, ray, from),
             Self::Gable { frame, half } => meet_gable(frame, *half, ray, from),
-            Self::Pole {
-                base,
-                radius,
-                height,
-            } => meet_pole(*base, *radius, *height, ray, from),
-            Self::Clump {
-                centre,
-                radius,
-                half_height,
-            } => meet_clump(*centre, *radius, *half_height, ray, from),
+            Self::Pole { base, radius, height } => meet_pole(*base, *radius, *height, ray, from),
+            Self::Clump { centre, radius, half_height } => {
+                meet_clump(*centre, *radius, *half_height, ray, from)
+            }
             Self::Car { frame, shape } => {
                 let mut contact = shape.meet(&frame.ray_to_local(ray), from)?;
                 contact.normal = frame.vector_to_town(&contact.normal);
@@ -126,28 +109,11 @@ mod tests {
     fn shapes() -> Vec<Shape> {
         let half = Vector3::new(2.0, 3.0, 1.5);
         vec![
-            Shape::Block {
-                frame: frame(),
-                half,
-            },
-            Shape::Gable {
-                frame: frame(),
-                half,
-            },
-            Shape::Pole {
-                base: frame().origin,
-                radius: 1.2,
-                height: 3.0,
-            },
-            Shape::Clump {
-                centre: Point3::new(1.0, 2.0, 10.0),
-                radius: 2.0,
-                half_height: 1.3,
-            },
-            Shape::Car {
-                frame: frame(),
-                shape: Box::new(CarShape::new(5)),
-            },
+            Shape::Block { frame: frame(), half },
+            Shape::Gable { frame: frame(), half },
+            Shape::Pole { base: frame().origin, radius: 1.2, height: 3.0 },
+            Shape::Clump { centre: Point3::new(1.0, 2.0, 10.0), radius: 2.0, half_height: 1.3 },
+            Shape::Car { frame: frame(), shape: Box::new(CarShape::new(5)) },
         ]
     }
 
@@ -155,13 +121,8 @@ mod tests {
     fn the_front_of_a_block_is_met_at_its_distance() {
         let half = Vector3::new(2.0, 3.0, 1.0);
         let frame = Frame::new(Point2::new(0.0, 10.0), 0.0, -Vector2::y());
-        let ray = Ray {
-            origin: Point3::new(0.5, 1.0, 0.0),
-            direction: Vector3::z(),
-        };
-        let contact = Shape::Block { frame, half }
-            .meet(&ray, 0.0, 100.0)
-            .expect("in the way");
+        let ray = Ray { origin: Point3::new(0.5, 1.0, 0.0), direction: Vector3::z() };
+        let contact = Shape::Block { frame, half }.meet(&ray, 0.0, 100.0).expect("in the way");
         assert!((contact.distance - 9.0).abs() < 1e-12);
         assert_eq!(contact.part, Part::Front);
         assert!((contact.normal + Vector3::z()).norm() < 1e-12);

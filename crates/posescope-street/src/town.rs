@@ -233,13 +233,9 @@ impl Town {
         const CLEAR: f64 = 0.02;
         /// Nothing is high enough to cast longer shadows \[m\].
         const LONGEST: f64 = 60.0;
-        let ray = Ray {
-            origin: sight.point + sight.normal * CLEAR,
-            direction: *light,
-        };
+        let ray = Ray { origin: sight.point + sight.normal * CLEAR, direction: *light };
         self.tree.any(&ray, LONGEST as f32, occluder, |index| {
-            self.meet(&self.solids[index as usize], &ray, CLEAR, LONGEST)
-                .is_some()
+            self.meet(&self.solids[index as usize], &ray, CLEAR, LONGEST).is_some()
         })
     }
 
@@ -247,9 +243,7 @@ impl Town {
     pub(super) fn openness(&self, sight: &Sight) -> f64 {
         let low = sight.point.y < 0.6;
         match &sight.target {
-            Target::Ground(_) => self
-                .shade
-                .openness(Point2::new(sight.point.x, sight.point.z)),
+            Target::Ground(_) => self.shade.openness(Point2::new(sight.point.x, sight.point.z)),
             Target::Solid(..) if low => 0.55 + 0.75 * sight.point.y.max(0.0),
             Target::Solid(..) => 1.0,
         }
@@ -281,9 +275,8 @@ fn footprint(sight: &Sight, ray: &Ray, pixel: f64) -> Footprint {
     const GRAZING: f64 = 0.02;
     let normal = sight.normal;
     let cosine = ray.direction.dot(&normal).abs().max(GRAZING);
-    let across = Vector3::new(normal.z, 0.0, -normal.x)
-        .try_normalize(1e-6)
-        .unwrap_or_else(Vector3::x);
+    let across =
+        Vector3::new(normal.z, 0.0, -normal.x).try_normalize(1e-6).unwrap_or_else(Vector3::x);
     let up = normal.cross(&across);
     let width = sight.distance * pixel;
     let extent = |axis: &Vector3<f64>| {
@@ -321,20 +314,14 @@ mod tests {
         let (here, there) = (cars(1), cars(2));
         let stayed = here.iter().filter(|car| there.contains(car)).count();
         assert!((120..400).contains(&here.len()), "{}", here.len());
-        assert!(
-            (0.4..0.6).contains(&(stayed as f64 / here.len() as f64)),
-            "{stayed}"
-        );
+        assert!((0.4..0.6).contains(&(stayed as f64 / here.len() as f64)), "{stayed}");
     }
 
     #[test]
     fn what_lies_behind_a_wall_is_seen_farther_along_the_line_of_sight() {
         // A wall at z = 4 that faces the origin, seen obliquely to the right and upwards.
         let direction = Vector3::new(0.6, 0.3, 0.8).normalize();
-        let ray = Ray {
-            origin: Point3::origin(),
-            direction,
-        };
+        let ray = Ray { origin: Point3::origin(), direction };
         let sight = Sight {
             distance: 5.0,
             point: ray.at(5.0),
@@ -350,9 +337,6 @@ mod tests {
             ),
         };
         let slant = footprint(&sight, &ray, 1e-3).slant;
-        assert!(
-            (slant - Vector2::new(0.75, 0.375)).norm() < 1e-12,
-            "{slant}"
-        );
+        assert!((slant - Vector2::new(0.75, 0.375)).norm() < 1e-12, "{slant}");
     }
 }

@@ -32,13 +32,7 @@ impl Traversal {
         let seed = derive(world, condition as u32);
         let town = Town::new(world_seed, seed, condition.season());
         let poses = camera_path::poses(&town.network, seed);
-        Self {
-            town,
-            look: condition.look(),
-            intrinsics: size.intrinsics(),
-            poses,
-            seed,
-        }
+        Self { town, look: condition.look(), intrinsics: size.intrinsics(), poses, seed }
     }
 
     /// Number of frames; they are about 1 m apart, and the last is about 1 m before the first.

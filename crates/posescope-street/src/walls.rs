@@ -34,10 +34,7 @@ pub(super) fn appearance(
     };
     // The eaves keep the sky off the wall below them.
     let below = ((facade.eaves - uv.y) / 0.9).clamp(0.0, 1.0);
-    Appearance {
-        albedo: fitted.albedo * (0.45 + 0.55 * below),
-        ..fitted
-    }
+    Appearance { albedo: fitted.albedo * (0.45 + 0.55 * below), ..fitted }
 }
 
 /// Painted plaster with stains.
@@ -90,11 +87,7 @@ fn wall(facade: &Facade, uv: Vector2<f64>, footprint: &Footprint) -> Rgb {
     let stones = grey(0.17)
         * (1.0 + 0.35 * octaves(uv.into(), 0.5, 4, 0.75, footprint, facade.seed ^ 8)).max(0.3);
     let joints = stripes(uv.x, 0.62, 0.02, footprint.along.x) * 0.4;
-    let based = blend(
-        stones * (1.0 - joints),
-        banded,
-        step(uv.y - facade.plinth, dv),
-    );
+    let based = blend(stones * (1.0 - joints), banded, step(uv.y - facade.plinth, dv));
     // Splashed dirt just above the ground.
     based * (0.62 + 0.38 * (uv.y / 0.7).min(1.0))
 }

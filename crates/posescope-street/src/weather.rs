@@ -96,12 +96,7 @@ fn night() -> Look {
         headlamps: 0.2,
         haze: 0.002,
         air: Rgb::new(0.020, 0.015, 0.010),
-        lens: Lens {
-            motion: 0.35,
-            blur: 6,
-            glare: 0.25,
-            ..Lens::default()
-        },
+        lens: Lens { motion: 0.35, blur: 6, glare: 0.25, ..Lens::default() },
         exposure: Rgb::new(2.00, 1.80, 1.60),
         noise: 20.0,
         vignetting: 0.45,
@@ -121,15 +116,8 @@ fn rain() -> Look {
         opposite: grey(0.07),
         haze: 0.005,
         air: Rgb::new(0.40, 0.42, 0.45),
-        cover: Cover {
-            snow: 0.0,
-            wet: 1.0,
-        },
-        lens: Lens {
-            drops: 28,
-            streaks: 700,
-            ..Lens::default()
-        },
+        cover: Cover { snow: 0.0, wet: 1.0 },
+        lens: Lens { drops: 28, streaks: 700, ..Lens::default() },
         exposure: grey(1.15),
         noise: 3.5,
         vignetting: 0.15,
@@ -150,14 +138,8 @@ fn snow() -> Look {
         glow: 0.7,
         haze: 0.003,
         air: Rgb::new(0.66, 0.68, 0.71),
-        cover: Cover {
-            snow: 1.0,
-            wet: 0.0,
-        },
-        lens: Lens {
-            flakes: 1800,
-            ..Lens::default()
-        },
+        cover: Cover { snow: 1.0, wet: 0.0 },
+        lens: Lens { flakes: 1800, ..Lens::default() },
         exposure: grey(1.30),
         noise: 2.0,
         ..overcast()

@@ -31,16 +31,12 @@ pub(in crate::app) fn left(ui: &mut Ui, state: &AppState, commands: &Queue, pane
     let overview = Overview::of(&results.iter().collect::<Vec<_>>());
     ui.add_space(4.0);
     ui.horizontal_wrapped(|ui| {
-        let headline = RichText::new(&overview.headline)
-            .size(15.0)
-            .color(ui.visuals().strong_text_color());
+        let headline =
+            RichText::new(&overview.headline).size(15.0).color(ui.visuals().strong_text_color());
         ui.label(headline);
         let (text, help) = match state.queries.progress() {
             Some((done, all)) => (format!("Stop ({done} of {all})"), "Stop"),
-            None => (
-                "Run all".to_owned(),
-                "Localise all queries, to know which fail",
-            ),
+            None => ("Run all".to_owned(), "Localise all queries, to know which fail"),
         };
         if ui.button(text).on_hover_text(help).clicked() {
             commands.send(Command::RunAllQueries);
@@ -48,10 +44,8 @@ pub(in crate::app) fn left(ui: &mut Ui, state: &AppState, commands: &Queue, pane
     });
     ui.add_space(4.0);
     let rows = overview.bars.len().max(overview.causes.len()).min(MOST);
-    let (area, _) = ui.allocate_exact_size(
-        vec2(ui.available_width(), rows as f32 * BAR + 6.0),
-        Sense::hover(),
-    );
+    let (area, _) =
+        ui.allocate_exact_size(vec2(ui.available_width(), rows as f32 * BAR + 6.0), Sense::hover());
     let (bars, causes) = area.split_left_right_at_fraction(0.5);
     draw_bars(ui, &overview, bars.with_max_x(bars.right() - 16.0));
     draw_causes(ui, &overview, causes);
@@ -65,20 +59,15 @@ fn draw_bars(ui: &Ui, overview: &Overview, area: Rect) {
         let top = area.top() + row as f32 * BAR;
         let line = Rect::from_min_size(pos2(area.left(), top), vec2(area.width(), BAR - 4.0));
         let words = Grade::ALL.iter().filter(|grade| bar.count(**grade) > 0);
-        let words: Vec<String> = words
-            .map(|grade| format!("{} {grade}", bar.count(*grade)))
-            .collect();
+        let words: Vec<String> =
+            words.map(|grade| format!("{} {grade}", bar.count(*grade))).collect();
         let spoken = format!("{}: {}", bar.name, words.join(", "));
         let response = ui.interact(line, ui.scope_id().with(("bar", row)), Sense::hover());
         response.widget_info(|| WidgetInfo::labeled(Role::Image, true, &spoken));
         let painter = ui.painter_at(line);
         let text = ui.visuals().text_color();
         let name = elided(ui, &bar.name, text, NAME - 4.0);
-        painter.galley(
-            pos2(line.left(), line.center().y - name.size().y / 2.0),
-            name,
-            text,
-        );
+        painter.galley(pos2(line.left(), line.center().y - name.size().y / 2.0), name, text);
         let width = (line.width() - NAME) / bar.total().max(1) as f32;
         let mut left = line.left() + NAME;
         for grade in Grade::ALL {
@@ -126,18 +115,11 @@ fn draw_causes(ui: &Ui, overview: &Overview, area: Rect) {
         let painter = ui.painter_at(line);
         let text = ui.visuals().text_color();
         let name = elided(ui, &title, text, names - 8.0);
-        painter.galley(
-            pos2(line.left(), line.center().y - name.size().y / 2.0),
-            name,
-            text,
-        );
+        painter.galley(pos2(line.left(), line.center().y - name.size().y / 2.0), name, text);
         let longest = area.width() - names - COUNT;
         let bar = Rect::from_min_size(
             pos2(line.left() + names, line.top() + 2.0),
-            vec2(
-                (longest * *times as f32 / most as f32).max(2.0),
-                line.height() - 4.0,
-            ),
+            vec2((longest * *times as f32 / most as f32).max(2.0), line.height() - 4.0),
         );
         painter.rect_filled(bar, 1.0, theme::ESTIMATE);
         painter.text(
@@ -158,26 +140,20 @@ pub(in crate::app) fn right(ui: &mut Ui, state: &AppState, commands: &Queue, pan
     ui.scope_builder(UiBuilder::new().max_rect(upper), |ui| {
         ui.shrink_clip_rect(upper);
         let span = state.shown_span();
-        let result = span
-            .filter(|span| state.has_come(span))
-            .and_then(|span| state.shown_result(span));
+        let result =
+            span.filter(|span| state.has_come(span)).and_then(|span| state.shown_result(span));
         match &result {
             Some(result) => {
-                let error = result.error.map_or(String::new(), |error| {
-                    format!(" · {} off", error.translation())
-                });
-                ui.strong(format!(
-                    "{} · {}{error}",
-                    result.query,
-                    result.method.label()
-                ));
+                let error = result
+                    .error
+                    .map_or(String::new(), |error| format!(" · {} off", error.translation()));
+                ui.strong(format!("{} · {}{error}", result.query, result.method.label()));
                 let text = match (result.diagnosis.first(), &result.reason) {
                     (Some(found), _) => found.text.clone(),
                     (None, Some(reason)) => reason.text.clone(),
                     (None, None) => result.evidence(),
                 };
-                ui.add(egui::Label::new(split(&text).0).truncate())
-                    .on_hover_text(&text);
+                ui.add(egui::Label::new(split(&text).0).truncate()).on_hover_text(&text);
             }
             None => {
                 ui.weak("Select a result in the table.");
@@ -185,10 +161,7 @@ pub(in crate::app) fn right(ui: &mut Ui, state: &AppState, commands: &Queue, pan
         }
         ui.horizontal(|ui| {
             let open = ui.button("Open in Inspect");
-            if open
-                .on_hover_text("Show this query at its proof picture (Enter)")
-                .clicked()
-            {
+            if open.on_hover_text("Show this query at its proof picture (Enter)").clicked() {
                 commands.send(Command::OpenSelected);
             }
         });

@@ -80,10 +80,8 @@ fn inside(ui: &mut Ui, rect: Rect, draw: impl FnOnce(&mut Ui)) {
 
 /// The name above a small picture; a click makes it the large one.
 fn small_title(ui: &mut Ui, state: &AppState, commands: &Queue, name: &'static str, rect: Rect) {
-    let title = views::ALL
-        .iter()
-        .find(|entry| entry.name == name)
-        .map_or(name, |entry| entry.title);
+    let title =
+        views::ALL.iter().find(|entry| entry.name == name).map_or(name, |entry| entry.title);
     let response = ui.interact(rect, ui.scope_id().with(("small", name)), Sense::click());
     let spoken = format!("Show {title} large");
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, &spoken));
@@ -92,11 +90,8 @@ fn small_title(ui: &mut Ui, state: &AppState, commands: &Queue, name: &'static s
     } else {
         ui.visuals().weak_text_color()
     };
-    let galley = ui
-        .painter()
-        .layout_no_wrap(title.to_owned(), theme::caption(), color);
-    ui.painter()
-        .galley(rect.min + vec2(2.0, 2.0), galley, color);
+    let galley = ui.painter().layout_no_wrap(title.to_owned(), theme::caption(), color);
+    ui.painter().galley(rect.min + vec2(2.0, 2.0), galley, color);
     if response.on_hover_text(spoken).clicked() {
         let large = state.shown_stage();
         commands.send(Command::Enlarge(large, name));
@@ -128,10 +123,7 @@ pub(super) fn why(ui: &mut Ui, state: &AppState, panes: &mut Panes) {
 pub(in crate::app) fn alone(ui: &mut Ui, state: &AppState, commands: &Queue, panes: &mut Panes) {
     ui.horizontal(|ui| {
         let button = ui.button(RichText::new("All panels").small());
-        if button
-            .on_hover_text("Back to the window with all its parts (M)")
-            .clicked()
-        {
+        if button.on_hover_text("Back to the window with all its parts (M)").clicked() {
             commands.send(Command::Maximize(None));
         }
     });

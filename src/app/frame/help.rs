@@ -11,9 +11,7 @@ pub(in crate::app) fn keys_ui(ctx: &egui::Context, open: &mut bool) {
     /// What the title and the margins take \[points\].
     const AROUND: f32 = 90.0;
     let of = |group: Group| {
-        ACTIONS
-            .iter()
-            .filter(move |action| action.group == group && !action.keys.is_empty())
+        ACTIONS.iter().filter(move |action| action.group == group && !action.keys.is_empty())
     };
     // Where the higher of the two columns is lowest; a title takes about a row.
     let rows = |groups: &[(Group, &str)]| -> usize {
@@ -34,16 +32,16 @@ pub(in crate::app) fn keys_ui(ctx: &egui::Context, open: &mut bool) {
                     ui.vertical(|ui| {
                         for (group, title) in groups {
                             ui.strong(*title);
-                            egui::Grid::new(title)
-                                .striped(true)
-                                .spacing([12.0, 2.0])
-                                .show(ui, |ui| {
+                            egui::Grid::new(title).striped(true).spacing([12.0, 2.0]).show(
+                                ui,
+                                |ui| {
                                     for action in of(*group) {
                                         ui.monospace(action.keys_text(ui.ctx()));
                                         ui.label(action.text);
                                         ui.end_row();
                                     }
-                                });
+                                },
+                            );
                             ui.add_space(6.0);
                         }
                     });
@@ -79,11 +77,8 @@ impl ActionSearch {
         const MOST: usize = 12;
         ui.set_width(420.0);
         let pressed = |ui: &Ui, key| ui.input_mut(|input| input.consume_key(Modifiers::NONE, key));
-        let (down, up, enter) = (
-            pressed(ui, Key::ArrowDown),
-            pressed(ui, Key::ArrowUp),
-            pressed(ui, Key::Enter),
-        );
+        let (down, up, enter) =
+            (pressed(ui, Key::ArrowDown), pressed(ui, Key::ArrowUp), pressed(ui, Key::Enter));
         let field = TextEdit::singleline(&mut self.typed)
             .hint_text("What do you want to do?")
             .desired_width(f32::INFINITY);
@@ -146,10 +141,7 @@ mod tests {
 
     #[test]
     fn an_action_is_found_by_its_words_in_any_order() {
-        let texts: Vec<_> = found("RERUN stream")
-            .iter()
-            .map(|action| action.text)
-            .collect();
+        let texts: Vec<_> = found("RERUN stream").iter().map(|action| action.text).collect();
         assert_eq!(texts, ["Stream the run to a Rerun viewer"]);
         assert_eq!(found("").len(), ACTIONS.len());
         assert!(found("no such words").is_empty());

@@ -107,11 +107,7 @@ fn why(ui: &mut Ui, state: &AppState, commands: &Queue) {
 
 fn heading(ui: &mut Ui, text: &str) {
     ui.add_space(10.0);
-    ui.label(
-        RichText::new(text)
-            .size(12.0)
-            .color(ui.visuals().weak_text_color()),
-    );
+    ui.label(RichText::new(text).size(12.0).color(ui.visuals().weak_text_color()));
 }
 
 /// The cause in plain words, its code after it, its sentence and its numbers.
@@ -196,18 +192,13 @@ const NAMES: &[(&str, &str)] = &[
 /// A field of evidence as people read it: its name, and the unit behind its value.
 fn readable(code: Code, key: &str) -> (String, &'static str) {
     let units = [("_m", " m"), ("_deg", "°"), ("_px", " px")];
-    let found = units
-        .into_iter()
-        .find_map(|(ending, unit)| Some((key.strip_suffix(ending)?, unit)));
+    let found =
+        units.into_iter().find_map(|(ending, unit)| Some((key.strip_suffix(ending)?, unit)));
     let (name, unit) = found.unwrap_or((key, ""));
     let of_code = format!("{}.{key}", code.name());
-    let known = NAMES
-        .iter()
-        .find(|(known, _)| *known == key || *known == of_code);
-    let name = known.map_or_else(
-        || capital(&name.replace('_', " ")),
-        |(_, name)| (*name).to_owned(),
-    );
+    let known = NAMES.iter().find(|(known, _)| *known == key || *known == of_code);
+    let name =
+        known.map_or_else(|| capital(&name.replace('_', " ")), |(_, name)| (*name).to_owned());
     (name, unit)
 }
 
@@ -261,10 +252,9 @@ fn helped(
     let words = match (failed, explanation.complete) {
         (0, _) => "none".to_owned(),
         (failed, true) => format!("{failed} of {} remedies", explanation.runs),
-        (failed, false) => format!(
-            "{failed} of {} remedies, then the search was stopped",
-            explanation.runs
-        ),
+        (failed, false) => {
+            format!("{failed} of {} remedies, then the search was stopped", explanation.runs)
+        }
     };
     ui.weak(words);
     ui.weak("The truth chose these. Click one to run it.");
@@ -273,10 +263,7 @@ fn helped(
 fn remedy(ui: &mut Ui, commands: &Queue, helped: &Helped) {
     let args = short(&helped.args);
     let stroke = Stroke::new(1.0, ui.visuals().widgets.noninteractive.bg_stroke.color);
-    let frame = Frame::new()
-        .stroke(stroke)
-        .corner_radius(3.0)
-        .inner_margin(vec2(8.0, 4.0));
+    let frame = Frame::new().stroke(stroke).corner_radius(3.0).inner_margin(vec2(8.0, 4.0));
     let response = frame.show(ui, |ui| {
         ui.set_width(ui.available_width());
         ui.label(RichText::new(&args).monospace().size(12.0));
@@ -286,10 +273,7 @@ fn remedy(ui: &mut Ui, commands: &Queue, helped: &Helped) {
     let response = response.response.interact(egui::Sense::click());
     let spoken = format!("Run with {args}");
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, &spoken));
-    if response
-        .on_hover_text("Keeps this run as A and runs the query with this")
-        .clicked()
-    {
+    if response.on_hover_text("Keeps this run as A and runs the query with this").clicked() {
         commands.send(Command::Try(helped.args.clone()));
     }
 }

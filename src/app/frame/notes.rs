@@ -24,8 +24,7 @@ pub(in crate::app) fn ui(ctx: &egui::Context, state: &AppState, commands: &Queue
                     }
                     let text = RichText::new(&note.text);
                     ui.label(if note.is_error {
-                        text.color(theme::text(ui.visuals(), theme::ESTIMATE))
-                            .strong()
+                        text.color(theme::text(ui.visuals(), theme::ESTIMATE)).strong()
                     } else {
                         text
                     });

@@ -34,16 +34,11 @@ pub(super) fn ui(
             let response = response.on_hover_text("Click to show this large");
             if response.hovered() {
                 let stroke = Stroke::new(1.0, theme::accent(ui.visuals()));
-                ui.painter()
-                    .rect_stroke(rect, 0.0, stroke, egui::StrokeKind::Outside);
+                ui.painter().rect_stroke(rect, 0.0, stroke, egui::StrokeKind::Outside);
             }
             if response.clicked() {
                 // The one that was large before stands in the place of the one that is large now.
-                *swapped = if *swapped == Some(small) {
-                    None
-                } else {
-                    Some(small)
-                };
+                *swapped = if *swapped == Some(small) { None } else { Some(small) };
             }
         }
     }
@@ -59,8 +54,7 @@ fn draw(ui: &Ui, textures: &Textures, panel: &Panel, rect: Rect, title_end: f32)
     let words = ui.visuals().text_color();
     let title = pos2(rect.left(), rect.top() - 3.0);
     let galley = elided(ui, &panel.title, words, title_end - rect.left());
-    ui.painter()
-        .galley(title - vec2(0.0, galley.size().y), galley, words);
+    ui.painter().galley(title - vec2(0.0, galley.size().y), galley, words);
     let texture = textures.of(ui.ctx(), "proof", &panel.picture, |picture| {
         color_image(&image::DynamicImage::ImageRgb8(picture.clone()))
     });
@@ -71,10 +65,7 @@ fn draw(ui: &Ui, textures: &Textures, panel: &Panel, rect: Rect, title_end: f32)
     let at = |point: [f32; 2]| rect.min + vec2(point[0], point[1]) * scale;
     for line in &panel.lines {
         let points = line.points.iter().map(|point| at(*point)).collect();
-        painter.add(Shape::line(
-            points,
-            Stroke::new(line.width, theme::rgb(line.color)),
-        ));
+        painter.add(Shape::line(points, Stroke::new(line.width, theme::rgb(line.color))));
     }
     for mark in &panel.marks {
         draw_mark(&painter, mark.thing, at(mark.at));
@@ -98,16 +89,9 @@ pub(in crate::app) fn draw_mark(painter: &egui::Painter, thing: Thing, at: Pos2)
                 painter.vline(at.x, at.y - MARK..=at.y + MARK, stroke);
             }
             Thing::Result(_) => {
-                let corners = [
-                    vec2(0.0, -MARK),
-                    vec2(MARK, 0.0),
-                    vec2(0.0, MARK),
-                    vec2(-MARK, 0.0),
-                ];
-                painter.add(Shape::closed_line(
-                    corners.map(|to| at + to).to_vec(),
-                    stroke,
-                ));
+                let corners =
+                    [vec2(0.0, -MARK), vec2(MARK, 0.0), vec2(0.0, MARK), vec2(-MARK, 0.0)];
+                painter.add(Shape::closed_line(corners.map(|to| at + to).to_vec(), stroke));
             }
             Thing::Dot(_) => {
                 painter.circle_stroke(at, 3.0, stroke);
@@ -147,12 +131,7 @@ fn labels<'a>(
 }
 
 fn place_of(rect: Rect) -> Place {
-    Place {
-        left: rect.left(),
-        top: rect.top(),
-        width: rect.width(),
-        height: rect.height(),
-    }
+    Place { left: rect.left(), top: rect.top(), width: rect.width(), height: rect.height() }
 }
 
 /// What the colours mean, in a corner without a mark. Where it is.
@@ -177,10 +156,8 @@ fn color_scale(
     for step in 0..STEPS {
         let color = theme::rgb(palette::viridis((step as f64 + 0.5) / STEPS as f64));
         let wide = BAR.x / STEPS as f32;
-        let rect = Rect::from_min_size(
-            start + vec2(step as f32 * wide, 0.0),
-            vec2(wide + 0.5, BAR.y),
-        );
+        let rect =
+            Rect::from_min_size(start + vec2(step as f32 * wide, 0.0), vec2(wide + 0.5, BAR.y));
         painter.rect_filled(rect, 0.0, color);
     }
     let after = start + vec2(BAR.x + 5.0, -1.0);

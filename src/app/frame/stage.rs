@@ -58,10 +58,7 @@ pub(super) fn caption(stage: Stage, has_failed: bool, records: &[Record]) -> Str
             format!("{} keypoints", counts.join(" + "))
         }
         _ => {
-            let latest = records
-                .iter()
-                .rev()
-                .find_map(|record| number(stage, &record.event));
+            let latest = records.iter().rev().find_map(|record| number(stage, &record.event));
             latest.unwrap_or_else(|| name(stage))
         }
     }

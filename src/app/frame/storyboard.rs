@@ -49,19 +49,13 @@ pub(in crate::app) fn ui(ui: &mut Ui, state: &AppState, commands: &Queue) {
     let area = ui.available_rect_before_wrap();
     let (above, line) = area.split_top_bottom_at_y(area.bottom() - SCRUB);
     let rows = rows(state);
-    let most = rows
-        .iter()
-        .map(|row| row.stages.len() + 1)
-        .max()
-        .unwrap_or(1);
+    let most = rows.iter().map(|row| row.stages.len() + 1).max().unwrap_or(1);
     let room = above.width() - NAME - 12.0;
     let width = (room / most as f32 - GAP).clamp(*WIDTH.start(), *WIDTH.end());
     let height = (above.height() / rows.len().max(1) as f32 - GAP).clamp(*ROW.start(), *ROW.end());
     ui.scope_builder(UiBuilder::new().max_rect(above), |ui| {
         ui.shrink_clip_rect(above);
-        let area = egui::ScrollArea::both()
-            .id_salt("storyboard")
-            .auto_shrink(false);
+        let area = egui::ScrollArea::both().id_salt("storyboard").auto_shrink(false);
         area.show(ui, |ui| {
             ui.spacing_mut().item_spacing = vec2(GAP, GAP);
             for row in &rows {
@@ -79,14 +73,10 @@ fn rows(state: &AppState) -> Vec<Row<'_>> {
     let run = state.shown_run();
     let reference = run.reference_at(state.shown_cursor());
     let methods = state.setup.task.protocol.methods.iter();
-    let own = methods
-        .clone()
-        .map(|&method| Part::Reference(method, reference));
+    let own = methods.clone().map(|&method| Part::Reference(method, reference));
     let fused = methods.map(|&method| Part::Fusion(method));
     let fused = fused.filter(|part| run.span_of(*part).is_some());
-    let retrieval = [Part::Retrieval]
-        .into_iter()
-        .filter(|part| run.span_of(*part).is_some());
+    let retrieval = [Part::Retrieval].into_iter().filter(|part| run.span_of(*part).is_some());
     let parts = retrieval.chain(own).chain(fused);
     parts
         .map(|part| {
@@ -100,9 +90,7 @@ fn rows(state: &AppState) -> Vec<Row<'_>> {
 fn draw(ui: &mut Ui, state: &AppState, commands: &Queue, row: &Row<'_>, size: egui::Vec2) {
     name(ui, state, commands, row, size.y);
     let Some(span) = row.span else { return };
-    let is_here = state
-        .shown_span()
-        .is_some_and(|here| here.records == span.records);
+    let is_here = state.shown_span().is_some_and(|here| here.records == span.records);
     let shows_why = is_here && state.options.shows_why;
     let run = state.shown_run();
     for bar in &row.stages {
@@ -186,13 +174,8 @@ fn stop_here(ui: &mut Ui, state: &AppState, commands: &Queue, part: Part, stage:
         Some(method) if !Breakpoint::is_outside(stage) => format!("{method}.{stage}"),
         _ => stage.to_owned(),
     };
-    let mut texts: Vec<String> = state
-        .setup
-        .task
-        .breakpoints
-        .iter()
-        .map(ToString::to_string)
-        .collect();
+    let mut texts: Vec<String> =
+        state.setup.task.breakpoints.iter().map(ToString::to_string).collect();
     let known = texts.iter().position(|text| *text == breakpoint);
     let words = match known {
         Some(_) => format!("Do not stop at {breakpoint}"),
@@ -236,35 +219,21 @@ impl Cell {
             let scale = (rect.width() / picture.x).min(rect.height() / picture.y);
             let place = Rect::from_center_size(rect.center(), picture * scale);
             let tint = Color32::WHITE.gamma_multiply(if self.is_pale { 0.6 } else { 1.0 });
-            painter.image(
-                texture,
-                place,
-                Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0)),
-                tint,
-            );
+            painter.image(texture, place, Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0)), tint);
         }
         let strip = rect.with_min_y(rect.bottom() - CAPTION);
         painter.rect_filled(strip, 0.0, Color32::from_rgb(16, 17, 20));
-        let words = elided(
-            ui,
-            &self.caption,
-            Color32::from_gray(232),
-            rect.width() - 6.0,
-        );
+        let words = elided(ui, &self.caption, Color32::from_gray(232), rect.width() - 6.0);
         painter.galley(strip.min + vec2(3.0, 1.0), words, Color32::WHITE);
-        let frame = match (
-            self.is_selected,
-            self.has_failed,
-            response.hovered() || response.has_focus(),
-        ) {
-            (true, ..) => Some((2.0, ui.visuals().strong_text_color())),
-            (_, true, _) => Some((2.0, theme::ESTIMATE)),
-            (.., true) => Some((1.0, theme::accent(ui.visuals()))),
-            _ => None,
-        };
+        let frame =
+            match (self.is_selected, self.has_failed, response.hovered() || response.has_focus()) {
+                (true, ..) => Some((2.0, ui.visuals().strong_text_color())),
+                (_, true, _) => Some((2.0, theme::ESTIMATE)),
+                (.., true) => Some((1.0, theme::accent(ui.visuals()))),
+                _ => None,
+            };
         if let Some((width, color)) = frame {
-            ui.painter()
-                .rect_stroke(rect, 2.0, Stroke::new(width, color), StrokeKind::Outside);
+            ui.painter().rect_stroke(rect, 2.0, Stroke::new(width, color), StrokeKind::Outside);
         }
         response.on_hover_text(spoken)
     }
@@ -282,24 +251,16 @@ pub(in crate::app) fn part_name(part: Part) -> String {
 fn name(ui: &mut Ui, state: &AppState, commands: &Queue, row: &Row<'_>, height: f32) {
     let (rect, response) = ui.allocate_exact_size(vec2(NAME, height), Sense::click());
     let run = state.shown_run();
-    let references = run
-        .loaded
-        .as_deref()
-        .map_or(0, |loaded| loaded.problems.len());
+    let references = run.loaded.as_deref().map_or(0, |loaded| loaded.problems.len());
     let of = match row.part.reference() {
         Some(reference) if references > 1 => format!("  ref {} of {references}", reference + 1),
         _ => String::new(),
     };
-    let color = row
-        .part
-        .method()
-        .map_or(ui.visuals().text_color(), |method| {
-            theme::text(ui.visuals(), theme::method(method))
-        });
-    let result = row
-        .span
-        .filter(|span| state.has_come(span))
-        .and_then(|span| state.shown_result(span));
+    let color = row.part.method().map_or(ui.visuals().text_color(), |method| {
+        theme::text(ui.visuals(), theme::method(method))
+    });
+    let result =
+        row.span.filter(|span| state.has_come(span)).and_then(|span| state.shown_result(span));
     let (grade, grade_color) = match &result {
         Some(result) => {
             let error = result.error.map(|error| error.translation());
@@ -315,34 +276,13 @@ fn name(ui: &mut Ui, state: &AppState, commands: &Queue, row: &Row<'_>, height: 
     let left = rect.left() + 4.0;
     let (upper, lower) = (rect.center().y - 7.0, rect.center().y + 8.0);
     let name = part_name(row.part);
-    painter.text(
-        pos2(left, upper),
-        Align2::LEFT_CENTER,
-        name,
-        theme::body(),
-        color,
-    );
+    painter.text(pos2(left, upper), Align2::LEFT_CENTER, name, theme::body(), color);
     let small = theme::caption();
-    let at = painter.text(
-        pos2(left, lower),
-        Align2::LEFT_CENTER,
-        &grade,
-        small.clone(),
-        grade_color,
-    );
+    let at =
+        painter.text(pos2(left, lower), Align2::LEFT_CENTER, &grade, small.clone(), grade_color);
     let weak = ui.visuals().weak_text_color();
-    painter.text(
-        pos2(at.right(), lower),
-        Align2::LEFT_CENTER,
-        &of,
-        small,
-        weak,
-    );
-    let help = if of.is_empty() {
-        "Show what it did"
-    } else {
-        "Show the next reference"
-    };
+    painter.text(pos2(at.right(), lower), Align2::LEFT_CENTER, &of, small, weak);
+    let help = if of.is_empty() { "Show what it did" } else { "Show the next reference" };
     if response.on_hover_text(help).clicked() {
         click(state, commands, row, references);
     }
@@ -384,9 +324,7 @@ fn scrub(ui: &mut Ui, state: &AppState, commands: &Queue) {
             ui.set_min_size(size);
             ui.add(egui::Label::new(RichText::new(title).size(12.0)).truncate());
         });
-        let records = bar
-            .map(|bar| bar.records.clone())
-            .or(span.map(|span| span.records.clone()));
+        let records = bar.map(|bar| bar.records.clone()).or(span.map(|span| span.records.clone()));
         let records = records.unwrap_or(0..0);
         let width = (ui.available_width() - 250.0).max(60.0);
         line(ui, commands, &records, cursor, width, color);
@@ -411,21 +349,13 @@ fn line(
     let here = cursor.saturating_sub(records.start).min(last);
     response.widget_info(|| WidgetInfo::slider(true, here as f64, "Step inside the stage"));
     let inside = rect.shrink2(vec2(7.0, 0.0));
-    let share = if last == 0 {
-        1.0
-    } else {
-        here as f32 / last as f32
-    };
+    let share = if last == 0 { 1.0 } else { here as f32 / last as f32 };
     let x = inside.left() + share * inside.width();
     let painter = ui.painter_at(rect);
     let weak = ui.visuals().widgets.inactive.bg_fill;
     painter.hline(inside.x_range(), rect.center().y, Stroke::new(3.0, weak));
     painter.hline(inside.left()..=x, rect.center().y, Stroke::new(3.0, color));
-    painter.circle_filled(
-        pos2(x, rect.center().y),
-        6.0,
-        ui.visuals().strong_text_color(),
-    );
+    painter.circle_filled(pos2(x, rect.center().y), 6.0, ui.visuals().strong_text_color());
     if let Some(pointer) = response.interact_pointer_pos() {
         let share = ((pointer.x - inside.left()) / inside.width().max(1.0)).clamp(0.0, 1.0);
         let wanted = records.start + (share * last as f32).round() as usize;
@@ -448,9 +378,7 @@ fn status(state: &AppState) -> String {
             None => "running".to_owned(),
         },
         RunState::Paused { breakpoint: None } => "paused".to_owned(),
-        RunState::Paused {
-            breakpoint: Some(text),
-        } => format!("stopped at {text}"),
+        RunState::Paused { breakpoint: Some(text) } => format!("stopped at {text}"),
         RunState::Finished => "finished".to_owned(),
         RunState::Cancelled => "cancelled".to_owned(),
         RunState::Broken(_) => "stopped by an error".to_owned(),

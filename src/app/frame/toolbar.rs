@@ -61,12 +61,10 @@ fn menu(ui: &mut Ui, state: &AppState, commands: &Queue) {
 fn query(ui: &mut Ui, state: &AppState, commands: &Queue, panes: &mut Panes) {
     let setup = &state.setup;
     let scene = RichText::new(setup.queries.name()).strong();
-    ui.add(Label::new(scene).truncate())
-        .on_hover_text("The scene of the query");
+    ui.add(Label::new(scene).truncate()).on_hover_text("The scene of the query");
     ui.weak("›");
     button(ui, state, commands, "◀", Command::NextQuery { back: true });
-    ui.label(RichText::new(setup.query_name()).strong())
-        .on_hover_text("The query");
+    ui.label(RichText::new(setup.query_name()).strong()).on_hover_text("The query");
     button(ui, state, commands, "▶", Command::NextQuery { back: false });
     // The names of the references are worth more than the word before them.
     if ui.available_width() > 170.0 {
@@ -111,11 +109,7 @@ fn running(ui: &mut Ui, state: &AppState, commands: &Queue, panes: &mut Panes) {
     });
     let config = MenuConfig::new().close_behavior(PopupCloseBehavior::CloseOnClickOutside);
     let count = state.setup.task.breakpoints.len();
-    let text = if count == 0 {
-        "Break".to_owned()
-    } else {
-        format!("Break ({count})")
-    };
+    let text = if count == 0 { "Break".to_owned() } else { format!("Break ({count})") };
     let (response, _) = MenuButton::new(text).config(config).ui(ui, |ui| {
         ui.set_min_size(egui::vec2(320.0, 260.0));
         ui.set_max_size(egui::vec2(320.0, 260.0));
@@ -134,10 +128,7 @@ fn shown(ui: &mut Ui, state: &AppState, commands: &Queue) {
         let tooltip =
             action::of(&Command::Arrange(arrangement)).map(|action| action.tooltip(ui.ctx()));
         let response = ui.add(Button::selectable(is_on, title));
-        if response
-            .on_hover_text(tooltip.unwrap_or_default())
-            .clicked()
-        {
+        if response.on_hover_text(tooltip.unwrap_or_default()).clicked() {
             commands.send(Command::Arrange(arrangement));
         }
     }
@@ -154,10 +145,7 @@ fn compare(ui: &mut Ui, state: &AppState, commands: &Queue) {
     };
     let button = Button::new(text).min_size(egui::vec2(72.0, 0.0));
     let (response, _) = MenuButton::from_button(button).ui(ui, |ui| {
-        for action in ACTIONS
-            .iter()
-            .filter(|action| action.group == Group::Compare)
-        {
+        for action in ACTIONS.iter().filter(|action| action.group == Group::Compare) {
             action.menu_item(ui, state, commands);
         }
     });

@@ -40,14 +40,10 @@ pub(in crate::app) fn ui(ui: &mut Ui, state: &AppState, commands: &Queue) {
     let rest = Rect::from_min_max(pos2(left + 12.0, area.top()), area.max);
     let (words, button) = rest.split_left_right_at_x(rest.right() - BUTTON);
     let span = state.shown_span();
-    let result = span
-        .filter(|span| state.has_come(span))
-        .and_then(|span| state.shown_result(span));
+    let result = span.filter(|span| state.has_come(span)).and_then(|span| state.shown_result(span));
     let layout = Layout::top_down(Align::Min);
     ui.scope_builder(
-        UiBuilder::new()
-            .max_rect(words.shrink2(vec2(0.0, 4.0)))
-            .layout(layout),
+        UiBuilder::new().max_rect(words.shrink2(vec2(0.0, 4.0))).layout(layout),
         |ui| {
             let (first, second) = sentence(state, span, result.as_ref());
             ui.spacing_mut().item_spacing.y = 1.0;
@@ -55,13 +51,7 @@ pub(in crate::app) fn ui(ui: &mut Ui, state: &AppState, commands: &Queue) {
             let rows = lines(ui, &first, egui::FontId::proportional(15.0), strong, 2);
             if !second.is_empty() {
                 let weak = ui.visuals().weak_text_color();
-                lines(
-                    ui,
-                    &second,
-                    theme::body(),
-                    weak,
-                    if rows > 1 { 1 } else { 2 },
-                );
+                lines(ui, &second, theme::body(), weak, if rows > 1 { 1 } else { 2 });
             }
         },
     );
@@ -94,19 +84,13 @@ fn lines(ui: &mut Ui, text: &str, font: egui::FontId, color: egui::Color32, most
 fn cell(ui: &Ui, state: &AppState, commands: &Queue, rect: Rect, part: Part, span: Option<&Span>) {
     let response = ui.interact(rect, ui.scope_id().with(("verdict", part)), Sense::click());
     let result = span.and_then(|span| state.shown_result(span));
-    let is_here = state
-        .shown_span()
-        .is_some_and(|here| here.part.method() == part.method());
+    let is_here = state.shown_span().is_some_and(|here| here.part.method() == part.method());
     let painter = ui.painter_at(rect);
     if is_here || response.hovered() {
         painter.rect_filled(rect, 0.0, ui.visuals().widgets.inactive.weak_bg_fill);
     }
     let Some(method) = part.method() else { return };
-    painter.hline(
-        rect.x_range(),
-        rect.top() + 1.5,
-        Stroke::new(3.0, theme::method(method)),
-    );
+    painter.hline(rect.x_range(), rect.top() + 1.5, Stroke::new(3.0, theme::method(method)));
     painter.vline(
         rect.right() - 0.5,
         rect.y_range(),
@@ -117,10 +101,7 @@ fn cell(ui: &Ui, state: &AppState, commands: &Queue, rect: Rect, part: Part, spa
     painter.galley(rect.min + vec2(10.0, 12.0), name, color);
     let (words, color) = match &result {
         Some(result) => worth(ui, result),
-        None => (
-            waiting(state, part).to_owned(),
-            ui.visuals().weak_text_color(),
-        ),
+        None => (waiting(state, part).to_owned(), ui.visuals().weak_text_color()),
     };
     let galley = elided(ui, &words, color, rect.width() - 14.0);
     painter.galley(rect.min + vec2(10.0, 34.0), galley, color);
@@ -139,22 +120,12 @@ fn cell(ui: &Ui, state: &AppState, commands: &Queue, rect: Rect, part: Part, spa
 fn worth(ui: &Ui, result: &QueryResult) -> (String, egui::Color32) {
     let color = theme::grade(ui.visuals(), result.grade);
     let words = match (&result.error, &result.confidence) {
-        (Some(error), _) => format!(
-            "{} {} {}",
-            result.grade.glyph(),
-            result.grade,
-            error.translation()
-        ),
+        (Some(error), _) => {
+            format!("{} {} {}", result.grade.glyph(), result.grade, error.translation())
+        }
         (None, Some(known)) if result.pose.is_some() => {
-            let low = if known.word == Confidence::Low {
-                "◆ "
-            } else {
-                ""
-            };
-            format!(
-                "{low}{} likely right",
-                confidence::percent(known.probability)
-            )
+            let low = if known.word == Confidence::Low { "◆ " } else { "" };
+            format!("{low}{} likely right", confidence::percent(known.probability))
         }
         _ => format!("{} {}", result.grade.glyph(), result.grade),
     };
@@ -176,20 +147,16 @@ fn sentence(
 ) -> (String, String) {
     let Some(span) = span else {
         return match state.run_state() {
-            RunState::Loading => (
-                "The photos and the cloud are being read.".to_owned(),
-                String::new(),
-            ),
+            RunState::Loading => {
+                ("The photos and the cloud are being read.".to_owned(), String::new())
+            }
             RunState::Broken(why) => (why.clone(), String::new()),
             _ => (HINT.to_owned(), String::new()),
         };
     };
     let Some(result) = result else {
-        let first = format!(
-            "{} is {}.",
-            part_name(span.part),
-            state.run_state().of_what_has_begun()
-        );
+        let first =
+            format!("{} is {}.", part_name(span.part), state.run_state().of_what_has_begun());
         let is_waiting = matches!(state.run_state(), RunState::Paused { .. });
         if is_waiting && state.run().results().next().is_none() {
             return (first, HINT.to_owned());
@@ -214,10 +181,7 @@ pub(in crate::app) fn split(text: &str) -> (String, String) {
 
 /// What a remedy changes, without the options that need no telling: `mi6`, `grid.rounds=2`.
 pub(super) fn short(args: &[String]) -> String {
-    let told = args
-        .iter()
-        .map(String::as_str)
-        .filter(|arg| !["--set", "--method"].contains(arg));
+    let told = args.iter().map(String::as_str).filter(|arg| !["--set", "--method"].contains(arg));
     told.collect::<Vec<_>>().join(" ")
 }
 
@@ -225,9 +189,7 @@ pub(super) fn short(args: &[String]) -> String {
 fn fitted(ui: &Ui, words: &str, number: &str, width: f32) -> String {
     let fits = |text: &str| {
         let text = text.to_owned();
-        let galley = ui
-            .painter()
-            .layout_no_wrap(text, theme::body(), ui.visuals().text_color());
+        let galley = ui.painter().layout_no_wrap(text, theme::body(), ui.visuals().text_color());
         galley.size().x <= width
     };
     let whole = format!("Try {words}{number}");
@@ -247,10 +209,7 @@ fn fitted(ui: &Ui, words: &str, number: &str, width: f32) -> String {
 /// The best of what helped, or the offer to look for it; always of the same width.
 fn remedy(ui: &mut Ui, state: &AppState, commands: &Queue, result: &QueryResult) {
     let size = vec2(BUTTON - 16.0, 30.0);
-    let explaining = state
-        .run()
-        .explaining
-        .filter(|explaining| explaining.method == result.method);
+    let explaining = state.run().explaining.filter(|explaining| explaining.method == result.method);
     let can_explain = result.error.or(result.initial_error).is_some();
     let mut whole = String::new();
     let (text, command) = match (&result.explanation, explaining) {
@@ -263,25 +222,19 @@ fn remedy(ui: &mut Ui, state: &AppState, commands: &Queue, result: &QueryResult)
                 let text = fitted(ui, &words, &number, size.x - 16.0);
                 (text, Some(Command::Try(helped.args.clone())))
             }
-            None => (
-                format!("None of {} remedies helped", explanation.runs),
-                None,
-            ),
+            None => (format!("None of {} remedies helped", explanation.runs), None),
         },
-        (None, Some(explaining)) => (
-            format!("Trying {} of {} …", explaining.tried, explaining.remedies),
-            None,
-        ),
+        (None, Some(explaining)) => {
+            (format!("Trying {} of {} …", explaining.tried, explaining.remedies), None)
+        }
         (None, None) if can_explain && state.setup.task.protocol.explain == 0 => {
             ("Try what would help".to_owned(), Some(Command::Explain))
         }
         (None, None) => return,
     };
     let is_on = command.is_some();
-    let button = Button::new(text.as_str())
-        .truncate()
-        .min_size(size)
-        .fill(theme::selected(ui.visuals()));
+    let button =
+        Button::new(text.as_str()).truncate().min_size(size).fill(theme::selected(ui.visuals()));
     let response = ui.add_enabled(is_on, button.wrap_mode(egui::TextWrapMode::Truncate));
     if !whole.is_empty() {
         response.widget_info(|| WidgetInfo::labeled(Role::Button, true, &whole));
@@ -290,10 +243,9 @@ fn remedy(ui: &mut Ui, state: &AppState, commands: &Queue, result: &QueryResult)
         Some(Command::Explain) => {
             action::of(&Command::Explain).map(|action| action.tooltip(ui.ctx()))
         }
-        Some(Command::Try(args)) => Some(format!(
-            "Keeps this run as A and runs the query with {}",
-            args.join(" ")
-        )),
+        Some(Command::Try(args)) => {
+            Some(format!("Keeps this run as A and runs the query with {}", args.join(" ")))
+        }
         Some(_) => None,
         None => None,
     };
@@ -318,10 +270,7 @@ mod tests {
             let text = |width| fitted(ui, "grid.coarse_step_m=0.5", " → 0.12 m", width);
             assert_eq!(text(1000.0), "Try grid.coarse_step_m=0.5 → 0.12 m");
             let cut = text(150.0);
-            assert!(
-                cut.starts_with("Try grid") && cut.ends_with("… → 0.12 m"),
-                "{cut}"
-            );
+            assert!(cut.starts_with("Try grid") && cut.ends_with("… → 0.12 m"), "{cut}");
             assert_eq!(text(1.0), "Try → 0.12 m");
         });
     }

@@ -15,10 +15,7 @@ use crate::session::{Part, Run, Span, StageBar};
 impl AppState {
     /// Whether a part came to something that needs an explanation.
     pub(in crate::app) fn needs_why(&self, part: Part) -> bool {
-        let span = self
-            .shown_run()
-            .span_of(part)
-            .filter(|span| self.has_come(span));
+        let span = self.shown_run().span_of(part).filter(|span| self.has_come(span));
         let result = span.and_then(|span| self.shown_result(span));
         result.is_some_and(|result| result.grade != Grade::Right)
     }
@@ -86,20 +83,14 @@ impl AppState {
     /// What an earlier run found for the method of a part, with nothing in it that is hidden.
     pub(in crate::app) fn known_result(&self, part: Part) -> Option<QueryResult> {
         let known = self.results.get(&self.setup.query)?;
-        let result = known
-            .iter()
-            .rfind(|result| Some(result.method) == part.method())?;
+        let result = known.iter().rfind(|result| Some(result.method) == part.method())?;
         Some(result.shown(self.options.shows_truth))
     }
 
     /// The same result in the other run, with nothing in it that is hidden.
     pub(in crate::app) fn other_result(&self, result: &QueryResult) -> Option<QueryResult> {
         let kept = self.kept.as_ref()?;
-        let other = if self.is_showing_kept() {
-            self.run()
-        } else {
-            &kept.run
-        };
+        let other = if self.is_showing_kept() { self.run() } else { &kept.run };
         let is_same = |other: &&QueryResult| {
             other.method == result.method
                 && other.fusion == result.fusion
@@ -132,8 +123,7 @@ impl AppState {
         part: &std::ops::Range<usize>,
         stage: &std::ops::Range<usize>,
     ) -> Option<egui::TextureHandle> {
-        self.shown_pictures()
-            .thumbnail(self.shown_run(), part, stage)
+        self.shown_pictures().thumbnail(self.shown_run(), part, stage)
     }
 
     /// The picture that proves the result of a part, once it is made.
@@ -158,23 +148,14 @@ impl AppState {
             Part::Reference(..) => 2,
             Part::Retrieval | Part::Fusion(_) => 1,
         };
-        inside
-            .into_iter()
-            .filter(|bar| bar.depth == depth)
-            .collect()
+        inside.into_iter().filter(|bar| bar.depth == depth).collect()
     }
 
     /// The last record of a stage of a part. What a part reports after its last stage belongs to that stage.
     pub(in crate::app) fn stage_end(&self, span: &Span, bar: &StageBar) -> usize {
         let stages = self.stages_of(span);
-        let is_last = stages
-            .last()
-            .is_some_and(|last| last.records == bar.records);
-        let end = if is_last && self.has_come(span) {
-            span.records.end
-        } else {
-            bar.records.end
-        };
+        let is_last = stages.last().is_some_and(|last| last.records == bar.records);
+        let end = if is_last && self.has_come(span) { span.records.end } else { bar.records.end };
         end - 1
     }
 }

@@ -130,18 +130,12 @@ impl BatchView {
         {
             return;
         }
-        let results: Vec<&QueryResult> = chosen
-            .iter()
-            .filter_map(|row| context.result(*row))
-            .collect();
+        let results: Vec<&QueryResult> =
+            chosen.iter().filter_map(|row| context.result(*row)).collect();
         let order = select(&results, None, self.order);
         let rows: Vec<ResultRow> = order.into_iter().map(|index| chosen[index]).collect();
         let words = words(context, &rows);
-        let made = Made {
-            chosen,
-            order: self.order,
-            version,
-        };
+        let made = Made { chosen, order: self.order, version };
         self.made = Some((made, Shown { rows, words }));
     }
 }
@@ -182,15 +176,9 @@ fn words(context: &ViewContext<'_>, rows: &[ResultRow]) -> String {
         let is_failed = result.grade.is_failure();
         *failed.entry(result.method).or_default() += usize::from(is_failed);
     }
-    let failed: Vec<String> = failed
-        .iter()
-        .map(|(method, count)| format!("{} {count}", method.label()))
-        .collect();
-    format!(
-        "{} of {results} results; wrong or without a pose: {}",
-        rows.len(),
-        failed.join(", ")
-    )
+    let failed: Vec<String> =
+        failed.iter().map(|(method, count)| format!("{} {count}", method.label())).collect();
+    format!("{} of {results} results; wrong or without a pose: {}", rows.len(), failed.join(", "))
 }
 
 /// The name of a column. A click sorts by it, the next one reverses, the third ends it.
@@ -248,9 +236,6 @@ fn draw(row: &mut TableRow<'_, '_>, context: &ViewContext<'_>, at: ResultRow) {
         answer = answer.on_hover_text(&finding.text);
     }
     if answer.clicked() {
-        context.send(Command::OpenResult {
-            query: at.query,
-            result: at.place,
-        });
+        context.send(Command::OpenResult { query: at.query, result: at.place });
     }
 }

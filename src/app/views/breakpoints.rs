@@ -38,10 +38,7 @@ impl View for BreakpointsView {
             for breakpoint in &breakpoints {
                 ui.horizontal(|ui| {
                     let remove = ui.small_button("×").on_hover_text("Remove");
-                    if remove
-                        .accessible_name(format!("Remove {breakpoint}"))
-                        .clicked()
-                    {
+                    if remove.accessible_name(format!("Remove {breakpoint}")).clicked() {
                         wanted.retain(|other| other != breakpoint);
                     }
                     ui.monospace(breakpoint);

@@ -18,10 +18,7 @@ pub(super) struct PanZoom {
 
 impl Default for PanZoom {
     fn default() -> Self {
-        Self {
-            zoom: 1.0,
-            centre: Vec2::splat(0.5),
-        }
+        Self { zoom: 1.0, centre: Vec2::splat(0.5) }
     }
 }
 
@@ -36,18 +33,10 @@ impl PanZoom {
         let along = |axis: usize| {
             let free = area.size()[axis] - extent[axis];
             let wanted = 0.5 * area.size()[axis] - self.centre[axis] * extent[axis];
-            let gap = if free >= 0.0 {
-                align[axis] * free
-            } else {
-                wanted.clamp(free, 0.0)
-            };
+            let gap = if free >= 0.0 { align[axis] * free } else { wanted.clamp(free, 0.0) };
             area.min[axis] + gap
         };
-        Placement {
-            area,
-            picture: Rect::from_min_size(pos2(along(0), along(1)), extent),
-            scale,
-        }
+        Placement { area, picture: Rect::from_min_size(pos2(along(0), along(1)), extent), scale }
     }
 
     /// Zooms by wheel and pinch about the pointer, moves by dragging, and goes back to the whole
@@ -96,11 +85,7 @@ impl Placement {
     pub(super) fn around(pixel: [f32; 2], half: f32, area: Rect, size: Vec2) -> Self {
         let scale = 0.5 * area.width() / half;
         let corner = area.center() - scale * vec2(pixel[0] + 0.5, pixel[1] + 0.5);
-        Self {
-            area,
-            picture: Rect::from_min_size(corner, scale * size),
-            scale,
-        }
+        Self { area, picture: Rect::from_min_size(corner, scale * size), scale }
     }
 
     /// The share of the picture that is in the middle of the area.
@@ -126,8 +111,7 @@ impl Placement {
     /// Paints the picture.
     pub(super) fn paint(&self, painter: &Painter, texture: TextureId, tint: Color32) {
         let whole = Rect::from_min_max(Pos2::ZERO, pos2(1.0, 1.0));
-        self.painter(painter)
-            .image(texture, self.picture, whole, tint);
+        self.painter(painter).image(texture, self.picture, whole, tint);
     }
 }
 

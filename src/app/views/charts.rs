@@ -32,11 +32,7 @@ impl Chart {
             "Recall",
             "The share of right results over the tolerance in metres and degrees",
         ),
-        (
-            Self::Verdicts,
-            "Verdicts",
-            "How often each verdict is the primary one",
-        ),
+        (Self::Verdicts, "Verdicts", "How often each verdict is the primary one"),
     ];
 }
 
@@ -71,8 +67,7 @@ impl View for ChartsView {
         let results: Vec<Chosen<'_>> = match context.selected() {
             Ok(rows) => {
                 let rows = rows.iter();
-                rows.filter_map(|row| Some((*row, context.result(*row)?)))
-                    .collect()
+                rows.filter_map(|row| Some((*row, context.result(*row)?))).collect()
             }
             Err(error) => {
                 ui.weak(error.to_string());
@@ -85,8 +80,7 @@ impl View for ChartsView {
         }
         ui.horizontal_wrapped(|ui| {
             for (chart, name, about) in Chart::ALL {
-                ui.selectable_value(&mut self.chart, chart, name)
-                    .on_hover_text(about);
+                ui.selectable_value(&mut self.chart, chart, name).on_hover_text(about);
             }
             ui.separator();
             match self.chart {
@@ -101,8 +95,7 @@ impl View for ChartsView {
                 }
                 Chart::Verdicts => {
                     for (columns, name, about) in Columns::ALL {
-                        ui.selectable_value(&mut self.columns, columns, name)
-                            .on_hover_text(about);
+                        ui.selectable_value(&mut self.columns, columns, name).on_hover_text(about);
                     }
                 }
             }
@@ -121,8 +114,7 @@ fn measure(ui: &mut Ui, label: &str, name: &mut &'static str) {
     let answer = combo.show_ui(ui, |ui| {
         let numbers = Field::ALL.iter().filter(|field| field.decimals.is_some());
         for field in numbers {
-            ui.selectable_value(name, field.name, field.name)
-                .on_hover_text(field.about);
+            ui.selectable_value(name, field.name, field.name).on_hover_text(field.about);
         }
     });
     answer.response.labelled_by(label.id);
@@ -173,9 +165,7 @@ impl ChartsView {
             return;
         };
         let distance = |at: &[f64; 2]| {
-            let at = plot
-                .transform
-                .position_from_point(&PlotPoint::new(at[0], at[1]));
+            let at = plot.transform.position_from_point(&PlotPoint::new(at[0], at[1]));
             at.distance(pointer)
         };
         let nearest = places
@@ -187,15 +177,11 @@ impl ChartsView {
             return;
         };
         if answer.clicked() {
-            context.send(Command::OpenResult {
-                query: row.query,
-                result: row.place,
-            });
+            context.send(Command::OpenResult { query: row.query, result: row.place });
         }
         let code = result.diagnosis.first();
-        let code = code.map_or(String::new(), |finding| {
-            format!("\n{} {}", finding.code, finding.text)
-        });
+        let code =
+            code.map_or(String::new(), |finding| format!("\n{} {}", finding.code, finding.text));
         let words = format!("{} {}{code}", result.query, result.method.label());
         plot.response.clone().on_hover_text_at_pointer(words);
     }

@@ -59,11 +59,7 @@ fn reported<'a>(context: &ViewContext<'a>) -> Option<(Method, Vec<&'a References
     let of = |method: Method| -> Vec<&'a ReferencesFused> {
         let records = spans(context, method).flat_map(|span| {
             let end = span.records.end.min(context.cursor + 1);
-            context
-                .run
-                .records()
-                .get(span.records.start..end)
-                .unwrap_or_default()
+            context.run.records().get(span.records.start..end).unwrap_or_default()
         });
         let fused = records.filter_map(|record| match &record.event {
             Event::ReferencesFused(fused) => Some(fused),
@@ -73,9 +69,7 @@ fn reported<'a>(context: &ViewContext<'a>) -> Option<(Method, Vec<&'a References
     };
     let others = context.setup.task.protocol.methods.iter().copied().rev();
     let methods = context.method().into_iter().chain(others);
-    methods
-        .map(|method| (method, of(method)))
-        .find(|(_, fused)| !fused.is_empty())
+    methods.map(|method| (method, of(method))).find(|(_, fused)| !fused.is_empty())
 }
 
 /// How far a pose is from the truth.
@@ -177,7 +171,5 @@ fn map(ui: &mut Ui, context: &ViewContext<'_>, fused: &[&ReferencesFused], heigh
             }
         });
     let name = format!("Map of the fusion {}", present.fusion);
-    answer
-        .response
-        .widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, &name));
+    answer.response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, &name));
 }

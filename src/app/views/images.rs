@@ -41,11 +41,7 @@ impl Default for ImagesView {
         let mut shown = [true; KINDS];
         // Most features fail the first two tests; their lines would bury all others.
         shown[..2].fill(false);
-        Self {
-            shown,
-            pan_zoom: PanZoom::default(),
-            detail: Detail::default(),
-        }
+        Self { shown, pan_zoom: PanZoom::default(), detail: Detail::default() }
     }
 }
 
@@ -57,10 +53,7 @@ impl View for ImagesView {
         };
         let progress = FeatureProgress::at(context);
         let kinds = progress.kinds();
-        let selected = context
-            .options
-            .selected_feature
-            .filter(|&feature| feature < kinds.len());
+        let selected = context.options.selected_feature.filter(|&feature| feature < kinds.len());
         let textures = [&problem.query.photo, &problem.reference.photo]
             .map(|source| photo(ui, context, source));
         let [query, reference] = &textures;

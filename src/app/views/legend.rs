@@ -58,24 +58,14 @@ pub(super) fn color_bar(
 /// The bar of [`palette::viridis`] between two numbers.
 pub(super) fn cost_bar(ui: &mut Ui, width: f32, what: &str, [dark, bright]: &[String; 2]) {
     let name = format!("Colours of {what}: {dark} is dark, {bright} is bright");
-    color_bar(
-        ui,
-        width,
-        &name,
-        theme::viridis,
-        &[(0.0, dark), (1.0, bright)],
-    );
+    color_bar(ui, width, &name, theme::viridis, &[(0.0, dark), (1.0, bright)]);
 }
 
 /// The bar of [`palette::depth`].
 pub(super) fn depth_bar(ui: &mut Ui, width: f32) {
     let metres = [2.0, 5.0, 10.0, 20.0, 40.0, 80.0];
     let words = ["2", "5", "10", "20", "40", "80 m"];
-    let ticks: Vec<(f64, &str)> = metres
-        .into_iter()
-        .map(palette::depth_share)
-        .zip(words)
-        .collect();
+    let ticks: Vec<(f64, &str)> = metres.into_iter().map(palette::depth_share).zip(words).collect();
     color_bar(ui, width, "depth, m", theme::turbo, &ticks);
 }
 

@@ -62,10 +62,7 @@ fn axis(ui: &mut Ui, context: &ViewContext<'_>, step: usize, last: usize) {
     ui.label(format!("of {last}"));
     let is_on = context.options.lockstep.is_some();
     let leave = ui.add_enabled(is_on, egui::Button::new("Leave"));
-    if leave
-        .on_hover_text("Back to the cursor of the run")
-        .clicked()
-    {
+    if leave.on_hover_text("Back to the cursor of the run").clicked() {
         context.send(Command::StepTogether(None));
     }
 }

@@ -33,10 +33,7 @@ pub(super) struct MeshPainter {
 
 impl MeshPainter {
     pub(super) fn new(pixels_per_point: f32) -> Self {
-        Self {
-            mesh: Mesh::default(),
-            soft: pixels_per_point.recip(),
-        }
+        Self { mesh: Mesh::default(), soft: pixels_per_point.recip() }
     }
 
     /// Paints everything collected so far and starts anew.
@@ -150,11 +147,7 @@ impl MeshPainter {
     }
 
     fn vertex(&mut self, pos: Pos2, color: Color32) {
-        self.mesh.vertices.push(Vertex {
-            pos,
-            uv: pos2(0.0, 0.0),
-            color,
-        });
+        self.mesh.vertices.push(Vertex { pos, uv: pos2(0.0, 0.0), color });
     }
 
     fn quad(&mut self, [a, b, c, d]: [u32; 4]) {

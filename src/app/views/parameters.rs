@@ -45,11 +45,8 @@ impl View for ParametersView {
 
 impl ParametersView {
     fn list(&self, ui: &mut Ui, context: &ViewContext<'_>) {
-        let params = if context.is_present() {
-            &context.setup.task.params
-        } else {
-            &context.run.params
-        };
+        let params =
+            if context.is_present() { &context.setup.task.params } else { &context.run.params };
         let degradation = context.setup.task.protocol.degrade;
         let rows = all(&degradation, params);
         let default = Params::default();
@@ -99,10 +96,10 @@ impl ParametersView {
 
 /// The steps of a degradation and all parameters.
 fn all(degradation: &Degradation, params: &Params) -> Vec<Described> {
-    let steps = degradation.steps().into_iter().map(|step| Described {
-        key: format!("{PHOTO}.{}", step.key),
-        ..step
-    });
+    let steps = degradation
+        .steps()
+        .into_iter()
+        .map(|step| Described { key: format!("{PHOTO}.{}", step.key), ..step });
     steps.chain(params.list()).collect()
 }
 

@@ -28,10 +28,7 @@ impl View for QueriesView {
         let field = egui::TextEdit::singleline(&mut self.typed).hint_text("Filter");
         let field = ui.add(field.desired_width(f32::INFINITY));
         field.widget_info(|| WidgetInfo::labeled(Role::TextInput, true, "Filter queries"));
-        let failed = context
-            .results
-            .keys()
-            .filter(|query| context.has_failed(**query));
+        let failed = context.results.keys().filter(|query| context.has_failed(**query));
         let failed = failed.count();
         let words = format!("{failed} of {} wrong", context.results.len());
         let only = ui.checkbox(&mut self.only_failures, words);
@@ -88,37 +85,16 @@ fn row(ui: &mut Ui, context: &ViewContext<'_>, query: usize, height: f32) {
     }
     let results = context.results.get(&query).map_or(&[][..], Vec::as_slice);
     let marks: Vec<_> = grades(context, results).collect();
-    let color = if is_here {
-        ui.visuals().selection.stroke.color
-    } else {
-        ui.visuals().text_color()
-    };
+    let color =
+        if is_here { ui.visuals().selection.stroke.color } else { ui.visuals().text_color() };
     let left = pos2(below.left() + 4.0, below.center().y);
-    painter.text(
-        left,
-        egui::Align2::LEFT_CENTER,
-        name,
-        theme::caption(),
-        color,
-    );
+    painter.text(left, egui::Align2::LEFT_CENTER, name, theme::caption(), color);
     let mut right = below.right() - 4.0;
     for (glyph, color, _) in marks.iter().rev() {
         let at = pos2(right, below.center().y);
         // On the ground of what is selected the shape alone says the grade.
-        let color = if is_here {
-            ui.visuals().selection.stroke.color
-        } else {
-            *color
-        };
-        right = painter
-            .text(
-                at,
-                egui::Align2::RIGHT_CENTER,
-                glyph,
-                theme::caption(),
-                color,
-            )
-            .left()
+        let color = if is_here { ui.visuals().selection.stroke.color } else { *color };
+        right = painter.text(at, egui::Align2::RIGHT_CENTER, glyph, theme::caption(), color).left()
             - 1.0;
     }
     let words: Vec<&str> = marks.iter().map(|(.., words)| words.as_str()).collect();
@@ -144,11 +120,7 @@ fn grades<'a>(
         let error = result.error.filter(|_| shows_truth);
         let error = error.map_or(String::new(), |error| format!(", {error}"));
         let words = format!("{}: {grade}{error}", result.method.label());
-        (
-            grade.glyph(),
-            theme::grade(&context.visuals(), grade),
-            words,
-        )
+        (grade.glyph(), theme::grade(&context.visuals(), grade), words)
     })
 }
 
@@ -156,7 +128,6 @@ fn grades<'a>(
 pub(super) fn dots(ui: &mut Ui, context: &ViewContext<'_>, results: &[QueryResult]) {
     ui.spacing_mut().item_spacing.x = 2.0;
     for (glyph, color, words) in grades(context, results) {
-        ui.label(egui::RichText::new(glyph).color(color))
-            .on_hover_text(words);
+        ui.label(egui::RichText::new(glyph).color(color)).on_hover_text(words);
     }
 }

@@ -52,22 +52,19 @@ impl PlotQuantity {
 
 impl View for RansacView {
     fn ui(&mut self, ui: &mut Ui, context: &ViewContext<'_>) {
-        egui::ScrollArea::vertical()
-            .auto_shrink(false)
-            .show(ui, |ui| {
-                let source = source(context);
-                let trials =
-                    source.and_then(|(span, end)| self.read(context, span.records.start..end));
-                let (Some((span, end)), Some(trials)) = (source, trials) else {
-                    ui.weak(
-                        "No hypothesis yet. Run FB (1), which tries hypotheses in its stage ransac",
-                    );
-                    return;
-                };
-                head(ui, context, span, trials);
-                plots(ui, context, trials);
-                verdict::ui(ui, context, span, end, trials);
-            });
+        egui::ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+            let source = source(context);
+            let trials = source.and_then(|(span, end)| self.read(context, span.records.start..end));
+            let (Some((span, end)), Some(trials)) = (source, trials) else {
+                ui.weak(
+                    "No hypothesis yet. Run FB (1), which tries hypotheses in its stage ransac",
+                );
+                return;
+            };
+            head(ui, context, span, trials);
+            plots(ui, context, trials);
+            verdict::ui(ui, context, span, end, trials);
+        });
     }
 }
 
@@ -76,11 +73,8 @@ impl View for RansacView {
 fn source<'a>(context: &ViewContext<'a>) -> Option<(&'a Span, usize)> {
     let is_inside =
         context.is_inside_hybrid(Method::FB) && context.latest::<HypothesisTried>().is_some();
-    let (span, cursor) = if is_inside {
-        (context.span()?, context.cursor)
-    } else {
-        context.part_of(Method::FB)?
-    };
+    let (span, cursor) =
+        if is_inside { (context.span()?, context.cursor) } else { context.part_of(Method::FB)? };
     Some((span, span.records.end.min(cursor + 1)))
 }
 
@@ -93,10 +87,7 @@ impl RansacView {
             .as_ref()
             .is_some_and(|(key, _)| Arc::ptr_eq(&key.loaded, loaded) && key.records == records);
         if !is_known {
-            let key = TrialsKey {
-                loaded: Arc::clone(loaded),
-                records: records.clone(),
-            };
+            let key = TrialsKey { loaded: Arc::clone(loaded), records: records.clone() };
             let trials = Trials::read(context.run.records().get(records.clone())?, records.start);
             self.known = Some((key, trials));
         }
@@ -140,11 +131,7 @@ fn hypothesis_color() -> Color32 {
 fn plots(ui: &mut Ui, context: &ViewContext<'_>, trials: &Trials) {
     let group = ui.make_persistent_id("trials");
     for quantity in PlotQuantity::ALL {
-        let height = if quantity == PlotQuantity::Needed {
-            110.0
-        } else {
-            130.0
-        };
+        let height = if quantity == PlotQuantity::Needed { 110.0 } else { 130.0 };
         let is_last = quantity == PlotQuantity::Needed;
         let mut plot = Plot::new(quantity.name())
             .height(height)
@@ -162,13 +149,10 @@ fn plots(ui: &mut Ui, context: &ViewContext<'_>, trials: &Trials) {
         }
         let answer = plot.show(ui, |plot| draw(plot, trials, quantity));
         let name = format!("{} by trial, {} trials", quantity.name(), trials.made());
-        answer
-            .response
-            .widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, &name));
-        if let (true, Some(at)) = (
-            answer.response.clicked(),
-            answer.response.interact_pointer_pos(),
-        ) {
+        answer.response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, &name));
+        if let (true, Some(at)) =
+            (answer.response.clicked(), answer.response.interact_pointer_pos())
+        {
             let distance = |[trial, value]: [f64; 2]| {
                 let point = PlotPoint::new(trial, value);
                 answer.transform.position_from_point(&point).distance_sq(at)
@@ -212,12 +196,7 @@ fn draw<'p>(plot: &mut PlotUi<'p>, trials: &'p Trials, quantity: PlotQuantity) {
         }
     };
     let points = Points::new("hypotheses", series.points.clone());
-    plot.points(
-        points
-            .radius(1.6)
-            .color(hypothesis_color())
-            .allow_hover(false),
-    );
+    plot.points(points.radius(1.6).color(hypothesis_color()).allow_hover(false));
     plot.line(line("best", &series.best).color(theme::ESTIMATE).width(1.5));
 }
 
@@ -225,9 +204,6 @@ fn draw<'p>(plot: &mut PlotUi<'p>, trials: &'p Trials, quantity: PlotQuantity) {
 fn decades(input: GridInput) -> Vec<GridMark> {
     let (from, to) = input.bounds;
     (from.ceil().max(0.0) as i32..=to.floor().min(12.0) as i32)
-        .map(|decade| GridMark {
-            value: f64::from(decade),
-            step_size: 1.0,
-        })
+        .map(|decade| GridMark { value: f64::from(decade), step_size: 1.0 })
         .collect()
 }

@@ -38,9 +38,8 @@ impl View for ReferencesView {
         let radius_m = setup.task.reach_m();
         let key = (setup.query, radius_m, setup.references.name().to_owned());
         let known = self.nearby.take().filter(|(of, _)| *of == key);
-        let (_, frames) = self
-            .nearby
-            .insert(known.unwrap_or_else(|| (key, setup.candidates(setup.query))));
+        let (_, frames) =
+            self.nearby.insert(known.unwrap_or_else(|| (key, setup.candidates(setup.query))));
         // Those that were named may be farther away than the radius.
         let chosen = &setup.chosen.frames;
         let mut shown: Vec<usize> = chosen.clone();
@@ -79,9 +78,7 @@ fn choice(ui: &mut Ui, context: &ViewContext<'_>) {
     ways.response.labelled_by(label.id);
     if let ReferencePick::By(selection) = setup.pick() {
         let mut wanted = count;
-        let drag = DragValue::new(&mut wanted)
-            .range(1..=20)
-            .update_while_editing(false);
+        let drag = DragValue::new(&mut wanted).range(1..=20).update_while_editing(false);
         let response = ui.add(drag).on_hover_text("How many references");
         if wanted != count && (!response.dragged() || response.drag_stopped()) {
             let pick = ReferencePick::By(selection.with_count(wanted));
@@ -92,10 +89,7 @@ fn choice(ui: &mut Ui, context: &ViewContext<'_>) {
 
 /// The radius around a query in which references may lie, and the seed of all random choices.
 fn numbers(ui: &mut Ui, context: &ViewContext<'_>) {
-    let (radius_m, seed) = (
-        context.setup.task.radius_m(),
-        context.setup.task.protocol.seed,
-    );
+    let (radius_m, seed) = (context.setup.task.radius_m(), context.setup.task.protocol.seed);
     let is_done = |response: &egui::Response| response.drag_stopped() || response.lost_focus();
     let mut wanted = radius_m;
     let label = ui.label("Radius");
@@ -121,9 +115,7 @@ fn fusions(ui: &mut Ui, context: &ViewContext<'_>) {
         if response.on_hover_text(fusion.about).clicked() {
             // In the order of the registry.
             let is_wanted = |other: &Fusion| present.contains(other) != (*other == fusion);
-            context.send(Command::SetFusions(
-                Fusion::all().filter(is_wanted).collect(),
-            ));
+            context.send(Command::SetFusions(Fusion::all().filter(is_wanted).collect()));
         }
     }
 }
@@ -142,16 +134,11 @@ fn row(ui: &mut Ui, context: &ViewContext<'_>, frame: usize) {
     }
     match context.queries.thumbnail(Side::Reference, frame) {
         Some(texture) => {
-            ui.add(
-                Image::new(texture)
-                    .fit_to_exact_size(THUMBNAIL)
-                    .alt_text(name),
-            );
+            ui.add(Image::new(texture).fit_to_exact_size(THUMBNAIL).alt_text(name));
         }
         None => {
             let (rect, _) = ui.allocate_exact_size(THUMBNAIL, Sense::hover());
-            ui.painter()
-                .rect_filled(rect, 2.0, ui.visuals().faint_bg_color);
+            ui.painter().rect_filled(rect, 2.0, ui.visuals().faint_bg_color);
         }
     }
     ui.vertical(|ui| {

@@ -137,10 +137,7 @@ impl RetrievalView {
         }
         mesh.paint_on(&ui.painter_at(area));
         let rank = self.selected + 1;
-        pair.name(
-            ui,
-            ["Query".to_owned(), format!("Rank {rank}: {}", frame.name)],
-        );
+        pair.name(ui, ["Query".to_owned(), format!("Rank {rank}: {}", frame.name)]);
         ui.advance_cursor_after_rect(area);
     }
 }

@@ -99,13 +99,7 @@ impl SpaceView {
     pub fn new(state: Option<&RenderState>) -> Self {
         Self {
             painter: state.map(Painter::new),
-            layers: Layers {
-                cloud: true,
-                cost: true,
-                path: true,
-                rays: true,
-                grid: true,
-            },
+            layers: Layers { cloud: true, cost: true, path: true, rays: true, grid: true },
             eye: Eye::default(),
             height_over_width: 1.0,
             cloud: None,
@@ -158,11 +152,7 @@ impl SpaceView {
         let method = content.search.as_ref().map(|search| search.method.label());
         let cost = method.as_deref().zip(ends.filter(|_| cost));
         let no_rays = Rays::default();
-        let rays = if self.layers.rays {
-            &content.rays
-        } else {
-            &no_rays
-        };
+        let rays = if self.layers.rays { &content.rays } else { &no_rays };
         labels::legend(ui, pane, cost, rays);
         let headline = self.headline(&view_camera, &response, content);
         labels::headline(ui, pane, &headline);
@@ -178,9 +168,8 @@ impl SpaceView {
 
     /// The menu in the upper right corner.
     fn menu(&mut self, ui: &mut Ui, pane: Rect, content: &SceneContent<'_>) {
-        let corner = UiBuilder::new()
-            .max_rect(pane.shrink(6.0))
-            .layout(Layout::right_to_left(Align::TOP));
+        let corner =
+            UiBuilder::new().max_rect(pane.shrink(6.0)).layout(Layout::right_to_left(Align::TOP));
         let mut ui = ui.new_child(corner);
         let config = MenuConfig::new().close_behavior(PopupCloseBehavior::CloseOnClickOutside);
         MenuButton::new("View").config(config).ui(&mut ui, |ui| {
@@ -202,13 +191,7 @@ impl SpaceView {
                 }
             }
             ui.separator();
-            let Layers {
-                cloud,
-                cost,
-                path,
-                rays,
-                grid,
-            } = &mut self.layers;
+            let Layers { cloud, cost, path, rays, grid } = &mut self.layers;
             ui.checkbox(cloud, "Cloud");
             ui.checkbox(cost, "Cost on the ground");
             ui.checkbox(path, "Way of the search");
@@ -337,13 +320,7 @@ impl SpaceView {
         let background = visuals.extreme_bg_color;
         match &self.painter {
             Some(painter) => {
-                let frame = Frame {
-                    view_camera: *view_camera,
-                    background,
-                    points,
-                    lines,
-                    faces,
-                };
+                let frame = Frame { view_camera: *view_camera, background, points, lines, faces };
                 painter.paint(&ui.painter_at(pane), pane, frame);
             }
             None => {

@@ -32,11 +32,7 @@ pub struct SynthesisView {
 
 impl Default for SynthesisView {
     fn default() -> Self {
-        Self {
-            mode: Mode::View,
-            blend: 0.5,
-            pan_zoom: PanZoom::default(),
-        }
+        Self { mode: Mode::View, blend: 0.5, pan_zoom: PanZoom::default() }
     }
 }
 
@@ -158,8 +154,7 @@ impl SynthesisView {
 fn blinking(ui: &Ui, mode: Mode) -> Mode {
     let turns = ui.input(|input| input.time) / BLINK_S;
     let rest = (turns.floor() + 1.0 - turns) * BLINK_S;
-    ui.ctx()
-        .request_repaint_after(Duration::from_secs_f64(rest));
+    ui.ctx().request_repaint_after(Duration::from_secs_f64(rest));
     match (turns.rem_euclid(2.0) < 1.0, mode) {
         (true, _) => Mode::Query,
         (false, Mode::Query) => Mode::View,
@@ -184,9 +179,7 @@ fn caption(
     shown: &ShownView,
 ) {
     let score = &shown.comparison.score;
-    let cost = score
-        .cost
-        .map_or("no cost".to_owned(), |cost| format!("cost {cost:.4}"));
+    let cost = score.cost.map_or("no cost".to_owned(), |cost| format!("cost {cost:.4}"));
     let share = 100.0 * f64::from(score.covered) / problem.query.intrinsics.area();
     let words = format!(
         "{}, {}: {cost}, {} px covered ({share:.1} %), {}",

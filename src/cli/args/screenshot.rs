@@ -53,15 +53,15 @@ const SIDES: std::ops::RangeInclusive<u32> = 64..=8192;
 
 fn size(text: &str) -> Result<[u32; 2], String> {
     let side = |word: &str| word.parse().ok().filter(|side| SIDES.contains(side));
-    text.split_once('x')
-        .and_then(|(width, height)| Some([side(width)?, side(height)?]))
-        .ok_or_else(|| {
+    text.split_once('x').and_then(|(width, height)| Some([side(width)?, side(height)?])).ok_or_else(
+        || {
             format!(
                 "a width and a height such as 1500x950 expected, each from {} to {} px",
                 SIDES.start(),
                 SIDES.end()
             )
-        })
+        },
+    )
 }
 
 fn scale(text: &str) -> Result<f32, String> {

@@ -90,11 +90,8 @@ pub struct TaskArgs {
 }
 
 /// Options of a protocol that only `eval` takes.
-const ONLY_EVAL: [(&str, &str); 3] = [
-    ("limit", "--limit"),
-    ("preset", "--preset"),
-    ("failure_radius_m", "--failure-radius"),
-];
+const ONLY_EVAL: [(&str, &str); 3] =
+    [("limit", "--limit"), ("preset", "--preset"), ("failure_radius_m", "--failure-radius")];
 
 impl TaskArgs {
     /// The task that these arguments describe for a scene.

@@ -15,10 +15,9 @@ use crate::cli::failure::CliError;
 pub fn plan(args: &EvalArgs, before: &Path) -> Result<PlannedRun, CliError> {
     let run = read_run(before)?;
     let failed = failed(&read_rows(before)?);
-    let params = run.params().map_err(|source| CliError::Config {
-        path: before.join("run.toml"),
-        source,
-    })?;
+    let params = run
+        .params()
+        .map_err(|source| CliError::Config { path: before.join("run.toml"), source })?;
     let params = args.config.over(params)?;
     let protocol = args.protocol.over(run.protocol.clone())?;
     let format = protocol.format.as_deref();

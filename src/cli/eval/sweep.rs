@@ -27,10 +27,7 @@ pub fn sweep(
         let judged = Judged::of(&args.judging, None, &path, &run)?;
         let of_run = judged.failures.iter();
         failures.extend(of_run.map(|failure| format!("{name}: {failure}")));
-        runs.push(SweptRun {
-            value: value.clone(),
-            measures: judged.report.measures,
-        });
+        runs.push(SweptRun { value: value.clone(), measures: judged.report.measures });
     }
     let table = write_sweep(folder, sweep, &runs)?;
     step_summary::append(&format!("{}\n", table.to_markdown()));

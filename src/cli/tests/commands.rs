@@ -34,9 +34,7 @@ pub fn commands(page: &Path) -> Vec<Vec<String>> {
     }
     let blocks = blocks.replace("\\\n", " ");
     let lines = blocks.lines().map(|line| shlex::Shlex::new(line).collect());
-    lines
-        .filter(|words: &Vec<String>| !words.is_empty())
-        .collect()
+    lines.filter(|words: &Vec<String>| !words.is_empty()).collect()
 }
 
 /// The arguments of posescope, where a command is one of it.

@@ -13,10 +13,7 @@ fn at(
 ) -> QueryResult {
     QueryResult {
         scene: scene.to_owned(),
-        setting: Some(Setting {
-            radius_m,
-            references,
-        }),
+        setting: Some(Setting { radius_m, references }),
         fusion: fusion.map(|name| name.parse().expect("a fusion")),
         ..row
     }
@@ -34,11 +31,7 @@ fn the_papers_own_cells_give_the_averages_of_its_abstract() {
         ["overcast", "sun", "night", "rain", "snow"].map(|name| format!("robotcar/{name}"));
     let pairs: Vec<(&str, &str)> = conditions
         .iter()
-        .flat_map(|scene| {
-            conditions
-                .iter()
-                .map(move |queries| (scene.as_str(), queries.as_str()))
-        })
+        .flat_map(|scene| conditions.iter().map(move |queries| (scene.as_str(), queries.as_str())))
         .collect();
     let rows: Vec<QueryResult> = pairs
         .iter()
@@ -59,10 +52,7 @@ fn the_papers_own_cells_give_the_averages_of_its_abstract() {
         })
         .collect();
     let tables = tables(&RunResults::of(rows, 10.0), Some("large"));
-    assert_eq!(
-        lines(&tables, "advantage"),
-        ["FB | 25 | 100.0 | 25.1", "MI | 25 | 50.0 | 5.8"]
-    );
+    assert_eq!(lines(&tables, "advantage"), ["FB | 25 | 100.0 | 25.1", "MI | 25 | 50.0 | 5.8"]);
 }
 
 #[test]
@@ -109,24 +99,14 @@ fn the_single_table_has_medians_over_queries_solved_by_all_and_the_papers_figure
 #[test]
 fn the_multi_table_has_the_rmse_over_the_successes_of_each_fusion() {
     let mut rows = Vec::new();
-    for (query, one, avg, robust) in [
-        ("a", Some(3.0), Some(1.0), Some(0.6)),
-        ("b", None, Some(7.0), Some(0.8)),
-    ] {
+    for (query, one, avg, robust) in
+        [("a", Some(3.0), Some(1.0), Some(0.6)), ("b", None, Some(7.0), Some(0.8))]
+    {
         for method in ["fb", "mi"] {
-            for (count, fusion, error) in [
-                (1, "avg", one),
-                (1, "r-wavg", one),
-                (2, "avg", avg),
-                (2, "r-wavg", robust),
-            ] {
-                rows.push(at(
-                    row(query, method, error),
-                    "street",
-                    10.0,
-                    count,
-                    Some(fusion),
-                ));
+            for (count, fusion, error) in
+                [(1, "avg", one), (1, "r-wavg", one), (2, "avg", avg), (2, "r-wavg", robust)]
+            {
+                rows.push(at(row(query, method, error), "street", 10.0, count, Some(fusion)));
             }
         }
     }
@@ -147,10 +127,7 @@ fn the_multi_table_has_the_rmse_over_the_successes_of_each_fusion() {
 
 #[test]
 fn the_large_table_and_the_confusion_matrix_place_every_pair() {
-    let with_rain = |row: QueryResult| QueryResult {
-        query_scene: Some("rain".to_owned()),
-        ..row
-    };
+    let with_rain = |row: QueryResult| QueryResult { query_scene: Some("rain".to_owned()), ..row };
     let fused = |row: QueryResult| at(row, "kitti/01", 10.0, 2, Some("r-wavg"));
     let rows = vec![
         fused(row("a", "fb", Some(3.0))),
@@ -179,23 +156,13 @@ fn the_large_table_and_the_confusion_matrix_place_every_pair() {
 
 #[test]
 fn the_large_table_has_no_columns_for_figures_that_the_paper_does_not_have() {
-    let rows = vec![at(
-        row("a", "fb", Some(3.0)),
-        "street",
-        10.0,
-        2,
-        Some("r-wavg"),
-    )];
+    let rows = vec![at(row("a", "fb", Some(3.0)), "street", 10.0, 2, Some("r-wavg"))];
     let tables = tables(&RunResults::of(rows, 10.0), Some("large"));
     assert_eq!(
         lines(&tables, "large"),
         ["street | FB | 1 | 100.0 | 3.000 | 1.500 | 3.000 | 1.500"]
     );
-    assert!(
-        tables
-            .iter()
-            .all(|table| !table.to_markdown().contains("paper"))
-    );
+    assert!(tables.iter().all(|table| !table.to_markdown().contains("paper")));
 }
 
 #[test]
@@ -204,18 +171,11 @@ fn every_shape_names_figures_that_there_are() {
     let one = RunResults::of(vec![row("a", "fb", Some(1.0))], 10.0);
     for shape in &shapes.table {
         for name in shape.first.iter().chain(shape.figures.iter().flatten()) {
-            assert!(
-                shapes.figures.contains_key(name),
-                "{name} of {}",
-                shape.name
-            );
+            assert!(shapes.figures.contains_key(name), "{name} of {}", shape.name);
         }
     }
     // Where chance has no radius it has no figure.
-    let unknown = shapes
-        .figures
-        .keys()
-        .filter(|name| one.measures[0].figure(name).is_none());
+    let unknown = shapes.figures.keys().filter(|name| one.measures[0].figure(name).is_none());
     assert!(unknown.eq(["chance_random", "chance_reference", "median(time)"]));
     for table in TableName::value_variants() {
         let is_empty = *table == TableName::Verdicts;

@@ -70,25 +70,13 @@ impl FromStr for Condition {
     type Err = ConditionError;
 
     fn from_str(text: &str) -> Result<Self, ConditionError> {
-        let error = |expected: String| ConditionError {
-            condition: text.to_owned(),
-            expected,
-        };
+        let error = |expected: String| ConditionError { condition: text.to_owned(), expected };
         let tokens = tokens(text).map_err(error)?;
-        let mut parser = Parser {
-            tokens: &tokens,
-            depth: 0,
-        };
+        let mut parser = Parser { tokens: &tokens, depth: 0 };
         let tree = parser.any().map_err(error)?;
         match parser.tokens.first() {
-            None => Ok(Self {
-                text: text.trim().to_owned(),
-                tree,
-            }),
-            Some(token) => Err(error(format!(
-                "`and` or `or` expected before {}",
-                token.shown()
-            ))),
+            None => Ok(Self { text: text.trim().to_owned(), tree }),
+            Some(token) => Err(error(format!("`and` or `or` expected before {}", token.shown()))),
         }
     }
 }
@@ -123,9 +111,7 @@ fn tokens(text: &str) -> Result<Vec<Token>, String> {
             (_, Some((relation, right))) => (Token::Relation(relation), rest.len() - right.len()),
             ('"' | '\'', _) => {
                 let inside = &rest[1..];
-                let end = inside
-                    .find(first)
-                    .ok_or(format!("a closing {first} expected"))?;
+                let end = inside.find(first).ok_or(format!("a closing {first} expected"))?;
                 (Token::Quoted(inside[..end].to_owned()), end + 2)
             }
             _ => {
@@ -134,9 +120,7 @@ fn tokens(text: &str) -> Result<Vec<Token>, String> {
                 };
                 let end = rest.find(is_end).unwrap_or(rest.len());
                 if end == 0 {
-                    return Err(format!(
-                        "a field, a value or a relation expected at `{rest}`"
-                    ));
+                    return Err(format!("a field, a value or a relation expected at `{rest}`"));
                 }
                 (Token::Word(rest[..end].to_owned()), end)
             }
@@ -212,10 +196,7 @@ impl Parser<'_> {
             None => return Err("FIELD RELATION VALUE expected, such as `error > 1`".to_owned()),
         };
         let Some(Token::Relation(relation)) = self.next().cloned() else {
-            return Err(format!(
-                "a relation expected after `{}`: = != < <= > >= ~",
-                field.name
-            ));
+            return Err(format!("a relation expected after `{}`: = != < <= > >= ~", field.name));
         };
         let value = match self.next() {
             Some(Token::Word(value) | Token::Quoted(value)) => value.clone(),

@@ -52,11 +52,7 @@ impl Value {
             (Self::Words(_), Self::Number(_)) => Ordering::Greater,
             (Self::Number(_), Self::Words(_)) => Ordering::Less,
         };
-        if descending {
-            forward.reverse()
-        } else {
-            forward
-        }
+        if descending { forward.reverse() } else { forward }
     }
 }
 
@@ -68,86 +64,51 @@ impl Field {
         words("queries", "the scene of the query", |r| {
             r.query_scene.clone().unwrap_or_else(|| r.scene.clone())
         }),
-        words("reference", "the reference frames", |r| {
-            r.references.join(" ")
-        }),
+        words("reference", "the reference frames", |r| r.references.join(" ")),
         words("method", "the method", |r| r.method.to_string()),
         words("fusion", "the fusion", |r| {
             r.fusion.as_ref().map_or(String::new(), ToString::to_string)
         }),
-        words("grade", "right, wrong, no pose or unmeasured", |r| {
-            r.grade.to_string()
-        }),
+        words("grade", "right, wrong, no pose or unmeasured", |r| r.grade.to_string()),
         words("confidence", "trusted, unsure or low", |r| {
-            r.confidence_word()
-                .map_or(String::new(), |word| word.to_string())
+            r.confidence_word().map_or(String::new(), |word| word.to_string())
         }),
         words("code", "the primary verdict", |r| {
-            r.diagnosis
-                .first()
-                .map_or(String::new(), |d| d.code.to_string())
+            r.diagnosis.first().map_or(String::new(), |d| d.code.to_string())
         }),
         words("cause", "the primary verdict as a phrase", |r| {
-            r.diagnosis
-                .first()
-                .map_or(String::new(), |d| d.code.title().to_owned())
+            r.diagnosis.first().map_or(String::new(), |d| d.code.title().to_owned())
         }),
         words("codes", "all verdicts", |r| {
             let codes: Vec<&str> = r.diagnosis.iter().map(|d| d.code.name()).collect();
             codes.join(" ")
         }),
-        number("error", "distance from the truth [m]", 3, |r| {
-            Some(r.error?.translation_m)
+        number("error", "distance from the truth [m]", 3, |r| Some(r.error?.translation_m)),
+        number("rotation", "rotation from the truth [°]", 2, |r| Some(r.error?.rotation_deg)),
+        number("start", "distance of the reference from the truth [m]", 3, |r| {
+            Some(r.initial_error?.translation_m)
         }),
-        number("rotation", "rotation from the truth [°]", 2, |r| {
-            Some(r.error?.rotation_deg)
-        }),
-        number(
-            "start",
-            "distance of the reference from the truth [m]",
-            3,
-            |r| Some(r.initial_error?.translation_m),
-        ),
         number("probability", "probability of being within 1 m", 3, |r| {
             Some(r.confidence.as_ref()?.probability)
         }),
         number("keypoints", "keypoints of the query", 0, |r| {
             Some(r.counts?.query_keypoints as f64)
         }),
-        number("matches", "matches with a depth", 0, |r| {
-            Some(r.counts?.with_depth as f64)
-        }),
+        number("matches", "matches with a depth", 0, |r| Some(r.counts?.with_depth as f64)),
         number("inliers", "inliers", 0, |r| Some(r.counts?.inliers as f64)),
-        number("cost", "cost at the result", 4, |r| {
-            Some(r.cost.as_ref()?.best)
+        number("cost", "cost at the result", 4, |r| Some(r.cost.as_ref()?.best)),
+        number("truth_cost", "cost at the truth", 4, |r| r.cost.as_ref()?.truth),
+        number("shuffled", "cost of shuffled pixels", 4, |r| r.cost.as_ref()?.shuffled),
+        number("coverage", "share of the photo covered at the result", 3, |r| {
+            Some(r.cost.as_ref()?.coverage_best)
         }),
-        number("truth_cost", "cost at the truth", 4, |r| {
-            r.cost.as_ref()?.truth
+        number("basin", "radius around the truth from which the search finds it [m]", 1, |r| {
+            r.cost.as_ref()?.basin_m
         }),
-        number("shuffled", "cost of shuffled pixels", 4, |r| {
-            r.cost.as_ref()?.shuffled
+        number("margin", "cost of the best minimum elsewhere above that at the truth", 4, |r| {
+            r.cost.as_ref()?.basin_margin
         }),
-        number(
-            "coverage",
-            "share of the photo covered at the result",
-            3,
-            |r| Some(r.cost.as_ref()?.coverage_best),
-        ),
-        number(
-            "basin",
-            "radius around the truth from which the search finds it [m]",
-            1,
-            |r| r.cost.as_ref()?.basin_m,
-        ),
-        number(
-            "margin",
-            "cost of the best minimum elsewhere above that at the truth",
-            4,
-            |r| r.cost.as_ref()?.basin_margin,
-        ),
-        number("radius", "the uncertainty radius [m]", 1, |r| {
-            Some(r.setting?.radius_m)
-        }),
+        number("radius", "the uncertainty radius [m]", 1, |r| Some(r.setting?.radius_m)),
         number("references", "requested number of references", 0, |r| {
             Some(r.setting?.references as f64)
         }),
@@ -158,27 +119,13 @@ impl Field {
 
     /// Further columns of tables, which cannot be used in conditions.
     pub const POSE: &[Self] = &[
-        number(
-            "max_euler",
-            "greatest Euler angle from the truth [°]",
-            2,
-            |r| Some(r.error?.max_euler_deg),
-        ),
-        number("x", "x of the camera in the world [m]", 3, |r| {
-            position(r, 0)
+        number("max_euler", "greatest Euler angle from the truth [°]", 2, |r| {
+            Some(r.error?.max_euler_deg)
         }),
-        number("y", "y of the camera in the world [m]", 3, |r| {
-            position(r, 1)
-        }),
-        number("z", "z of the camera in the world [m]", 3, |r| {
-            position(r, 2)
-        }),
-        number(
-            "qx",
-            "x of the quaternion of the rotation to the world",
-            4,
-            |r| quaternion(r, 0),
-        ),
+        number("x", "x of the camera in the world [m]", 3, |r| position(r, 0)),
+        number("y", "y of the camera in the world [m]", 3, |r| position(r, 1)),
+        number("z", "z of the camera in the world [m]", 3, |r| position(r, 2)),
+        number("qx", "x of the quaternion of the rotation to the world", 4, |r| quaternion(r, 0)),
         number("qy", "y of the quaternion", 4, |r| quaternion(r, 1)),
         number("qz", "z of the quaternion", 4, |r| quaternion(r, 2)),
         number("qw", "scalar of the quaternion", 4, |r| quaternion(r, 3)),
@@ -191,8 +138,7 @@ impl Field {
     pub fn find(name: &str) -> Result<&'static Self, UnknownWord> {
         let mut all = Self::ALL.iter();
         let names = Self::ALL.iter().map(|field| field.name);
-        all.find(|field| field.name == name)
-            .ok_or_else(|| UnknownWord::among(name, "field", names))
+        all.find(|field| field.name == name).ok_or_else(|| UnknownWord::among(name, "field", names))
     }
 
     /// The alignment of its column in a table.
@@ -244,12 +190,7 @@ enum Read {
 }
 
 const fn words(name: &'static str, about: &'static str, read: fn(&QueryResult) -> String) -> Field {
-    Field {
-        name,
-        about,
-        decimals: None,
-        read: Read::Words(read),
-    }
+    Field { name, about, decimals: None, read: Read::Words(read) }
 }
 
 const fn number(
@@ -258,10 +199,5 @@ const fn number(
     decimals: usize,
     read: fn(&QueryResult) -> Option<f64>,
 ) -> Field {
-    Field {
-        name,
-        about,
-        decimals: Some(decimals),
-        read: Read::Number(read),
-    }
+    Field { name, about, decimals: Some(decimals), read: Read::Number(read) }
 }

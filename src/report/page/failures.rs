@@ -138,9 +138,7 @@ fn again(run: &RunFile, one: &ReportedResult) -> String {
     if let Some(setting) = result.setting {
         protocol.radii_m = vec![setting.radius_m];
     }
-    protocol
-        .query_scene
-        .truncate(usize::from(result.query_scene.is_some()));
+    protocol.query_scene.truncate(usize::from(result.query_scene.is_some()));
     let task = Task {
         protocol,
         // A run of another version is repeated with the parameters that this one knows.

@@ -29,10 +29,8 @@ pub(super) fn methods(overview: &Overview) -> Markup {
 fn bar(bar: &Bar) -> Markup {
     let counts = Grade::ALL.map(|grade| (grade, bar.count(grade)));
     let counts: Vec<(Grade, usize)> = counts.into_iter().filter(|(_, count)| *count > 0).collect();
-    let words: Vec<String> = counts
-        .iter()
-        .map(|(grade, count)| format!("{count} {grade}"))
-        .collect();
+    let words: Vec<String> =
+        counts.iter().map(|(grade, count)| format!("{count} {grade}")).collect();
     let spoken = format!("{}: {}", bar.name, words.join(", "));
     html! {
         div.bar {

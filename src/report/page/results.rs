@@ -17,11 +17,7 @@ pub(super) struct Column {
 }
 
 const fn column(name: &'static str, class: &'static str, is_default: bool) -> Column {
-    Column {
-        name,
-        class,
-        is_default,
-    }
+    Column { name, class, is_default }
 }
 
 const COLUMNS: [Column; 12] = [
@@ -196,8 +192,5 @@ fn cell(report: &RunReport, one: &ReportedResult, column: &Column) -> Markup {
 
 /// The scene and the setting of a result.
 pub(super) fn place(one: &ReportedResult) -> Group {
-    Group {
-        fusion: None,
-        ..Group::of(&one.result)
-    }
+    Group { fusion: None, ..Group::of(&one.result) }
 }

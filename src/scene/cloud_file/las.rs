@@ -117,10 +117,7 @@ fn expect_chunks(file: &mut (impl Read + Seek), size: u64, layout: &LazVlr) -> R
         file.seek(SeekFrom::Start(lengths_at)).map_err(damaged)?;
         file.read_exact(&mut lengths).map_err(damaged)?;
         let (numbers, _) = lengths.as_chunks();
-        let length: u64 = numbers
-            .iter()
-            .map(|number| u64::from(u32::from_le_bytes(*number)))
-            .sum();
+        let length: u64 = numbers.iter().map(|number| u64::from(u32::from_le_bytes(*number))).sum();
         let end = lengths_at + 4 * layers + length;
         if end > size {
             return Err(format!(

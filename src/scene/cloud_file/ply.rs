@@ -45,12 +45,7 @@ pub(super) fn read(path: &Path, size: u64) -> Result<MapCloud, String> {
     let mut reader = BufReader::new(File::open(path).map_err(text)?);
     let parser = Parser::<Vertex>::new();
     let header = parser.read_header(&mut reader).map_err(text)?;
-    let Some(vertex) = header
-        .elements
-        .values()
-        .next()
-        .filter(|e| e.name == "vertex")
-    else {
+    let Some(vertex) = header.elements.values().next().filter(|e| e.name == "vertex") else {
         return Err("`element vertex` expected as the first element".to_owned());
     };
     for axis in ["x", "y", "z"] {
@@ -58,11 +53,7 @@ pub(super) fn read(path: &Path, size: u64) -> Result<MapCloud, String> {
             return Err(format!("a property `{axis}` of the vertices expected"));
         }
     }
-    expect_room(
-        vertex.count as u64,
-        least_bytes(vertex, header.encoding)?,
-        size,
-    )?;
+    expect_room(vertex.count as u64, least_bytes(vertex, header.encoding)?, size)?;
     let mut cloud = MapCloud::default();
     let mut line = String::new();
     for index in 0..vertex.count {

@@ -11,10 +11,7 @@ use crate::scene::SceneError;
 pub(super) fn read(path: &Path) -> Result<MapCloud, SceneError> {
     let io = SceneError::io(path);
     let mut cloud = MapCloud::default();
-    for (index, line) in BufReader::new(File::open(path).map_err(io)?)
-        .lines()
-        .enumerate()
-    {
+    for (index, line) in BufReader::new(File::open(path).map_err(io)?).lines().enumerate() {
         let line = line.map_err(io)?;
         let line = line.trim();
         if line.is_empty() || line.starts_with('#') || line.starts_with("//") {
@@ -28,10 +25,7 @@ pub(super) fn read(path: &Path) -> Result<MapCloud, SceneError> {
         .map_err(|expected| SceneError::line(path, index + 1, expected))?;
     }
     if cloud.points.is_empty() {
-        return Err(SceneError::expected(
-            path,
-            "lines `x y z` expected, none found",
-        ));
+        return Err(SceneError::expected(path, "lines `x y z` expected, none found"));
     }
     Ok(cloud)
 }

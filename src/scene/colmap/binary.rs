@@ -20,11 +20,7 @@ pub(super) fn read(folder: &Path) -> Result<Model, SceneError> {
     let cameras = cameras(&folder.join("cameras.bin"))?;
     let points = points(&folder.join("points3D.bin"))?;
     let images = images(&folder.join("images.bin"), &points)?;
-    Ok(Model {
-        cameras,
-        images,
-        points: points.positions,
-    })
+    Ok(Model { cameras, images, points: points.positions })
 }
 
 fn cameras(path: &Path) -> Result<BTreeMap<u32, ModelCamera>, SceneError> {
@@ -81,12 +77,7 @@ fn images(path: &Path, points: &Points) -> Result<Vec<ModelImage>, SceneError> {
             }
             observed.push(points.find(id).map_err(|why| file.error(why))?);
         }
-        images.push(ModelImage {
-            name,
-            camera,
-            camera_from_world,
-            observed,
-        });
+        images.push(ModelImage { name, camera, camera_from_world, observed });
     }
     if images.is_empty() {
         return Err(file.error("images expected, none found"));
@@ -107,12 +98,7 @@ impl BinaryFile {
         let io = SceneError::io(path);
         let file = File::open(path).map_err(io)?;
         let size = file.metadata().map_err(io)?.len();
-        Ok(Self {
-            path: path.to_owned(),
-            reader: BufReader::new(file),
-            size,
-            left: size,
-        })
+        Ok(Self { path: path.to_owned(), reader: BufReader::new(file), size, left: size })
     }
 
     /// An error at the current position.
@@ -171,9 +157,7 @@ impl BinaryFile {
         let error = |file: &Self| file.error("more bytes expected, the file is cut off");
         let left = self.left.checked_sub(bytes).ok_or_else(|| error(self))?;
         let offset = i64::try_from(bytes).map_err(|_| error(self))?;
-        self.reader
-            .seek_relative(offset)
-            .map_err(SceneError::io(&self.path))?;
+        self.reader.seek_relative(offset).map_err(SceneError::io(&self.path))?;
         self.left = left;
         Ok(())
     }

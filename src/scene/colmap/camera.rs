@@ -11,20 +11,13 @@ pub(in super::super) struct ModelCamera {
 }
 
 /// The supported models with their number of parameters. The index is the model's number in binary files.
-const MODELS: [(&str, usize); 5] = [
-    ("SIMPLE_PINHOLE", 3),
-    ("PINHOLE", 4),
-    ("SIMPLE_RADIAL", 4),
-    ("RADIAL", 5),
-    ("OPENCV", 8),
-];
+const MODELS: [(&str, usize); 5] =
+    [("SIMPLE_PINHOLE", 3), ("PINHOLE", 4), ("SIMPLE_RADIAL", 4), ("RADIAL", 5), ("OPENCV", 8)];
 
 /// The name of a model and its number of parameters.
 pub(super) fn model_of_number(number: u32) -> Result<(&'static str, usize), String> {
     let model = usize::try_from(number).ok().and_then(|n| MODELS.get(n));
-    model
-        .copied()
-        .ok_or_else(|| format!("{} expected, model number {number} found", known()))
+    model.copied().ok_or_else(|| format!("{} expected, model number {number} found", known()))
 }
 
 fn known() -> String {
@@ -38,15 +31,9 @@ impl ModelCamera {
         (width, height): (u64, u64),
         parameters: &[f64],
     ) -> Result<Self, String> {
-        let (_, count) = MODELS
-            .iter()
-            .find(|(name, _)| *name == model)
-            .ok_or_else(|| {
-                format!(
-                    "{} expected, `{model}` found; `colmap image_undistorter` converts it",
-                    known()
-                )
-            })?;
+        let (_, count) = MODELS.iter().find(|(name, _)| *name == model).ok_or_else(|| {
+            format!("{} expected, `{model}` found; `colmap image_undistorter` converts it", known())
+        })?;
         if parameters.len() != *count {
             return Err(format!(
                 "{count} parameters of {model} expected, {} found",
@@ -86,12 +73,7 @@ mod tests {
         for (model, focal, center, distortion) in [
             ("SIMPLE_PINHOLE", (10.0, 10.0), (20.0, 30.0), [0.0; 4]),
             ("PINHOLE", (10.0, 20.0), (30.0, 40.0), [0.0; 4]),
-            (
-                "SIMPLE_RADIAL",
-                (10.0, 10.0),
-                (20.0, 30.0),
-                [40.0, 0.0, 0.0, 0.0],
-            ),
+            ("SIMPLE_RADIAL", (10.0, 10.0), (20.0, 30.0), [40.0, 0.0, 0.0, 0.0]),
             ("RADIAL", (10.0, 10.0), (20.0, 30.0), [40.0, 0.1, 0.0, 0.0]),
             ("OPENCV", (10.0, 20.0), (30.0, 40.0), [0.1, 0.2, 0.3, 0.4]),
         ] {

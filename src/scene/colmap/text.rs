@@ -15,11 +15,7 @@ pub(super) fn read(folder: &Path) -> Result<Model, SceneError> {
         .collect::<Result<BTreeMap<_, _>, _>>()?;
     let points = points(&folder.join("points3D.txt"))?;
     let images = images(&folder.join("images.txt"), &points)?;
-    Ok(Model {
-        cameras,
-        images,
-        points: points.positions,
-    })
+    Ok(Model { cameras, images, points: points.positions })
 }
 
 /// `CAMERA_ID MODEL WIDTH HEIGHT PARAMS…`
@@ -29,10 +25,8 @@ pub(in super::super) fn camera(line: Line<'_>) -> Result<(u32, ModelCamera), Sce
         return Err(line.error("a line `id model width height parameters` expected"));
     };
     let size = (whole(&line, width)?, whole(&line, height)?);
-    let parameters = parameters
-        .iter()
-        .map(|word| line.number(word))
-        .collect::<Result<Vec<_>, _>>()?;
+    let parameters =
+        parameters.iter().map(|word| line.number(word)).collect::<Result<Vec<_>, _>>()?;
     let camera = ModelCamera::new(model, size, &parameters).map_err(|why| line.error(why))?;
     Ok((whole(&line, id)?, camera))
 }
@@ -113,10 +107,9 @@ fn image(line: Line<'_>) -> Result<ModelImage, SceneError> {
 fn observed(line: Line<'_>, points: &Points) -> Result<Vec<u32>, SceneError> {
     let words = line.words().collect::<Vec<_>>();
     if words.len() % 3 != 0 {
-        return Err(line.error(format!(
-            "features `x y point` expected, {} numbers found",
-            words.len()
-        )));
+        return Err(
+            line.error(format!("features `x y point` expected, {} numbers found", words.len()))
+        );
     }
     let ids = words.chunks_exact(3).map(|feature| feature[2]);
     ids.filter(|id| *id != "-1")

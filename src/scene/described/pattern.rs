@@ -37,10 +37,7 @@ fn matches(pattern: &str, name: &str) -> bool {
     let [first, middle @ .., last] = parts.as_slice() else {
         return pattern == name;
     };
-    let Some(mut rest) = name
-        .strip_prefix(first)
-        .and_then(|name| name.strip_suffix(last))
-    else {
+    let Some(mut rest) = name.strip_prefix(first).and_then(|name| name.strip_suffix(last)) else {
         return false;
     };
     // Each part between two stars matches at its first occurrence.

@@ -35,10 +35,7 @@ fn by_time(
 ) -> Result<Vec<FramePoses>, SceneError> {
     let poses = photos.iter().map(|photo| {
         let time_s = lines::numbers::<1>(&stem(photo)).ok().map(|[time]| time);
-        FramePoses {
-            pose: time_s.and_then(|time| trajectory.at(time)),
-            time_s,
-        }
+        FramePoses { pose: time_s.and_then(|time| trajectory.at(time)), time_s }
     });
     let poses: Vec<FramePoses> = poses.collect();
     if poses.iter().all(|frame| frame.pose.is_none()) {
@@ -68,10 +65,7 @@ fn by_line(
                 poses.count(),
             ))
         })?;
-        Ok(FramePoses {
-            pose: Some(pose),
-            time_s: None,
-        })
+        Ok(FramePoses { pose: Some(pose), time_s: None })
     };
     photos.iter().enumerate().map(pose).collect()
 }

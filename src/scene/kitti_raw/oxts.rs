@@ -89,10 +89,7 @@ pub(super) fn world_from_camera0(
         let first_from_imu = first_from_mercator * packet.mercator_from_imu(scale);
         camera0_from_imu * first_from_imu * imu_from_camera0
     };
-    packets
-        .iter()
-        .map(|(&n, packet)| (n, pose(packet)))
-        .collect()
+    packets.iter().map(|(&n, packet)| (n, pose(packet))).collect()
 }
 
 #[cfg(test)]
@@ -114,11 +111,7 @@ mod tests {
         let length = EARTH_RADIUS_M * second.to_radians();
         for (latitude, longitude, expected) in [
             (49.0 + second, 8.0, Vector3::new(0.0, length, 0.0)),
-            (
-                49.0,
-                8.0 + second,
-                Vector3::new(length * 49_f64.to_radians().cos(), 0.0, 0.0),
-            ),
+            (49.0, 8.0 + second, Vector3::new(length * 49_f64.to_radians().cos(), 0.0, 0.0)),
         ] {
             let packets = BTreeMap::from([
                 (0, packet(49.0, 8.0, 0.0)),

@@ -44,10 +44,7 @@ impl Sweep {
     fn imu_motion(&self, time_s: f64) -> Pose {
         // The velocity turns with the car; half-way it equals the mean to second order.
         let half_way = UnitQuaternion::from_scaled_axis(self.angular_rate * (time_s / 2.0));
-        Pose::from_parts(
-            Translation3::from(half_way * self.velocity * time_s),
-            half_way * half_way,
-        )
+        Pose::from_parts(Translation3::from(half_way * self.velocity * time_s), half_way * half_way)
     }
 }
 
@@ -74,10 +71,7 @@ mod tests {
 
     #[test]
     fn a_wall_that_is_scanned_from_a_turning_car_is_straight_again() {
-        let sweep = Sweep {
-            angular_rate: Vector3::new(0.0, 0.0, 0.4),
-            ..SWEEP
-        };
+        let sweep = Sweep { angular_rate: Vector3::new(0.0, 0.0, 0.4), ..SWEEP };
         let velodyne_from_imu = Pose::from_parts(
             Translation3::new(-0.8, 0.3, -0.8),
             UnitQuaternion::from_euler_angles(0.0, 0.0, 0.01),
@@ -103,10 +97,7 @@ mod tests {
 
     #[test]
     fn the_motion_is_the_integral_of_the_velocities() {
-        let sweep = Sweep {
-            angular_rate: Vector3::new(0.02, -0.03, 0.5),
-            ..SWEEP
-        };
+        let sweep = Sweep { angular_rate: Vector3::new(0.02, -0.03, 0.5), ..SWEEP };
         let steps = 10_000;
         let time_s = 0.05;
         let step_s = time_s / f64::from(steps);

@@ -35,11 +35,7 @@ impl Writer {
         let folder = root.join(name);
         make_folder(&folder.join("images"))?;
         make_folder(&folder.join("sparse/0"))?;
-        Ok(Self {
-            folder,
-            drive,
-            observed: Mutex::default(),
-        })
+        Ok(Self { folder, drive, observed: Mutex::default() })
     }
 }
 
@@ -52,9 +48,7 @@ impl DriveWriter for Writer {
             .iter()
             .filter_map(|(position, _)| {
                 let position: Point3<f64> = position.cast();
-                let pixel = camera
-                    .project(&position)
-                    .filter(|pixel| camera.contains(pixel))?;
+                let pixel = camera.project(&position).filter(|pixel| camera.contains(pixel))?;
                 Some((pixel, world_from_camera * position))
             })
             .collect();
@@ -70,10 +64,7 @@ impl DriveWriter for Writer {
     fn finish(&self) -> Result<(), SceneError> {
         let camera = self.drive.intrinsics;
         let parameters = joined(&[camera.fx, camera.fy, camera.cx + 0.5, camera.cy + 0.5]);
-        let cameras = format!(
-            "1 PINHOLE {} {} {parameters}\n",
-            camera.width, camera.height
-        );
+        let cameras = format!("1 PINHOLE {} {} {parameters}\n", camera.width, camera.height);
         let (mut images, mut points) = (String::new(), String::new());
         let observed = self.observed.lock().unwrap_or_else(PoisonError::into_inner);
         let mut id = 0;

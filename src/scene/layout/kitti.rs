@@ -43,10 +43,7 @@ impl Writer {
         let lines: String = lines.map(|pose| row_by_row(&pose) + "\n").collect();
         write(&poses.join(format!("{name}.txt")), lines)?;
         let times = drive.times_s.iter().map(|time| format!("{time:e}\n"));
-        write(
-            &folder.join("times.txt"),
-            times.collect::<String>().as_bytes(),
-        )?;
+        write(&folder.join("times.txt"), times.collect::<String>().as_bytes())?;
         Ok(Self { folder, drive })
     }
 }
@@ -59,13 +56,10 @@ fn calibration(drive: &Drive) -> String {
         0.0, 0.0, 1.0, 0.0,
     );
     let mut camera_from_velodyne = Matrix3x4::zeros();
-    camera_from_velodyne
-        .fixed_columns_mut::<3>(0)
-        .copy_from(&CAMERA_FROM_VELODYNE);
+    camera_from_velodyne.fixed_columns_mut::<3>(0).copy_from(&CAMERA_FROM_VELODYNE);
     camera_from_velodyne.set_column(3, &drive.scanner.coords);
-    let mut text: String = (0..4)
-        .map(|camera| format!("P{camera}: {}\n", row_by_row(&projection)))
-        .collect();
+    let mut text: String =
+        (0..4).map(|camera| format!("P{camera}: {}\n", row_by_row(&projection))).collect();
     text += &format!("Tr: {}\n", row_by_row(&camera_from_velodyne));
     text
 }
@@ -76,10 +70,7 @@ impl DriveWriter for Writer {
         let scan = velodyne_bytes(shot.scan, &self.drive.scanner);
         // The scan first: a frame with a photo is complete.
         write(&self.folder.join(SCANS).join(format!("{name}.bin")), &scan)?;
-        write_image(
-            &self.folder.join(IMAGES).join(format!("{name}.png")),
-            shot.photo,
-        )
+        write_image(&self.folder.join(IMAGES).join(format!("{name}.png")), shot.photo)
     }
 }
 
@@ -137,12 +128,7 @@ mod tests {
         let photo = RgbImage::from_fn(width, height, |x, y| image::Rgb([x as u8, y as u8, 9]));
         let points = [Point3::new(7.6, 2.85, 10.0), Point3::new(-3.1, 0.4, -41.7)];
         let scan: Vec<_> = points.into_iter().zip([0.25, 0.5]).collect();
-        let shot = Shot {
-            index: 1,
-            photo: &photo,
-            scan: &scan,
-            depth: &|_| None,
-        };
+        let shot = Shot { index: 1, photo: &photo, scan: &scan, depth: &|_| None };
         writer.frame(&shot).expect("writable");
 
         let folder = root.path().join("sequences/dusk");
@@ -162,10 +148,7 @@ mod tests {
         // On disk: forward, left, up of the scanner, and the reflectance.
         let bytes = fs::read(folder.join("velodyne/000001.bin")).expect("was written");
         let (numbers, _) = bytes.as_chunks();
-        let first: Vec<f32> = numbers[..4]
-            .iter()
-            .map(|n| f32::from_le_bytes(*n))
-            .collect();
+        let first: Vec<f32> = numbers[..4].iter().map(|n| f32::from_le_bytes(*n)).collect();
         for (read, expected) in first.iter().zip([10.27, -7.5, -2.93, 0.25]) {
             assert!((read - expected).abs() < 1e-5, "{first:?}");
         }

@@ -34,10 +34,7 @@ impl Writer {
             camera.fx, camera.fy, camera.cx, camera.cy
         );
         write(&folder.join("scene.toml"), description)?;
-        Ok(Self {
-            folder,
-            names: drive.names,
-        })
+        Ok(Self { folder, names: drive.names })
     }
 }
 

@@ -29,29 +29,16 @@ impl Writer {
         let folder = root.join(name);
         for (images, what) in [("rgb", "color images"), ("depth", "depth maps")] {
             make_folder(&folder.join(images))?;
-            let times = drive
-                .written
-                .iter()
-                .map(|&frame| stem(drive.times_s[frame]));
+            let times = drive.written.iter().map(|&frame| stem(drive.times_s[frame]));
             let lines = times.map(|time| format!("{time} {images}/{time}.png\n"));
-            let list = format!(
-                "# {what}\n# timestamp filename\n{}",
-                lines.collect::<String>()
-            );
+            let list = format!("# {what}\n# timestamp filename\n{}", lines.collect::<String>());
             write(&folder.join(format!("{images}.txt")), list)?;
         }
         let poses = drive.poses.iter().zip(&drive.times_s).map(|(pose, &time)| {
-            let parts = pose
-                .translation
-                .vector
-                .iter()
-                .chain(pose.rotation.coords.iter());
+            let parts = pose.translation.vector.iter().chain(pose.rotation.coords.iter());
             format!("{} {}\n", stem(time), joined(parts))
         });
-        let truth = format!(
-            "# timestamp tx ty tz qx qy qz qw\n{}",
-            poses.collect::<String>()
-        );
+        let truth = format!("# timestamp tx ty tz qx qy qz qw\n{}", poses.collect::<String>());
         write(&folder.join("groundtruth.txt"), truth)?;
         let Intrinsics { fx, fy, cx, cy, .. } = drive.intrinsics;
         let camera = joined(&[fx, fy, cx, cy]) + "\n";

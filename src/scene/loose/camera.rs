@@ -46,11 +46,7 @@ impl CameraArgument {
             }
             Self::Line(line) => {
                 let camera = line_camera(line).map_err(error)?;
-                let Intrinsics {
-                    width: w,
-                    height: h,
-                    ..
-                } = camera.intrinsics;
+                let Intrinsics { width: w, height: h, .. } = camera.intrinsics;
                 if (w, h) != (width, height) {
                     return Err(error(format!(
                         "{w}x{h} pixels expected, as in --camera, {width}x{height} found"
@@ -117,9 +113,9 @@ impl FromStr for CameraArgument {
         let expected = "fx,fy,cx,cy [px], a camera line of COLMAP (`1 PINHOLE 640 480 500 500 320 240`) or \
                         its cameras.txt expected";
         match numbers::<4>(text) {
-            Ok([fx, fy, ..]) if fx <= 0.0 || fy <= 0.0 => Err(format!(
-                "positive focal lengths expected, {fx} and {fy} found"
-            )),
+            Ok([fx, fy, ..]) if fx <= 0.0 || fy <= 0.0 => {
+                Err(format!("positive focal lengths expected, {fx} and {fy} found"))
+            }
             Ok(pinhole) => Ok(Self::Pinhole(pinhole)),
             Err(why) if text.contains(',') => Err(format!("{expected}; {why}")),
             Err(_) => Err(format!("{expected}; there is no file `{}`", excerpt(text))),
@@ -146,10 +142,7 @@ mod tests {
     #[test]
     fn a_camera_is_read_in_each_form_and_written_again() {
         let numbers: CameraArgument = "500,510,319.5,239.5".parse().expect("four numbers");
-        assert_eq!(
-            numbers,
-            CameraArgument::Pinhole([500.0, 510.0, 319.5, 239.5])
-        );
+        assert_eq!(numbers, CameraArgument::Pinhole([500.0, 510.0, 319.5, 239.5]));
         let line = "1 SIMPLE_RADIAL 640 480 500 320 240 0.01";
         let radial: CameraArgument = line.parse().expect("a line of COLMAP");
         for camera in [&numbers, &radial] {
@@ -157,10 +150,7 @@ mod tests {
         }
         // COLMAP's pixels have their centres at halves.
         let camera = radial.of_photo(Path::new("a.png"), (640, 480));
-        let ModelCamera {
-            intrinsics: taken,
-            distortion,
-        } = camera.expect("its size");
+        let ModelCamera { intrinsics: taken, distortion } = camera.expect("its size");
         assert_eq!((taken.fx, taken.cx, taken.cy), (500.0, 319.5, 239.5));
         assert_eq!(distortion.k1, 0.01);
         for (wrong, word) in [
@@ -176,14 +166,9 @@ mod tests {
 
     #[test]
     fn a_camera_for_photos_of_another_size_is_refused() {
-        for camera in [
-            "1500,1500,959.5,539.5",
-            "1 SIMPLE_PINHOLE 1920 1080 1500 960 540",
-        ] {
+        for camera in ["1500,1500,959.5,539.5", "1 SIMPLE_PINHOLE 1920 1080 1500 960 540"] {
             let camera: CameraArgument = camera.parse().expect("a camera");
-            let error = camera
-                .of_photo(Path::new("a.png"), (640, 480))
-                .expect_err("too small");
+            let error = camera.of_photo(Path::new("a.png"), (640, 480)).expect_err("too small");
             let said = error.to_string();
             assert!(said.contains("a.png") && said.contains("640x480"), "{said}");
         }

@@ -44,19 +44,15 @@ impl Exif {
         let by_sensor = || {
             let focal_mm = self.number(Tag::FocalLength)?;
             let density = self.number(Tag::FocalPlaneXResolution)?;
-            let unit_mm = match self
-                .number(Tag::FocalPlaneResolutionUnit)
-                .map_or(2, |unit| unit as u8)
-            {
-                3 => 10.0,
-                4 => 1.0,
-                5 => 1e-3,
-                _ => 25.4,
-            };
+            let unit_mm =
+                match self.number(Tag::FocalPlaneResolutionUnit).map_or(2, |unit| unit as u8) {
+                    3 => 10.0,
+                    4 => 1.0,
+                    5 => 1e-3,
+                    _ => 25.4,
+                };
             // The density refers to the original image, which may have been larger.
-            let written = self
-                .number(Tag::PixelXDimension)
-                .unwrap_or(f64::from(width));
+            let written = self.number(Tag::PixelXDimension).unwrap_or(f64::from(width));
             let focal_px = focal_mm * density / unit_mm * f64::from(width) / written;
             Some((focal_px, format!("{focal_mm:.1} mm on its sensor")))
         };
@@ -71,8 +67,6 @@ impl Exif {
             let across = f64::from(width.max(height));
             (0.04 * across..200.0 * across).contains(focal_px)
         };
-        by_sensor()
-            .filter(is_lens)
-            .or_else(|| by_film().filter(is_lens))
+        by_sensor().filter(is_lens).or_else(|| by_film().filter(is_lens))
     }
 }

@@ -55,25 +55,15 @@ impl HlocFiles {
             let expected = "a file of hloc's features and one of its matches expected, both .h5";
             return Err(content(folder, &expected));
         };
-        let images: BTreeMap<String, String> = found
-            .keypoints
-            .into_iter()
-            .map(|name| (name.replace('/', "-"), name))
-            .collect();
+        let images: BTreeMap<String, String> =
+            found.keypoints.into_iter().map(|name| (name.replace('/', "-"), name)).collect();
         let mut pairs: BTreeMap<_, Vec<[String; 2]>> = BTreeMap::new();
         for [first, second] in stored.matches {
             let frame = |name: &str| frame_name(images.get(name).map_or(name, String::as_str));
             let key = (frame(&first), frame(&second));
             pairs.entry(key).or_default().push([first, second]);
         }
-        Ok(Self {
-            features,
-            features_path,
-            matches,
-            matches_path,
-            images,
-            pairs,
-        })
+        Ok(Self { features, features_path, matches, matches_path, images, pairs })
     }
 
     /// Reads the matches of two frames, if they are stored in this order.
@@ -107,11 +97,7 @@ impl HlocFiles {
         let partners = partners
             .and_then(|set| partners_of(&set))
             .map_err(|why| content(&self.matches_path, &format!("{place}: {why}")))?;
-        let found = RawMatches {
-            first,
-            second,
-            partners,
-        };
+        let found = RawMatches { first, second, partners };
         found.checked(&self.matches_path).map(Some)
     }
 }
@@ -166,9 +152,7 @@ fn walk(group: &Group, path: &mut Vec<String>, found: &mut Found) -> Result<(), 
 /// Refuses arrays that are larger than any photo's keypoints, before reading them.
 fn check_size(set: &Dataset) -> Result<Vec<u64>, String> {
     let shape = set.shape().map_err(text_of)?;
-    let count = shape
-        .iter()
-        .try_fold(1_u64, |all, &side| all.checked_mul(side));
+    let count = shape.iter().try_fold(1_u64, |all, &side| all.checked_mul(side));
     match count {
         Some(count) if count <= 2 * MOST_KEYPOINTS as u64 => Ok(shape),
         _ => Err(format!(
@@ -186,16 +170,11 @@ fn positions(set: &Dataset) -> Result<Vec<[f32; 2]>, String> {
         2 => {
             let bytes = set.read_raw().map_err(text_of)?;
             let halves = bytes.chunks_exact(2);
-            halves
-                .map(|half| f16::from_le_bytes([half[0], half[1]]).to_f32())
-                .collect()
+            halves.map(|half| f16::from_le_bytes([half[0], half[1]]).to_f32()).collect()
         }
         _ => set.read_f32().map_err(text_of)?,
     };
-    Ok(numbers
-        .chunks_exact(2)
-        .map(|pair| [pair[0], pair[1]])
-        .collect())
+    Ok(numbers.chunks_exact(2).map(|pair| [pair[0], pair[1]]).collect())
 }
 
 fn partners_of(set: &Dataset) -> Result<Vec<Option<usize>>, String> {

@@ -32,18 +32,10 @@ pub(super) fn read(path: &Path) -> Result<RawMatches, SceneError> {
         Array::parse(&bytes)
     };
     let named = |name: &'static str| move |why: String| error(format!("{name}: {why}"));
-    let mut points = |name| {
-        array(name)
-            .and_then(|array| array.points())
-            .map_err(named(name))
-    };
+    let mut points = |name| array(name).and_then(|array| array.points()).map_err(named(name));
     let (first, second) = (points("keypoints0")?, points("keypoints1")?);
     let partners = array("matches").and_then(|array| array.partners());
-    Ok(RawMatches {
-        first,
-        second,
-        partners: partners.map_err(named("matches"))?,
-    })
+    Ok(RawMatches { first, second, partners: partners.map_err(named("matches"))? })
 }
 
 struct Array {
@@ -58,9 +50,7 @@ impl Array {
     fn parse(bytes: &[u8]) -> Result<Self, String> {
         let header = Header::read(bytes).ok_or("an array of numpy (.npy) expected")?;
         let Header { shape, kind, data } = header;
-        let count = shape
-            .iter()
-            .try_fold(1_u64, |all, &side| all.checked_mul(side));
+        let count = shape.iter().try_fold(1_u64, |all, &side| all.checked_mul(side));
         let numbers = match kind {
             "<f4" => numbers(data, |bytes| f32::from_le_bytes(bytes).into()),
             "<f8" => numbers(data, f64::from_le_bytes),
@@ -144,10 +134,7 @@ impl<'a> Header<'a> {
         value("fortran_order")?.starts_with("False").then_some(())?;
         let (kind, _) = value("descr")?.strip_prefix('\'')?.split_once('\'')?;
         let (sides, _) = value("shape")?.strip_prefix('(')?.split_once(')')?;
-        let sides = sides
-            .split(',')
-            .map(str::trim)
-            .filter(|side| !side.is_empty());
+        let sides = sides.split(',').map(str::trim).filter(|side| !side.is_empty());
         let shape = sides.map(|side| side.parse().ok()).collect::<Option<_>>()?;
         Some(Self { shape, kind, data })
     }

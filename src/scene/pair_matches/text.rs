@@ -13,11 +13,7 @@ use crate::scene::lines::TextFile;
 /// Reads a file of matches. Further columns, such as a score, are ignored.
 pub(super) fn read(path: &Path) -> Result<RawMatches, SceneError> {
     let file = TextFile::read(path)?;
-    let mut found = RawMatches {
-        first: Vec::new(),
-        second: Vec::new(),
-        partners: Vec::new(),
-    };
+    let mut found = RawMatches { first: Vec::new(), second: Vec::new(), partners: Vec::new() };
     for line in file.lines() {
         let mut numbers = [0.0_f32; 4];
         let mut words = line.words();

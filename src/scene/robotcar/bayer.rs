@@ -36,12 +36,10 @@ pub(super) fn demosaiced(raw: &GrayImage, pattern: Pattern) -> RgbImage {
             }
         }
         let own = pattern.channel(x, y);
-        Rgb(std::array::from_fn(|channel| {
-            match (channel == own, weights[channel]) {
-                (true, _) => raw.get_pixel(x, y).0[0],
-                (false, 0) => 0,
-                (false, weight) => ((sums[channel] + weight / 2) / weight) as u8,
-            }
+        Rgb(std::array::from_fn(|channel| match (channel == own, weights[channel]) {
+            (true, _) => raw.get_pixel(x, y).0[0],
+            (false, 0) => 0,
+            (false, weight) => ((sums[channel] + weight / 2) / weight) as u8,
         }))
     })
 }
@@ -56,11 +54,7 @@ mod tests {
         for pattern in [Pattern::Gbrg, Pattern::Rggb] {
             let raw =
                 GrayImage::from_fn(7, 6, |x, y| image::Luma([color.0[pattern.channel(x, y)]]));
-            assert!(
-                demosaiced(&raw, pattern)
-                    .pixels()
-                    .all(|pixel| *pixel == color)
-            );
+            assert!(demosaiced(&raw, pattern).pixels().all(|pixel| *pixel == color));
         }
     }
 

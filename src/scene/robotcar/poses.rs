@@ -46,9 +46,7 @@ pub(super) fn first_and_last_motion(track: &Trajectory) -> Option<(f64, f64)> {
 pub(super) fn read_ins(path: &Path) -> Result<Trajectory, SceneError> {
     let file = TextFile::read(path)?;
     let mut lines = file.lines();
-    let header = lines
-        .next()
-        .ok_or_else(|| file.error("a header expected, the file is empty"))?;
+    let header = lines.next().ok_or_else(|| file.error("a header expected, the file is empty"))?;
     let column = |name: &str| {
         let found = header.words().position(|word| word == name);
         found.ok_or_else(|| header.error(format!("a column `{name}` expected")))
@@ -103,17 +101,12 @@ fn transform_at(line: &Line<'_>, words: &[&str], at: [usize; 6]) -> Result<Pose,
 
 fn word<'a>(line: &Line<'_>, words: &[&'a str], column: usize) -> Result<&'a str, SceneError> {
     words.get(column).copied().ok_or_else(|| {
-        line.error(format!(
-            "{} columns or more expected, {} found",
-            column + 1,
-            words.len()
-        ))
+        line.error(format!("{} columns or more expected, {} found", column + 1, words.len()))
     })
 }
 
 fn microseconds(line: &Line<'_>, word: &str) -> Result<u64, SceneError> {
-    word.parse()
-        .map_err(|_| line.error("a timestamp in microseconds expected"))
+    word.parse().map_err(|_| line.error("a timestamp in microseconds expected"))
 }
 
 #[cfg(test)]

@@ -53,9 +53,7 @@ impl Sdk {
             })
         };
         let intrinsics = pinhole(next()?.numbers()?, size).map_err(|why| file.error(why))?;
-        let rows: Vec<[f64; 4]> = (0..3)
-            .map(|_| next()?.numbers())
-            .collect::<Result<_, _>>()?;
+        let rows: Vec<[f64; 4]> = (0..3).map(|_| next()?.numbers()).collect::<Result<_, _>>()?;
         let matrix = Matrix3x4::from_fn(|row, column| rows[row][column]);
         let camera_from_image =
             pose_from_matrix(&matrix).map_err(|error| file.error(error.to_string()))?;
@@ -92,10 +90,7 @@ fn read_table(path: &Path, (width, height): (u32, u32)) -> Result<Vec<[f32; 2]>,
 /// The SDK's transform of a position and roll, pitch, yaw: Rz(yaw) Ry(pitch) Rx(roll).
 pub(super) fn transform(position: [f64; 3], [roll, pitch, yaw]: [f64; 3]) -> Pose {
     let rotation = Rotation3::from_euler_angles(roll, pitch, yaw);
-    Pose::from_parts(
-        Translation3::from(position),
-        UnitQuaternion::from_rotation_matrix(&rotation),
-    )
+    Pose::from_parts(Translation3::from(position), UnitQuaternion::from_rotation_matrix(&rotation))
 }
 
 /// A camera, and the table that undistorts its photos.

@@ -83,14 +83,7 @@ fn has_histogram(method: Method) -> bool {
 
 /// The world and text on the left, a row per method on the right.
 fn root(input: &LayoutInput<'_>) -> BlueprintNode {
-    let LayoutInput {
-        methods,
-        first,
-        references,
-        ranked,
-        ref focus,
-        has_pages,
-    } = *input;
+    let LayoutInput { methods, first, references, ranked, ref focus, has_pages } = *input;
     let viewpoints = &Viewpoints(first);
     let document = |name, origin: &str| view("TextDocument", name, origin);
     let mut words = vec![
@@ -104,10 +97,8 @@ fn root(input: &LayoutInput<'_>) -> BlueprintNode {
     if ranked > 0 {
         words.push(document("Ranking", entities::RETRIEVAL_TABLE));
     }
-    let mut left = vec![
-        (3.0, overview(viewpoints, &focus.places).into()),
-        (2.0, BlueprintNode::Tabs(words)),
-    ];
+    let mut left =
+        vec![(3.0, overview(viewpoints, &focus.places).into()), (2.0, BlueprintNode::Tabs(words))];
     if has_pages {
         left.insert(0, (4.0, document("Lesson", entities::LESSON)));
     }
@@ -124,9 +115,7 @@ fn root(input: &LayoutInput<'_>) -> BlueprintNode {
         _ => 1.2,
     };
     let direct = direct.into_iter();
-    let direct: Vec<_> = direct
-        .map(|method| search_row(method, viewpoints))
-        .collect();
+    let direct: Vec<_> = direct.map(|method| search_row(method, viewpoints)).collect();
     // Three rows would be too low for the photos.
     if rows.is_empty() {
         rows = equal(direct);
@@ -162,11 +151,7 @@ fn ranks(ranked: usize) -> BlueprintNode {
 fn overview(viewpoints: &Viewpoints<'_>, places: &[[f64; 3]]) -> BlueprintView {
     BlueprintView::new("3D", "World", "/")
         // The maps of PM and MI overlap, so each has its own view.
-        .of([
-            "+ /world/**",
-            "- /world/search/**",
-            "- /world/correspondences/outlier/**",
-        ])
+        .of(["+ /world/**", "- /world/search/**", "- /world/correspondences/outlier/**"])
         .with("EyeControls3D", viewpoints.behind(places))
         .with("LineGrid3D", LineGrid3D::new().with_visible(false))
 }
@@ -202,10 +187,7 @@ fn search_row(method: Method, viewpoints: &Viewpoints<'_>) -> BlueprintNode {
         vec![image("residual", "residual"), image("weights", "weights")]
     } else {
         vec![
-            image(
-                "joint histogram (right: synthetic, up: query)",
-                "joint_histogram",
-            ),
+            image("joint histogram (right: synthetic, up: query)", "joint_histogram"),
             plot(format!("{name} entropy"), of("entropy")),
         ]
     });
@@ -233,10 +215,7 @@ fn equal(nodes: impl IntoIterator<Item = BlueprintNode>) -> Vec<(f32, BlueprintN
 }
 
 fn row(name: &str, children: Vec<(f32, BlueprintNode)>) -> BlueprintNode {
-    BlueprintNode::Row {
-        name: name.to_owned(),
-        children,
-    }
+    BlueprintNode::Row { name: name.to_owned(), children }
 }
 
 /// A surface of the grid search, seen from above.
@@ -256,9 +235,7 @@ fn map(method: Method, part: &str, viewpoints: &Viewpoints<'_>) -> BlueprintView
 
 fn plot(name: impl Into<String>, origin: impl Into<String>) -> BlueprintNode {
     let legend = PlotLegend::new().with_corner(Corner2D::LeftBottom);
-    BlueprintView::new("TimeSeries", name, origin)
-        .with("PlotLegend", legend)
-        .into()
+    BlueprintView::new("TimeSeries", name, origin).with("PlotLegend", legend).into()
 }
 
 /// Points of view, fixed to the first reference camera.

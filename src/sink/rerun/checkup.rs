@@ -29,9 +29,7 @@ pub fn record_checkup(
     };
     let mut stream = Stream::open(targets, &identity)?;
     stream.log_static(entities::WORLD, &ViewCoordinates::RDF());
-    let first = frames
-        .first()
-        .map(|frame| frame.world_from_camera.translation.vector);
+    let first = frames.first().map(|frame| frame.world_from_camera.translation.vector);
     let origin = Origin(first.unwrap_or_default());
     for (index, tuple) in frames.iter().enumerate() {
         stream.set_query(index);
@@ -55,9 +53,8 @@ pub fn record_checkup(
                 (place, super::color(palette::viridis(near)))
             })
             .unzip();
-        let points = Points2D::new(places)
-            .with_colors(colors)
-            .with_radii([Radius::new_ui_points(1.2)]);
+        let points =
+            Points2D::new(places).with_colors(colors).with_radii([Radius::new_ui_points(1.2)]);
         stream.log("check/photo/cloud", &points);
         stream.flush();
     }

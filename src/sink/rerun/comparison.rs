@@ -84,9 +84,7 @@ fn log(stream: &mut Stream, origin: Origin, result: &QueryResult, run: &str, col
     }
     stream.log_static(
         &path,
-        &SeriesLines::new()
-            .with_names([run])
-            .with_colors([super::color(color)]),
+        &SeriesLines::new().with_names([run]).with_colors([super::color(color)]),
     );
 }
 

@@ -61,11 +61,8 @@ impl DirectContext {
         }
         stream.set_eval(Some(eval));
         if let Some(Explanation::JointHistogram(histogram)) = &comparison.explanation {
-            let entropies = [
-                histogram.query_entropy,
-                histogram.synthetic_entropy,
-                histogram.joint_entropy,
-            ];
+            let entropies =
+                [histogram.query_entropy, histogram.synthetic_entropy, histogram.joint_entropy];
             stream.log(&path("entropy"), &Scalars::new(entropies));
         }
         if let Some(cost) = comparison.score.cost {

@@ -44,12 +44,7 @@ pub(super) fn indexed(picture: &Indexed) -> Encoded {
 }
 
 fn indexed_bytes(picture: &Indexed) -> Result<Vec<u8>, png::EncodingError> {
-    let Indexed {
-        width,
-        height,
-        palette,
-        indices,
-    } = picture;
+    let Indexed { width, height, palette, indices } = picture;
     let mut bytes = Vec::new();
     let mut encoder = png::Encoder::new(&mut bytes, *width, *height);
     encoder.set_color(png::ColorType::Indexed);
@@ -76,19 +71,12 @@ mod tests {
             let picture = Indexed {
                 width,
                 height,
-                palette: (0..colors)
-                    .map(|color| [color, 2 * (color / 2), 7])
-                    .collect(),
-                indices: (0..width * height)
-                    .map(|i| (i * 37) as u8 % colors)
-                    .collect(),
+                palette: (0..colors).map(|color| [color, 2 * (color / 2), 7]).collect(),
+                indices: (0..width * height).map(|i| (i * 37) as u8 % colors).collect(),
             };
             let bytes = indexed_bytes(&picture).expect("encodes");
             let read = image::load_from_memory(&bytes).expect("a PNG").into_rgb8();
-            let shown = picture
-                .indices
-                .iter()
-                .map(|&index| picture.palette[usize::from(index)]);
+            let shown = picture.indices.iter().map(|&index| picture.palette[usize::from(index)]);
             assert_eq!(read.dimensions(), (width, height));
             assert_eq!(read.into_raw(), shown.flatten().collect::<Vec<u8>>());
         }

@@ -24,9 +24,7 @@ pub const WORLD: &str = "world";
 /// The roots of all entities of one query, for any methods.
 pub fn of_a_query() -> impl Iterator<Item = &'static str> {
     let methods = estimator::methods().map(|method| method.name());
-    [WORLD, PROOF, "query", "search", "fusion", "retrieval"]
-        .into_iter()
-        .chain(methods)
+    [WORLD, PROOF, "query", "search", "fusion", "retrieval"].into_iter().chain(methods)
 }
 /// Inliers of the best trial so far, one row per improvement.
 pub const RANSAC_BEST: &str = "fb/ransac/best";

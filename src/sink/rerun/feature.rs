@@ -76,10 +76,7 @@ impl FeatureContext {
             Side::Query => self.query = Arc::clone(features),
             Side::Reference => self.reference = Arc::clone(features),
         }
-        let pixels = features
-            .keypoints
-            .iter()
-            .map(|keypoint| shown([keypoint.x, keypoint.y]));
+        let pixels = features.keypoints.iter().map(|keypoint| shown([keypoint.x, keypoint.y]));
         let points = Points2D::new(pixels)
             .with_radii(features.keypoints.iter().map(|keypoint| keypoint.scale))
             .with_colors([super::color(palette::UNDECIDED)]);
@@ -103,10 +100,7 @@ impl FeatureContext {
             .map(|decision| decision.query)
             .collect();
         let lines = self.lines(&matches, palette::UNDECIDED);
-        stream.log(
-            &entities::matches_in_state(context.reference, UNDECIDED),
-            &lines,
-        );
+        stream.log(&entities::matches_in_state(context.reference, UNDECIDED), &lines);
     }
 
     /// Lines from query keypoints, by index, to their nearest reference keypoints.
@@ -141,14 +135,10 @@ impl FeatureContext {
 
     fn classified(&self, states: &[FeatureState], context: &EventContext<'_>, stream: &mut Stream) {
         stream.log(entities::QUERY_DETECTED, &Clear::flat());
-        stream.log(
-            &entities::matches_in_state(context.reference, UNDECIDED),
-            &Clear::flat(),
-        );
+        stream.log(&entities::matches_in_state(context.reference, UNDECIDED), &Clear::flat());
         for (index, name) in FeatureState::NAMES.into_iter().enumerate() {
-            let members: Vec<usize> = (0..states.len())
-                .filter(|&query| states[query].index() == index)
-                .collect();
+            let members: Vec<usize> =
+                (0..states.len()).filter(|&query| states[query].index() == index).collect();
             let color = palette::STATES[index];
             let points = self.points(&members, states, color);
             stream.log(&entities::query_keypoints(name), &points);
@@ -190,26 +180,12 @@ impl FeatureContext {
         let centre = Point3::from(pose.translation.vector);
         for name in ["inlier", "outlier"] {
             let members = self.lifted.iter().filter(|lifted| {
-                states
-                    .get(lifted.query)
-                    .is_some_and(|state| state.name() == name)
+                states.get(lifted.query).is_some_and(|state| state.name() == name)
             });
             let points: Vec<Point3<f64>> = members.filter_map(|lifted| lifted.point).collect();
-            let color = if name == "inlier" {
-                palette::TRUTH
-            } else {
-                palette::ESTIMATE
-            };
+            let color = if name == "inlier" { palette::TRUTH } else { palette::ESTIMATE };
             let path = entities::correspondences(name);
-            log_rays(
-                stream,
-                &path,
-                context.problem,
-                context.origin,
-                &centre,
-                &points,
-                color,
-            );
+            log_rays(stream, &path, context.problem, context.origin, &centre, &points, color);
         }
     }
 }

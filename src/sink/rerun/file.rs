@@ -32,18 +32,12 @@ enum Writer {
 impl RecordingFile {
     /// Creates or replaces the file, and writes its header.
     pub(super) fn create(path: &Path) -> Result<Self, RecordError> {
-        let refused = |source: io::Error| RecordError::Create {
-            path: path.to_owned(),
-            source,
-        };
+        let refused = |source: io::Error| RecordError::Create { path: path.to_owned(), source };
         let file = File::create(path).map_err(refused)?;
         let options = EncodingOptions::PROTOBUF_COMPRESSED;
         let encoder = Encoder::new_eager(CrateVersion::LOCAL, options, file)
             .map_err(|error| refused(into_io(error)))?;
-        Ok(Self {
-            path: path.to_owned(),
-            writer: Arc::new(Mutex::new(Writer::Open(encoder))),
-        })
+        Ok(Self { path: path.to_owned(), writer: Arc::new(Mutex::new(Writer::Open(encoder))) })
     }
 
     /// The error, if any.
@@ -65,10 +59,7 @@ impl RecordingFile {
     }
 
     fn incomplete(&self, message: String) -> RecordError {
-        RecordError::Incomplete {
-            path: self.path.clone(),
-            message,
-        }
+        RecordError::Incomplete { path: self.path.clone(), message }
     }
 
     fn writer(&self) -> MutexGuard<'_, Writer> {
@@ -129,9 +120,6 @@ mod tests {
         *file.writer() = Writer::Broken("no room".to_owned());
         assert!(file.flush_blocking(Duration::ZERO).is_err());
         let message = file.finish().expect_err("it is broken").to_string();
-        assert!(
-            message.ends_with("run.rrd is incomplete: no room"),
-            "{message}"
-        );
+        assert!(message.ends_with("run.rrd is incomplete: no room"), "{message}");
     }
 }

@@ -31,21 +31,13 @@ impl FusionTables {
         self.tables += &table(event, method);
         let document = TextDocument::from_markdown(self.tables.as_str());
         stream.log(entities::FUSION_TABLE, &document);
-        stream.log(
-            &entities::fusion_candidates(method),
-            &candidates(event, origin),
-        );
+        stream.log(&entities::fusion_candidates(method), &candidates(event, origin));
     }
 }
 
 /// The query's position by each reference alone.
 fn candidates(event: &ReferencesFused, origin: Origin) -> Points3D {
-    let placed = || {
-        event
-            .shares
-            .iter()
-            .filter_map(|share| Some((share, share.pose?)))
-    };
+    let placed = || event.shares.iter().filter_map(|share| Some((share, share.pose?)));
     Points3D::new(placed().map(|(_, pose)| origin.place(&pose.translation.vector)))
         .with_colors(placed().map(|(share, _)| {
             super::color(match share.outcome {
@@ -77,9 +69,7 @@ fn table(event: &ReferencesFused, method: Method) -> String {
                 format!("{:.2} m from the fused pose", offset.norm())
             }
         };
-        let support = share
-            .support
-            .map(|support| format!("; {}", support.words()));
+        let support = share.support.map(|support| format!("; {}", support.words()));
         text += &format!(
             "| {} | {} | {} | {alone}{} |\n",
             share.reference,

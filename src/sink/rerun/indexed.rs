@@ -54,25 +54,15 @@ mod tests {
     use crate::render::{SplattedPixel, SyntheticView};
 
     fn view(count: u32) -> SyntheticView {
-        let pixel = |index| SplattedPixel {
-            index,
-            depth: 10.0,
-            intensity: 50.0,
-        };
-        SyntheticView {
-            width: count,
-            height: 1,
-            pixels: (0..count).map(pixel).collect(),
-        }
+        let pixel = |index| SplattedPixel { index, depth: 10.0, intensity: 50.0 };
+        SyntheticView { width: count, height: 1, pixels: (0..count).map(pixel).collect() }
     }
 
     #[test]
     fn a_difference_has_the_colour_of_the_nearest_step_and_great_ones_that_of_the_ends() {
         let differences = [-300.0, -64.0, -0.5, 0.0, 0.2, 31.7, 64.0, 300.0];
-        let pairs = differences.map(|difference| IntensityPair {
-            query: 100.0 + difference,
-            synthetic: 100.0,
-        });
+        let pairs = differences
+            .map(|difference| IntensityPair { query: 100.0 + difference, synthetic: 100.0 });
         let picture = residual(&Painter::new(&view(8)), &pairs);
         assert_eq!(picture.palette.len(), 66);
         for (index, difference) in picture.indices.iter().zip(differences) {
@@ -87,16 +77,9 @@ mod tests {
     fn a_pixel_that_counts_is_white_and_one_that_is_ignored_grey() {
         let shown = weights(
             &Painter::new(&view(2)),
-            &PhotometricWeights {
-                power: 1,
-                threshold: 9.0,
-                counted: vec![true, false],
-            },
+            &PhotometricWeights { power: 1, threshold: 9.0, counted: vec![true, false] },
         );
-        let colors = shown
-            .indices
-            .iter()
-            .map(|&index| shown.palette[usize::from(index)]);
+        let colors = shown.indices.iter().map(|&index| shown.palette[usize::from(index)]);
         assert_eq!(colors.collect::<Vec<_>>(), [[255; 3], [90; 3]]);
     }
 }

@@ -108,10 +108,7 @@ pub(super) fn send(
         .with_loop_mode(LoopMode::Off);
     stream.log("time_panel", &time_panel)?;
     for panel in ["blueprint_panel", "selection_panel"] {
-        stream.log(
-            panel,
-            &PanelBlueprint::new().with_state(PanelState::Collapsed),
-        )?;
+        stream.log(panel, &PanelBlueprint::new().with_state(PanelState::Collapsed))?;
     }
     if let Some(info) = stream.store_info() {
         let activation = BlueprintActivationCommand {
@@ -137,10 +134,9 @@ fn log_node(
         }
         BlueprintNode::Row { children, .. } => (ContainerKind::Horizontal, shares(children)),
         BlueprintNode::Column(children) => (ContainerKind::Vertical, shares(children)),
-        BlueprintNode::Tabs(children) => (
-            ContainerKind::Tabs,
-            children.iter().map(|child| (1.0, child)).collect(),
-        ),
+        BlueprintNode::Tabs(children) => {
+            (ContainerKind::Tabs, children.iter().map(|child| (1.0, child)).collect())
+        }
     };
     let mut contents = Vec::new();
     for (index, (_, child)) in children.iter().enumerate() {
@@ -163,10 +159,7 @@ fn log_node(
 }
 
 fn shares(children: &[(f32, BlueprintNode)]) -> Vec<(f32, &BlueprintNode)> {
-    children
-        .iter()
-        .map(|(share, child)| (*share, child))
-        .collect()
+    children.iter().map(|(share, child)| (*share, child)).collect()
 }
 
 fn log_view(
@@ -174,21 +167,10 @@ fn log_view(
     view: &BlueprintView,
     place: &str,
 ) -> RecordingStreamResult<()> {
-    let BlueprintView {
-        class,
-        name,
-        origin,
-        contents,
-        properties,
-    } = view;
+    let BlueprintView { class, name, origin, contents, properties } = view;
     let path = view_path(place, class);
-    let expressions = contents
-        .iter()
-        .map(|line| QueryExpression(line.as_str().into()));
-    stream.log(
-        format!("{path}/ViewContents"),
-        &ViewContents::new(expressions),
-    )?;
+    let expressions = contents.iter().map(|line| QueryExpression(line.as_str().into()));
+    stream.log(format!("{path}/ViewContents"), &ViewContents::new(expressions))?;
     let blueprint = ViewBlueprint::new(ViewClass((*class).into()))
         .with_display_name(Name(name.as_str().into()))
         .with_space_origin(origin.as_str());
@@ -219,12 +201,6 @@ fn id(place: &str) -> u128 {
 
 fn uuid(place: &str) -> String {
     let hex = format!("{:032x}", id(place));
-    let parts = [
-        &hex[..8],
-        &hex[8..12],
-        &hex[12..16],
-        &hex[16..20],
-        &hex[20..],
-    ];
+    let parts = [&hex[..8], &hex[8..12], &hex[12..16], &hex[16..20], &hex[20..]];
     parts.join("-")
 }

@@ -98,11 +98,7 @@ impl Recorder {
     fn finish(&mut self) -> Option<Recording> {
         let Writer { tasks, thread } = self.writer.take()?;
         drop(tasks);
-        Some(
-            thread
-                .join()
-                .unwrap_or_else(|panic| panic::resume_unwind(panic)),
-        )
+        Some(thread.join().unwrap_or_else(|panic| panic::resume_unwind(panic)))
     }
 
     fn tell(&self, task: impl FnOnce(&mut Recording) + Send + 'static) {

@@ -136,8 +136,7 @@ impl Recording {
         let reference = &first.reference.world_from_camera;
         let origin = Origin(reference.translation.vector);
         self.origin = Some(origin);
-        self.stream
-            .log_static(entities::WORLD, &ViewCoordinates::RDF());
+        self.stream.log_static(entities::WORLD, &ViewCoordinates::RDF());
         blueprint::log_styles(&mut self.stream, &self.methods);
         origin
     }
@@ -152,13 +151,7 @@ impl Recording {
 
     /// Sends the layout again, now that the failures are known.
     fn lay_out_story(&mut self) {
-        let CurrentQuery {
-            problems,
-            truth,
-            results,
-            proven,
-            ..
-        } = &self.query;
+        let CurrentQuery { problems, truth, results, proven, .. } = &self.query;
         // The layout of a lesson stays as it is.
         if results.is_empty() || self.stream.is_broken() || self.has_pages {
             return;
@@ -242,29 +235,22 @@ impl Recording {
 
     fn result_in_words(&mut self, result: &QueryResult) {
         let outcome = result.words();
-        let level = if !result.grade.is_failure() {
-            TextLogLevel::INFO
-        } else {
-            TextLogLevel::WARN
-        };
+        let level =
+            if !result.grade.is_failure() { TextLogLevel::INFO } else { TextLogLevel::WARN };
         self.say(&format!("{} result: {outcome}", result.method), level);
     }
 
     fn report(&mut self) {
         let Some(origin) = self.origin else { return };
-        let CurrentQuery {
-            problems, results, ..
-        } = &self.query;
+        let CurrentQuery { problems, results, .. } = &self.query;
         // Not on the timeline `lockstep`: the report would show results too early there.
         self.stream.set_lockstep(None);
         let text = report::markdown(problems, results, &self.identity, origin);
-        self.stream
-            .log(entities::REPORT, &TextDocument::from_markdown(text));
+        self.stream.log(entities::REPORT, &TextDocument::from_markdown(text));
     }
 
     fn say(&mut self, words: &str, level: &str) {
-        self.stream
-            .log(entities::LOG, &TextLog::new(words).with_level(level));
+        self.stream.log(entities::LOG, &TextLog::new(words).with_level(level));
     }
 
     fn stage_started(&mut self, stage: Stage) {
@@ -314,9 +300,7 @@ impl Recording {
 
     /// The cloud with the colours of the direct methods.
     fn colored(&self, tuple: &ReferenceTuple) -> ColoredCloud {
-        let ReferenceTuple {
-            photo, intrinsics, ..
-        } = tuple;
+        let ReferenceTuple { photo, intrinsics, .. } = tuple;
         color_cloud(&tuple.cloud, &photo.gray, intrinsics, &self.params.render)
     }
 
@@ -402,11 +386,7 @@ impl Recording {
         problems: Vec<Problem>,
         truth: Option<Pose>,
     ) {
-        self.query = CurrentQuery {
-            problems,
-            truth,
-            ..CurrentQuery::default()
-        };
+        self.query = CurrentQuery { problems, truth, ..CurrentQuery::default() };
         let Some(first) = self.query.problems.first().cloned() else {
             return;
         };

@@ -20,9 +20,7 @@ pub(super) fn markdown(
     let mut text = String::new();
     if let Some(problem) = problems.first() {
         let references = problems.iter().map(|p| &p.reference.name);
-        let names: Vec<String> = references
-            .map(|name| identity.reference_label(name))
-            .collect();
+        let names: Vec<String> = references.map(|name| identity.reference_label(name)).collect();
         text += &format!(
             "# Query {}\n\nReference: {}. Search radius: {} m. Seed: {}.\n\n",
             identity.query_label(&problem.query.name),
@@ -79,15 +77,7 @@ fn failure(result: &QueryResult) -> String {
 }
 
 fn errors(results: &[QueryResult]) -> String {
-    let header = [
-        "method",
-        "error",
-        "rotation",
-        "max Euler",
-        "grade",
-        "confidence",
-        "reference",
-    ];
+    let header = ["method", "error", "rotation", "max Euler", "grade", "confidence", "reference"];
     let mut table = Table::with_notes(header, &[1, 2, 3, 5], 0);
     for result in results {
         let grade = match (result.grade, &result.reason) {
@@ -120,15 +110,7 @@ fn errors(results: &[QueryResult]) -> String {
 }
 
 fn features(results: &[QueryResult]) -> String {
-    let header = [
-        "method",
-        "query",
-        "reference",
-        "ratio test",
-        "unique",
-        "depth",
-        "inliers",
-    ];
+    let header = ["method", "query", "reference", "ratio test", "unique", "depth", "inliers"];
     let mut table = Table::new("", "", header);
     for result in results {
         let Some(counts) = &result.counts else {
@@ -252,9 +234,6 @@ mod tests {
     fn only_the_parameters_that_differ_are_listed() {
         assert!(changes("").contains("All at their defaults."));
         let text = changes("[fb]\nratio = 0.7\n");
-        assert!(
-            text.contains("- `fb.ratio=0.7`") && !text.contains("depth"),
-            "{text}"
-        );
+        assert!(text.contains("- `fb.ratio=0.7`") && !text.contains("depth"), "{text}");
     }
 }

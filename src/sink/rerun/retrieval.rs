@@ -172,12 +172,10 @@ fn table(ranking: &ReferenceRanking, truth: Option<&Pose>) -> String {
             Geometry::Unchecked => ("–".to_owned(), "not checked"),
         };
         let distance =
-            truth
-                .zip(reference.world_from_camera)
-                .map_or("–".to_owned(), |(truth, pose)| {
-                    let offset = pose.translation.vector - truth.translation.vector;
-                    format!("{:.1}", offset.norm())
-                });
+            truth.zip(reference.world_from_camera).map_or("–".to_owned(), |(truth, pose)| {
+                let offset = pose.translation.vector - truth.translation.vector;
+                format!("{:.1}", offset.norm())
+            });
         let chosen = if rank < ranking.chosen { "yes" } else { "no" };
         text += &format!(
             "| {} | {} | {} | {inliers} | {verified} | {distance} | {chosen} |\n",
@@ -198,11 +196,7 @@ mod tests {
     use crate::retrieval::{Affine, Ranked, Verification};
 
     fn matched(query: [f64; 2], reference: [f64; 2]) -> VerifiedMatch {
-        VerifiedMatch {
-            query: 0,
-            query_pixel: query.into(),
-            reference_pixel: reference.into(),
-        }
+        VerifiedMatch { query: 0, query_pixel: query.into(), reference_pixel: reference.into() }
     }
 
     fn verification() -> Verification {
@@ -212,10 +206,7 @@ mod tests {
                 linear: Matrix2::new(2.0, 0.0, 0.0, 1.0),
                 translation: Vector2::new(5.0, 0.0),
             },
-            matches: vec![
-                matched([10.0, 20.0], [25.0, 20.0]),
-                matched([30.0, 40.0], [65.0, 40.0]),
-            ],
+            matches: vec![matched([10.0, 20.0], [25.0, 20.0]), matched([30.0, 40.0], [65.0, 40.0])],
         }
     }
 
@@ -226,18 +217,9 @@ mod tests {
         // 960 × (300 + 4 + 300) at half the size.
         assert_eq!(photo_pair.picture.dimensions(), (480, 302));
         assert_eq!(photo_pair.of_query(&Point2::new(-0.5, -0.5)), [0.0, 0.0]);
-        assert_eq!(
-            photo_pair.of_query(&Point2::new(959.5, 299.5)),
-            [480.0, 150.0]
-        );
-        assert_eq!(
-            photo_pair.of_reference(&Point2::new(-0.5, -0.5)),
-            [0.0, 152.0]
-        );
-        assert_eq!(
-            photo_pair.of_reference(&Point2::new(959.5, 299.5)),
-            [480.0, 302.0]
-        );
+        assert_eq!(photo_pair.of_query(&Point2::new(959.5, 299.5)), [480.0, 150.0]);
+        assert_eq!(photo_pair.of_reference(&Point2::new(-0.5, -0.5)), [0.0, 152.0]);
+        assert_eq!(photo_pair.of_reference(&Point2::new(959.5, 299.5)), [480.0, 302.0]);
         // A small photo is not blown up.
         let small = Photo::from_gray(GrayImage::new(96, 30));
         let photo_pair = PhotoPair::of(&small, &small);
@@ -249,11 +231,7 @@ mod tests {
         let ranked = |name: &str, score, geometry, ahead: Option<f64>| RankedReference {
             name: name.to_owned(),
             world_from_camera: ahead.map(|z| Pose::translation(0.0, 0.0, z)),
-            ranked: Ranked {
-                frame: 0,
-                score,
-                geometry,
-            },
+            ranked: Ranked { frame: 0, score, geometry },
         };
         let ranking = ReferenceRanking {
             criterion: Criterion::Words,
@@ -277,9 +255,6 @@ mod tests {
         );
         assert!(text.contains("first 1 of 40 candidates"), "{text}");
         assert!(table(&ranking, None).contains("| a | 0.250 | 2 | yes | – | yes |"));
-        assert_eq!(
-            label(&ranking, 0, &ranking.frames[0]),
-            "1. a: 0.250, 2 inliers"
-        );
+        assert_eq!(label(&ranking, 0, &ranking.frames[0]), "1. a: 0.250, 2 inliers");
     }
 }

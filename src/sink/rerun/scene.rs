@@ -99,10 +99,7 @@ impl PlacedCamera<'_> {
     pub(super) fn log(&self, stream: &mut Stream, origin: Origin) {
         let path = entities::camera(self.owner);
         stream.log(&path, &origin.transform(self.world_from_camera));
-        stream.log(
-            &path,
-            &pinhole(self.intrinsics).with_color(super::color(self.color)),
-        );
+        stream.log(&path, &pinhole(self.intrinsics).with_color(super::color(self.color)));
         let centre = origin.place(&self.world_from_camera.translation.vector);
         let label = Points3D::new([centre])
             .with_colors([super::color(palette::light(self.color))])
@@ -151,11 +148,7 @@ fn photo_color(tuple: &ReferenceTuple, point: &Point3<f32>) -> Option<Rgb> {
     let photo = tuple.photo.color.as_ref()?;
     let pixel = tuple.intrinsics.project(&point.cast())?;
     let nearest = |value: f64| value.round().max(0.0) as u32;
-    Some(
-        photo
-            .get_pixel_checked(nearest(pixel.x), nearest(pixel.y))?
-            .0,
-    )
+    Some(photo.get_pixel_checked(nearest(pixel.x), nearest(pixel.y))?.0)
 }
 
 /// Records rays from a camera centre to points, all in the reference camera's frame.

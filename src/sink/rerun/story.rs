@@ -21,17 +21,12 @@ pub(super) fn focus(
     proven: &[Method],
 ) -> Focus {
     let wrong = results.iter().filter(|result| is_wrong(result));
-    let estimates = results
-        .iter()
-        .filter_map(|result| result.pose.as_ref()?.to_pose());
+    let estimates = results.iter().filter_map(|result| result.pose.as_ref()?.to_pose());
     let in_reference =
         |pose: &Pose| -> [f64; 3] { first.reference_from_query(pose).translation.vector.into() };
     Focus {
         wrong: wrong.filter_map(responsible).collect(),
         proven: proven.to_vec(),
-        places: estimates
-            .chain(truth.copied())
-            .map(|pose| in_reference(&pose))
-            .collect(),
+        places: estimates.chain(truth.copied()).map(|pose| in_reference(&pose)).collect(),
     }
 }

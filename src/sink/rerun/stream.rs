@@ -66,12 +66,7 @@ impl Stream {
             error: None,
             viewer_lost: false,
             is_live: targets.connect.is_some() || targets.spawn,
-            now: Now {
-                query: 0,
-                step: -1,
-                eval: None,
-                lockstep: None,
-            },
+            now: Now { query: 0, step: -1, eval: None, lockstep: None },
             layouts: 0,
         })
     }
@@ -119,14 +114,11 @@ impl Stream {
             return;
         }
         // Rerun keeps the time per thread, and a run may move to another one.
-        self.recording
-            .set_time_sequence(QUERY_TIMELINE, self.now.query);
-        self.recording
-            .set_time_sequence(STEP_TIMELINE, self.now.step);
-        for (timeline, time) in [
-            (EVAL_TIMELINE, self.now.eval),
-            (LOCKSTEP_TIMELINE, self.now.lockstep),
-        ] {
+        self.recording.set_time_sequence(QUERY_TIMELINE, self.now.query);
+        self.recording.set_time_sequence(STEP_TIMELINE, self.now.step);
+        for (timeline, time) in
+            [(EVAL_TIMELINE, self.now.eval), (LOCKSTEP_TIMELINE, self.now.lockstep)]
+        {
             match time {
                 Some(time) => self.recording.set_time_sequence(timeline, time),
                 None => self.recording.disable_timeline(timeline),
@@ -208,8 +200,5 @@ impl Stream {
 }
 
 fn unrecordable(what: &str, error: &dyn std::error::Error) -> RecordError {
-    RecordError::Encode {
-        what: what.to_owned(),
-        message: error.to_string(),
-    }
+    RecordError::Encode { what: what.to_owned(), message: error.to_string() }
 }

@@ -31,20 +31,13 @@ impl CostRange {
     /// The range of the eligible hypotheses; `None` if there are none.
     pub(super) fn of(surface: &ScoredLattice) -> Option<Self> {
         let costs = || (0..surface.scores.len()).filter_map(|cell| surface.eligible_cost(cell));
-        Some(Self {
-            least: costs().reduce(f64::min)?,
-            greatest: costs().reduce(f64::max)?,
-        })
+        Some(Self { least: costs().reduce(f64::min)?, greatest: costs().reduce(f64::max)? })
     }
 
     /// 1 for the least cost, 0 for the greatest.
     fn merit(&self, cost: f64) -> f64 {
         let width = self.greatest - self.least;
-        if width > 0.0 {
-            (self.greatest - cost) / width
-        } else {
-            1.0
-        }
+        if width > 0.0 { (self.greatest - cost) / width } else { 1.0 }
     }
 }
 
@@ -56,37 +49,22 @@ pub(super) fn log_maps(
     range: CostRange,
     context: &EventContext<'_>,
 ) {
-    let most = surface
-        .scores
-        .iter()
-        .flatten()
-        .map(|score| score.covered)
-        .max();
+    let most = surface.scores.iter().flatten().map(|score| score.covered).max();
     let most = f64::from(most.unwrap_or(1).max(1));
     let cost = |cell: usize| {
         surface.scores[cell]?;
         let eligible = surface.eligible_cost(cell);
         Some(eligible.map_or([70; 3], |cost| palette::viridis(range.merit(cost))))
     };
-    let coverage = |cell: usize| {
-        Some(palette::viridis(
-            f64::from(surface.scores[cell]?.covered) / most,
-        ))
-    };
+    let coverage =
+        |cell: usize| Some(palette::viridis(f64::from(surface.scores[cell]?.covered) / most));
     let fine = surface.lattice.phase == Phase::PositionFine;
     let part = |name: &str| {
-        if fine {
-            format!("{name}/fine")
-        } else {
-            name.to_owned()
-        }
+        if fine { format!("{name}/fine") } else { name.to_owned() }
     };
     let path = |name: &str| entities::search(context.method, &part(name));
     stream.log(&path("cost"), &grid_map(&surface.lattice, context, cost));
-    stream.log(
-        &path("coverage"),
-        &grid_map(&surface.lattice, context, coverage),
-    );
+    stream.log(&path("coverage"), &grid_map(&surface.lattice, context, coverage));
 }
 
 /// A lattice of positions as a map; `color` returns `None` for cells to leave out.
@@ -97,9 +75,8 @@ fn grid_map(
 ) -> GridMap {
     let (columns, rows) = (lattice.columns, lattice.rows);
     // The first row of the image is farthest ahead.
-    let cells = (0..rows)
-        .rev()
-        .flat_map(|row| (0..columns).map(move |column| row * columns + column));
+    let cells =
+        (0..rows).rev().flat_map(|row| (0..columns).map(move |column| row * columns + column));
     let data: Vec<u8> = cells
         .flat_map(|cell| match color(cell) {
             Some([r, g, b]) => [r, g, b, 255],
@@ -118,11 +95,7 @@ fn grid_map(
         yaw_rad: 0.0,
     };
     GridMap::new(data, format, lattice.step as f32)
-        .with_translation(on_ground(
-            &corner,
-            if is_fine { FINE_ABOVE_M } else { 0.0 },
-            context,
-        ))
+        .with_translation(on_ground(&corner, if is_fine { FINE_ABOVE_M } else { 0.0 }, context))
         .with_quaternion(Quaternion::from_xyzw(map_rotation(context)))
         .with_opacity(Opacity::from(0.9))
         .with_draw_order(DrawOrder::from(if is_fine { 1.0 } else { 0.0 }))
@@ -145,9 +118,7 @@ fn on_ground(offset: &Offset, above_m: f64, context: &EventContext<'_>) -> [f32;
 
 /// Records the path of the best hypothesis so far.
 pub(super) fn log_path(stream: &mut Stream, path: &[Offset], context: &EventContext<'_>) {
-    let places = path
-        .iter()
-        .map(|offset| on_ground(offset, PATH_ABOVE_M, context));
+    let places = path.iter().map(|offset| on_ground(offset, PATH_ABOVE_M, context));
     let strip = LineStrips3D::new([places.collect::<Vec<_>>()])
         .with_colors([super::color(palette::ESTIMATE)])
         .with_radii([Radius::new_ui_points(2.0)]);
@@ -164,21 +135,14 @@ pub(super) fn log_yaw(stream: &mut Stream, surface: &ScoredLattice, context: &Ev
         .lattice
         .hypotheses()
         .map(|(cell, offset)| {
-            let gain = surface
-                .eligible_cost(cell)
-                .map_or(0.0, |cost| range.greatest - cost);
+            let gain = surface.eligible_cost(cell).map_or(0.0, |cost| range.greatest - cost);
             (offset.yaw_rad.to_degrees(), gain)
         })
         .unzip();
     let is_fine = surface.lattice.phase == Phase::YawFine;
-    let color = if is_fine {
-        palette::ESTIMATE
-    } else {
-        palette::REFERENCE
-    };
-    let chart = BarChart::new(vector(gains))
-        .with_abscissa(vector(angles))
-        .with_color(super::color(color));
+    let color = if is_fine { palette::ESTIMATE } else { palette::REFERENCE };
+    let chart =
+        BarChart::new(vector(gains)).with_abscissa(vector(angles)).with_color(super::color(color));
     let path = entities::yaw_curve(context.method);
     if is_fine {
         stream.log(&format!("{path}/fine"), &chart);
@@ -197,14 +161,8 @@ mod tests {
 
     #[test]
     fn the_least_cost_has_the_greatest_merit_and_a_flat_surface_is_all_best() {
-        let range = CostRange {
-            least: 2.0,
-            greatest: 6.0,
-        };
-        assert_eq!(
-            [2.0, 4.0, 6.0].map(|cost| range.merit(cost)),
-            [1.0, 0.5, 0.0]
-        );
+        let range = CostRange { least: 2.0, greatest: 6.0 };
+        assert_eq!([2.0, 4.0, 6.0].map(|cost| range.merit(cost)), [1.0, 0.5, 0.0]);
         assert_eq!(CostRange::default().merit(0.0), 1.0);
     }
 }

@@ -29,10 +29,7 @@ pub struct Targets {
 impl Targets {
     /// Only a file.
     pub fn file(path: &Path) -> Self {
-        Self {
-            save: Some(path.to_owned()),
-            ..Self::default()
-        }
+        Self { save: Some(path.to_owned()), ..Self::default() }
     }
 }
 
@@ -144,15 +141,8 @@ impl Targets {
 }
 
 fn connect(url: &str) -> Result<Viewer, RecordError> {
-    let url = if url.is_empty() {
-        DEFAULT_CONNECT_URL
-    } else {
-        url
-    };
-    let refused = |message: String| RecordError::Address {
-        url: url.to_owned(),
-        message,
-    };
+    let url = if url.is_empty() { DEFAULT_CONNECT_URL } else { url };
+    let refused = |message: String| RecordError::Address { url: url.to_owned(), message };
     match url.parse() {
         Ok(RedapUri::Proxy(uri)) => Ok(Viewer::new(GrpcSink::new(uri))),
         Ok(_) => Err(refused("the URL of a viewer ends in /proxy".to_owned())),
@@ -161,10 +151,7 @@ fn connect(url: &str) -> Result<Viewer, RecordError> {
 }
 
 fn spawn() -> Result<Viewer, RecordError> {
-    let options = SpawnOptions {
-        hide_welcome_screen: true,
-        ..SpawnOptions::default()
-    };
+    let options = SpawnOptions { hide_welcome_screen: true, ..SpawnOptions::default() };
     let viewer = rerun::spawn(&options).map_err(|error| {
         RecordError::Spawn(match error {
             // Rerun's own message is a page long.
@@ -217,14 +204,9 @@ mod tests {
             nowhere.starts_with("cannot create the recording /nonexistent/run.rrd: "),
             "{nowhere}"
         );
-        let elsewhere = line(Targets {
-            connect: Some("http://example.org".to_owned()),
-            ..Targets::default()
-        });
-        assert!(
-            elsewhere.starts_with("cannot connect to `http://example.org`: "),
-            "{elsewhere}"
-        );
+        let elsewhere =
+            line(Targets { connect: Some("http://example.org".to_owned()), ..Targets::default() });
+        assert!(elsewhere.starts_with("cannot connect to `http://example.org`: "), "{elsewhere}");
         assert!(!nowhere.contains('\n') && !elsewhere.contains('\n'));
     }
 }

@@ -16,10 +16,7 @@ pub(super) struct Viewer {
 
 impl Viewer {
     pub(super) fn new(connection: GrpcSink) -> Self {
-        Self {
-            connection,
-            lost: Mutex::default(),
-        }
+        Self { connection, lost: Mutex::default() }
     }
 
     fn lost(&self) -> MutexGuard<'_, Option<String>> {

@@ -43,14 +43,7 @@ impl Writer {
             let path = drive_folder.join(sensor).join("timestamps.txt");
             write(&path, times.collect::<String>());
         }
-        let Intrinsics {
-            fx,
-            fy,
-            cx,
-            cy,
-            width,
-            height,
-        } = drive.intrinsics;
+        let Intrinsics { fx, fy, cx, cy, width, height } = drive.intrinsics;
         let one = "1 0 0 0 1 0 0 0 1";
         let mut cameras = String::new();
         for number in 0..4 {
@@ -66,10 +59,7 @@ impl Writer {
         write(&day.join("calib_velo_to_cam.txt"), velodyne);
         let imu = format!("R: {one}\nT: 0 0 0\n");
         write(&day.join("calib_imu_to_velo.txt"), imu);
-        let writer = Self {
-            drive_folder,
-            drive,
-        };
+        let writer = Self { drive_folder, drive };
         writer.packets();
         writer
     }

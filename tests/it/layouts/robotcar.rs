@@ -68,16 +68,9 @@ impl Writer {
         for part in ["stereo/centre", "ldmrs", "lms_front", "gps", "vo"] {
             make_folder(&folder.join(part));
         }
-        let times = drive
-            .times_s
-            .iter()
-            .map(|&time| format!("{} 1\n", microseconds(time)));
+        let times = drive.times_s.iter().map(|&time| format!("{} 1\n", microseconds(time)));
         let times: String = times.collect();
-        for list in [
-            "stereo.timestamps",
-            "ldmrs.timestamps",
-            "lms_front.timestamps",
-        ] {
+        for list in ["stereo.timestamps", "ldmrs.timestamps", "lms_front.timestamps"] {
             write(&folder.join(list), &times);
         }
         let writer = Self { folder, drive };
@@ -103,18 +96,12 @@ impl Writer {
         let columns = pixels().map(|(x, _)| moved(x, MOVED.0, width));
         let rows = pixels().map(|(_, y)| moved(y, MOVED.1, height));
         let table: Vec<u8> = columns.chain(rows).flat_map(f64::to_le_bytes).collect();
-        write(
-            &models.join("stereo_narrow_left_distortion_lut.bin"),
-            &table,
-        );
+        write(&models.join("stereo_narrow_left_distortion_lut.bin"), &table);
         let scanner = CAR_FROM_CAMERA * self.drive.scanner.coords;
         let ldmrs = [scanner.x, scanner.y, scanner.z, 0.0, 0.0, 0.0];
-        for (sensor, numbers) in [
-            ("stereo", [0.0; 6]),
-            ("ins", INS),
-            ("ldmrs", ldmrs),
-            ("lms_front", LMS),
-        ] {
+        for (sensor, numbers) in
+            [("stereo", [0.0; 6]), ("ins", INS), ("ldmrs", ldmrs), ("lms_front", LMS)]
+        {
             let text = joined(&numbers, " ") + "\n";
             write(&extrinsics.join(format!("{sensor}.txt")), text);
         }
@@ -142,10 +129,8 @@ impl Writer {
             let angles = joined(&[roll, pitch, yaw], ",");
             text +=
                 &format!("{time},INS_SOLUTION_GOOD,51.76,-1.26,110,{place},30U,0,0,0,{angles}\n");
-            text += &format!(
-                "{},INS_BAD_GPS_AGREEMENT,0,0,0,0,0,0,30U,0,0,0,0,0,0\n",
-                time + 40_000
-            );
+            text +=
+                &format!("{},INS_BAD_GPS_AGREEMENT,0,0,0,0,0,0,30U,0,0,0,0,0,0\n", time + 40_000);
         }
         text
     }

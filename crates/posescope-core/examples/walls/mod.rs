@@ -4,14 +4,8 @@ use posescope_core::Intrinsics;
 use posescope_core::nalgebra::Point2;
 
 /// The camera of both photos.
-pub const CAMERA: Intrinsics = Intrinsics {
-    fx: 180.0,
-    fy: 180.0,
-    cx: 119.5,
-    cy: 49.5,
-    width: 240,
-    height: 100,
-};
+pub const CAMERA: Intrinsics =
+    Intrinsics { fx: 180.0, fy: 180.0, cx: 119.5, cy: 49.5, width: 240, height: 100 };
 
 /// How far away the wall in a column of the reference photo is [m].
 fn wall_m(x: f64) -> f64 {

@@ -25,10 +25,7 @@ pub enum Evaluator<'a> {
 impl Evaluator<'_> {
     /// The evaluator of a cost that is made of the entropies of a joint histogram.
     pub fn of_entropies(bins: usize, cost: fn(&Entropies) -> Option<f64>) -> Self {
-        Self::Counts {
-            bins,
-            cost: Box::new(move |counts| cost(&Entropies::of(counts, bins))),
-        }
+        Self::Counts { bins, cost: Box::new(move |counts| cost(&Entropies::of(counts, bins))) }
     }
 
     /// The cost of pairs.

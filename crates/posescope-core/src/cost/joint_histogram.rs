@@ -35,11 +35,7 @@ impl JointHistogram {
                 counts[cell(pair, bins)] += 1;
             }
         }
-        let Entropies {
-            query,
-            synthetic,
-            joint,
-        } = Entropies::of(&counts, bins);
+        let Entropies { query, synthetic, joint } = Entropies::of(&counts, bins);
         Self {
             bins,
             counts,
@@ -68,13 +64,9 @@ impl JointHistogram {
     pub fn pointwise(&self) -> Vec<f64> {
         let Self { bins, counts, .. } = self;
         let sum = |cells: &mut dyn Iterator<Item = &u32>| cells.map(|&c| f64::from(c)).sum::<f64>();
-        let rows: Vec<f64> = counts
-            .chunks(*bins)
-            .map(|row| sum(&mut row.iter()))
-            .collect();
-        let columns: Vec<f64> = (0..*bins)
-            .map(|column| sum(&mut counts.iter().skip(column).step_by(*bins)))
-            .collect();
+        let rows: Vec<f64> = counts.chunks(*bins).map(|row| sum(&mut row.iter())).collect();
+        let columns: Vec<f64> =
+            (0..*bins).map(|column| sum(&mut counts.iter().skip(column).step_by(*bins))).collect();
         let all: f64 = rows.iter().sum();
         counts
             .iter()
@@ -344,10 +336,7 @@ mod tests {
             not_zero += u32::from(entropies.query > 0.0);
             assert_eq!(entropies.normalized_mutual_information(), None, "{count}");
         }
-        assert!(
-            not_zero > 0,
-            "the counts that come out as 1e-16 are among them"
-        );
+        assert!(not_zero > 0, "the counts that come out as 1e-16 are among them");
         let mut one_differs = vec![0; 256];
         (one_differs[37], one_differs[38]) = (1_000_000, 1);
         let entropies = Entropies::of(&one_differs, 16);

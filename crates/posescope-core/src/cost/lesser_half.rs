@@ -29,11 +29,7 @@ pub(super) struct LesserHalfFinder {
 
 impl LesserHalfFinder {
     pub fn new() -> Self {
-        Self {
-            level: Level::new(),
-            sampled: [0; BINS],
-            around: Vec::new(),
-        }
+        Self { level: Level::new(), sampled: [0; BINS], around: Vec::new() }
     }
 
     /// How many of some numbers ≥ 0 are no greater than their lower median, and the sum of these, each
@@ -41,10 +37,7 @@ impl LesserHalfFinder {
     /// bad, the sum is too large to be exact, or there are no numbers.
     pub fn find(&mut self, values: &[f32]) -> Option<(u32, f64)> {
         let middle = values.len().checked_sub(1)? / 2;
-        let Guess {
-            mut median,
-            mut density,
-        } = self.guess(values, middle);
+        let Guess { mut median, mut density } = self.guess(values, middle);
         let level = self.level;
         let mut last: Option<(f32, f32)> = None;
         for _ in 0..CORRECTIONS {
@@ -64,11 +57,7 @@ impl LesserHalfFinder {
         if self.around.len() <= values.len() {
             self.around.resize(values.len() + 1, 0.0);
         }
-        let mut around = Around {
-            range,
-            values: &mut self.around,
-            count: 0,
-        };
+        let mut around = Around { range, values: &mut self.around, count: 0 };
         let (below, sum) = dispatch!(level, _simd => add_below(values, &mut around));
         let place = middle.checked_sub(below as usize)?;
         let around = &mut around.values[..around.count];
@@ -180,22 +169,16 @@ fn add_below(values: &[f32], around: &mut Around<'_>) -> (u32, f64) {
             *counted = counted.wrapping_add(u32::from(is_below));
         }
         // Not `any`, which would stop early and so compare one by one.
-        let is_near = group.iter().fold(false, |found, &value| {
-            found | ((value >= low) & (value < high))
-        });
+        let is_near =
+            group.iter().fold(false, |found, &value| found | ((value >= low) & (value < high)));
         if is_near {
             around.take(group);
         }
     }
     around.take(rest);
     let below = || rest.iter().filter(|&&value| value < low);
-    let sum = below()
-        .map(|&value| LesserHalf::rounded(f64::from(value)))
-        .sum::<f64>();
-    (
-        counted.iter().sum::<u32>() + below().count() as u32,
-        sums.iter().sum::<f64>() + sum,
-    )
+    let sum = below().map(|&value| LesserHalf::rounded(f64::from(value))).sum::<f64>();
+    (counted.iter().sum::<u32>() + below().count() as u32, sums.iter().sum::<f64>() + sum)
 }
 
 #[cfg(test)]
@@ -208,9 +191,7 @@ mod tests {
         sorted.sort_by(f32::total_cmp);
         let median = sorted[(values.len() - 1) / 2];
         let lesser = sorted.iter().filter(|&&value| value <= median);
-        let sum = lesser
-            .clone()
-            .map(|&value| LesserHalf::rounded(f64::from(value)));
+        let sum = lesser.clone().map(|&value| LesserHalf::rounded(f64::from(value)));
         (lesser.count() as u32, sum.sum())
     }
 

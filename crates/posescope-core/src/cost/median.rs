@@ -52,9 +52,7 @@ impl MedianFinder {
         candidates.clear();
         dispatch!(self.level, _simd => take_of(of_median as u16, bins, values, candidates));
         let place = middle - before;
-        let (_, median, _) = self
-            .candidates
-            .select_nth_unstable_by(place, f32::total_cmp);
+        let (_, median, _) = self.candidates.select_nth_unstable_by(place, f32::total_cmp);
         Some(*median)
     }
 
@@ -95,16 +93,9 @@ fn take_of(wanted: u16, bins: &[u16], values: &[f32], taken: &mut Vec<f32>) {
     const GROUP: usize = 16;
     for (bins, values) in bins.chunks(GROUP).zip(values.chunks(GROUP)) {
         // Not `any`, which would stop early and so compare one by one.
-        if bins
-            .iter()
-            .fold(false, |found, &bin| found | (bin == wanted))
-        {
+        if bins.iter().fold(false, |found, &bin| found | (bin == wanted)) {
             let members = bins.iter().zip(values);
-            taken.extend(
-                members
-                    .filter(|(bin, _)| **bin == wanted)
-                    .map(|(_, value)| value),
-            );
+            taken.extend(members.filter(|(bin, _)| **bin == wanted).map(|(_, value)| value));
         }
     }
 }

@@ -14,10 +14,7 @@ pub(super) const ENTRY: Entry = Entry {
     about: "1 − mutual information normalised by the larger entropy",
     sees: "grey value",
     explains: ExplanationKind::JointHistogram,
-    similarity: Some(Similarity {
-        name: "NMI",
-        formula: "I(Q,S) / max(H(Q), H(S))",
-    }),
+    similarity: Some(Similarity { name: "NMI", formula: "I(Q,S) / max(H(Q), H(S))" }),
     params: || Box::new(MutualInformationParams::default()),
 };
 
@@ -38,11 +35,7 @@ parameters! {
 
 impl Default for MutualInformationParams {
     fn default() -> Self {
-        Self {
-            sigma_px: 1.5,
-            bins: 16,
-            search: SearchRule::Grid,
-        }
+        Self { sigma_px: 1.5, bins: 16, search: SearchRule::Grid }
     }
 }
 
@@ -61,9 +54,7 @@ pub struct MutualInformation {
 impl MutualInformation {
     /// The cost with these parameters.
     pub fn new(params: &MutualInformationParams) -> Self {
-        Self {
-            params: params.clone(),
-        }
+        Self { params: params.clone() }
     }
 }
 
@@ -86,10 +77,7 @@ impl Cost for MutualInformation {
 
     fn tallying(&self) -> Option<Tallying> {
         let bins = self.params.bins;
-        Some(Tallying::Counts {
-            bins,
-            cost: distance,
-        })
+        Some(Tallying::Counts { bins, cost: distance })
     }
 
     fn descended(&self) -> Option<SmoothCost> {
@@ -114,10 +102,7 @@ mod tests {
     use super::*;
 
     fn pairs(values: impl IntoIterator<Item = (f32, f32)>) -> Vec<IntensityPair> {
-        values
-            .into_iter()
-            .map(|(query, synthetic)| IntensityPair { query, synthetic })
-            .collect()
+        values.into_iter().map(|(query, synthetic)| IntensityPair { query, synthetic }).collect()
     }
 
     fn cost(values: &[IntensityPair]) -> Option<f64> {
@@ -139,10 +124,7 @@ mod tests {
         }));
         let histogram = JointHistogram::of(&pairs, 16);
         let pointwise = histogram.pointwise();
-        let sum: f64 = pairs
-            .iter()
-            .map(|pair| pointwise[histogram.cell(pair)])
-            .sum();
+        let sum: f64 = pairs.iter().map(|pair| pointwise[histogram.cell(pair)]).sum();
         let shared =
             histogram.query_entropy + histogram.synthetic_entropy - histogram.joint_entropy;
         assert!(shared > 0.5 && (sum / 500.0 - shared).abs() < 1e-9);

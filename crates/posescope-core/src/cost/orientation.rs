@@ -23,10 +23,7 @@ pub(super) const ENTRY: Entry = Entry {
     about: "normalised information distance of gradient orientations",
     sees: "orientation",
     explains: ExplanationKind::JointHistogram,
-    similarity: Some(Similarity {
-        name: "shared information",
-        formula: "I(Q,S) / H(Q,S)",
-    }),
+    similarity: Some(Similarity { name: "shared information", formula: "I(Q,S) / H(Q,S)" }),
     params: || Box::new(OrientationParams::default()),
 };
 
@@ -46,11 +43,7 @@ parameters! {
 
 impl Default for OrientationParams {
     fn default() -> Self {
-        Self {
-            sigma_px: 1.5,
-            bins: 9,
-            least_gradient: 2.0,
-        }
+        Self { sigma_px: 1.5, bins: 9, least_gradient: 2.0 }
     }
 }
 
@@ -69,9 +62,7 @@ pub struct Orientation {
 impl Orientation {
     /// The cost with these parameters.
     pub fn new(params: &OrientationParams) -> Self {
-        Self {
-            params: params.clone(),
-        }
+        Self { params: params.clone() }
     }
 
     /// The orientation of the smoothed photo's gradient as a value 0 … 255: flat places fall into the
@@ -132,10 +123,7 @@ impl Cost for Orientation {
 
     fn tallying(&self) -> Option<Tallying> {
         let bins = self.params.bins;
-        Some(Tallying::Counts {
-            bins,
-            cost: distance,
-        })
+        Some(Tallying::Counts { bins, cost: distance })
     }
 
     fn explain(&self, pairs: &[IntensityPair]) -> Option<Explanation> {
@@ -195,10 +183,7 @@ mod tests {
         let channel = cost.channel(&flat);
         let pairs: Vec<_> = channel
             .pixels()
-            .map(|pixel| IntensityPair {
-                query: pixel.0[0],
-                synthetic: pixel.0[0],
-            })
+            .map(|pixel| IntensityPair { query: pixel.0[0], synthetic: pixel.0[0] })
             .collect();
         assert!(pairs.iter().all(|pair| pair.query < 256.0 / 9.0));
         assert_eq!(cost.evaluate(&pairs), None);

@@ -38,11 +38,7 @@ parameters! {
 
 impl Default for PhotometricParams {
     fn default() -> Self {
-        Self {
-            sigma_px: 1.5,
-            power: 1,
-            search: SearchRule::Grid,
-        }
+        Self { sigma_px: 1.5, power: 1, search: SearchRule::Grid }
     }
 }
 
@@ -72,9 +68,7 @@ pub struct PhotometricWeights {
 impl Photometric {
     /// The cost with these parameters.
     pub fn new(params: &PhotometricParams) -> Self {
-        Self {
-            params: params.clone(),
-        }
+        Self { params: params.clone() }
     }
 }
 
@@ -94,11 +88,7 @@ impl Photometric {
             for ((&error, sum), counted) in some.iter().zip(&mut sums).zip(&mut counted) {
                 let counts = error <= threshold;
                 let error = f64::from(if counts { error } else { 0.0 });
-                *sum += if squared_again {
-                    error * error
-                } else {
-                    LesserHalf::rounded(error)
-                };
+                *sum += if squared_again { error * error } else { LesserHalf::rounded(error) };
                 // A view has no 2³² pixels; a check would keep the eight from being added at once.
                 *counted = counted.wrapping_add(u32::from(counts));
             }
@@ -125,10 +115,7 @@ impl Cost for Photometric {
     }
 
     fn evaluate(&self, pairs: &[IntensityPair]) -> Option<f64> {
-        let errors: Vec<f32> = pairs
-            .iter()
-            .map(IntensityPair::squared_difference)
-            .collect();
+        let errors: Vec<f32> = pairs.iter().map(IntensityPair::squared_difference).collect();
         let threshold = median(&mut errors.clone())?;
         Some(self.mean_up_to(threshold, &errors))
     }
@@ -165,18 +152,12 @@ impl Cost for Photometric {
     }
 
     fn explain(&self, pairs: &[IntensityPair]) -> Option<Explanation> {
-        let mut errors: Vec<f32> = pairs
-            .iter()
-            .map(IntensityPair::squared_difference)
-            .collect();
+        let mut errors: Vec<f32> = pairs.iter().map(IntensityPair::squared_difference).collect();
         let threshold = median(&mut errors)?;
         Some(Explanation::Weights(PhotometricWeights {
             power: self.params.power,
             threshold,
-            counted: pairs
-                .iter()
-                .map(|pair| pair.squared_difference() <= threshold)
-                .collect(),
+            counted: pairs.iter().map(|pair| pair.squared_difference() <= threshold).collect(),
         }))
     }
 }
@@ -186,13 +167,7 @@ mod tests {
     use super::*;
 
     fn with_differences(differences: &[f32]) -> Vec<IntensityPair> {
-        differences
-            .iter()
-            .map(|&d| IntensityPair {
-                query: 100.0 + d,
-                synthetic: 100.0,
-            })
-            .collect()
+        differences.iter().map(|&d| IntensityPair { query: 100.0 + d, synthetic: 100.0 }).collect()
     }
 
     #[test]
@@ -211,10 +186,7 @@ mod tests {
     #[test]
     fn the_literal_formula_squares_once_more() {
         let pairs = with_differences(&[1.0, 2.0, 3.0]);
-        let cost = Photometric::new(&PhotometricParams {
-            power: 2,
-            ..Default::default()
-        });
+        let cost = Photometric::new(&PhotometricParams { power: 2, ..Default::default() });
         assert_eq!(cost.evaluate(&pairs), Some((1.0 + 16.0) / 2.0));
     }
 

@@ -37,11 +37,7 @@ impl Fallen {
         let (t2, t3) = (t * t, t * t * t);
         let rest = 1.0 - t;
         // Beyond both ends nothing changes any more.
-        let per_value = if (0.0..=255.0).contains(&value) {
-            per_value
-        } else {
-            0.0
-        };
+        let per_value = if (0.0..=255.0).contains(&value) { per_value } else { 0.0 };
         Self {
             first: whole as usize - 1,
             weights: [
@@ -50,13 +46,8 @@ impl Fallen {
                 (-3.0 * t3 + 3.0 * t2 + 3.0 * t + 1.0) / 6.0,
                 t3 / 6.0,
             ],
-            slopes: [
-                -0.5 * rest * rest,
-                1.5 * t2 - 2.0 * t,
-                -1.5 * t2 + t + 0.5,
-                0.5 * t2,
-            ]
-            .map(|slope| slope * per_value),
+            slopes: [-0.5 * rest * rest, 1.5 * t2 - 2.0 * t, -1.5 * t2 + t + 0.5, 0.5 * t2]
+                .map(|slope| slope * per_value),
         }
     }
 }
@@ -80,11 +71,7 @@ impl<'a> Distance<'a> {
     pub(super) fn new(view: &'a View<'a>, bins: usize) -> Self {
         let bins = bins + 3;
         let values = view.values().iter();
-        Self {
-            view,
-            bins,
-            fallen: values.map(|&value| Fallen::new(value, bins)).collect(),
-        }
+        Self { view, bins, fallen: values.map(|&value| Fallen::new(value, bins)).collect() }
     }
 
     fn histogram(&self, x: &[f64]) -> Option<Histogram> {
@@ -114,13 +101,7 @@ impl<'a> Distance<'a> {
             query[cell / self.bins] += value;
             synthetic[cell % self.bins] += value;
         }
-        Some(Histogram {
-            seen,
-            points: points as f64,
-            joint,
-            query,
-            synthetic,
-        })
+        Some(Histogram { seen, points: points as f64, joint, query, synthetic })
     }
 }
 
@@ -136,11 +117,7 @@ impl CostFunction for Distance<'_> {
         };
         let both = entropy(&histogram.joint);
         let single = entropy(&histogram.query) + entropy(&histogram.synthetic);
-        Ok(if both > 1e-9 {
-            2.0 - single / both
-        } else {
-            1.0
-        })
+        Ok(if both > 1e-9 { 2.0 - single / both } else { 1.0 })
     }
 }
 
@@ -160,11 +137,7 @@ impl Gradient for Distance<'_> {
         }
         let single = entropy(&histogram.query) + entropy(&histogram.synthetic);
         let ln = |share: f64| if share > 0.0 { share.ln() } else { 0.0 };
-        let by_query: Vec<f64> = histogram
-            .query
-            .iter()
-            .map(|&share| ln(share) / both)
-            .collect();
+        let by_query: Vec<f64> = histogram.query.iter().map(|&share| ln(share) / both).collect();
         let by_joint = single / (both * both);
         for (seen, own) in histogram.seen.iter().zip(&self.fallen) {
             let Some((query, slope)) = seen else { continue };
@@ -209,10 +182,7 @@ pub fn descend<E>(
         let state = stepper.state();
         let cost = state.cost();
         if state.param().iter().all(|x| x.is_finite()) {
-            tell(Step {
-                camera_from_reference: view.camera_after(state.param()),
-                cost,
-            })?;
+            tell(Step { camera_from_reference: view.camera_after(state.param()), cost })?;
         }
         if matches!(outcome, StepOutcome::Stopped(_)) || before - cost < LEAST_CHANGE {
             return Ok(());

@@ -24,15 +24,9 @@ impl Motion {
         let cross = vector.cross_matrix();
         // Below that the series is exact to the last digit.
         let (a, b) = if angle < 1e-4 {
-            (
-                0.5 - angle * angle / 24.0,
-                1.0 / 6.0 - angle * angle / 120.0,
-            )
+            (0.5 - angle * angle / 24.0, 1.0 / 6.0 - angle * angle / 120.0)
         } else {
-            (
-                (1.0 - angle.cos()) / (angle * angle),
-                (angle - angle.sin()) / (angle * angle * angle),
-            )
+            ((1.0 - angle.cos()) / (angle * angle), (angle - angle.sin()) / (angle * angle * angle))
         };
         Self {
             rotation: *Rotation3::new(vector).matrix(),

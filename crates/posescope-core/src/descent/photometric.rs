@@ -40,10 +40,7 @@ impl<'a> Differences<'a> {
         let median = sizes.get(sizes.len() / 2).copied().unwrap_or(0.0);
         // Of equal photos nothing differs; a grey value is what a photo resolves.
         let deviation = (TO_DEVIATION * median).max(1.0);
-        let differences = Self {
-            view,
-            out_of_view: deviation,
-        };
+        let differences = Self { view, out_of_view: deviation };
         (differences, deviation)
     }
 }
@@ -57,8 +54,7 @@ impl Residual for Differences<'_> {
         let seen = self.view.seen(x);
         let pairs = seen.iter().zip(self.view.values());
         let difference = |(seen, value): (&Option<(f64, _)>, &f64)| {
-            seen.as_ref()
-                .map_or(self.out_of_view, |(own, _)| own - value)
+            seen.as_ref().map_or(self.out_of_view, |(own, _)| own - value)
         };
         Ok(pairs.map(difference).collect())
     }
@@ -69,10 +65,8 @@ impl Jacobian for Differences<'_> {
 
     fn jacobian(&self, x: &Vec<f64>) -> Result<DenseMatrix, Infallible> {
         let seen = self.view.seen(x);
-        let slopes: Vec<f64> = seen
-            .iter()
-            .flat_map(|seen| seen.map_or([0.0; 6], |(_, slope)| slope))
-            .collect();
+        let slopes: Vec<f64> =
+            seen.iter().flat_map(|seen| seen.map_or([0.0; 6], |(_, slope)| slope)).collect();
         Ok(DenseMatrix::from_row_slice(seen.len(), 6, &slopes))
     }
 }
@@ -91,9 +85,8 @@ pub fn descend<E>(
     let solver = LevenbergMarquardt::<Vec<f64>, DenseMatrix>::new()
         .with_relative_model_reduction_tolerance(LEAST_REDUCTION);
     let start = PointState::new(vec![0.0; 6]);
-    let Ok(mut stepper) = Executor::new(objective, solver, start)
-        .max_iter(most_steps as u64)
-        .into_stepper();
+    let Ok(mut stepper) =
+        Executor::new(objective, solver, start).max_iter(most_steps as u64).into_stepper();
     loop {
         let Ok(outcome) = stepper.step();
         let state = stepper.state();

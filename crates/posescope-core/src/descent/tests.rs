@@ -10,14 +10,8 @@ use super::*;
 use crate::camera::Intrinsics;
 use crate::image::FloatImage;
 
-const CAMERA: Intrinsics = Intrinsics {
-    fx: 90.0,
-    fy: 90.0,
-    cx: 59.5,
-    cy: 39.5,
-    width: 120,
-    height: 80,
-};
+const CAMERA: Intrinsics =
+    Intrinsics { fx: 90.0, fy: 90.0, cx: 59.5, cy: 39.5, width: 120, height: 80 };
 
 /// Waves on a wall that is slanted to the left.
 fn brightness(point: &Point3<f64>) -> f64 {
@@ -31,10 +25,8 @@ fn brightness(point: &Point3<f64>) -> f64 {
 /// Where a pixel's ray meets the wall.
 fn met(camera_from_world: &Pose, pixel: Point2<f64>) -> Point3<f64> {
     let pose = camera_from_world.inverse();
-    let (centre, ray) = (
-        pose.translation.vector,
-        pose.rotation * CAMERA.unproject(&pixel, 1.0).coords,
-    );
+    let (centre, ray) =
+        (pose.translation.vector, pose.rotation * CAMERA.unproject(&pixel, 1.0).coords);
     // x + 4 z = 40.
     let along = (40.0 - centre.x - 4.0 * centre.z) / (ray.x + 4.0 * ray.z);
     Point3::from(centre + ray * along)
@@ -48,19 +40,14 @@ fn photo(camera_from_world: &Pose) -> FloatImage {
 }
 
 fn cloud() -> Vec<Point3<f32>> {
-    let pixels = (4..76)
-        .step_by(3)
-        .flat_map(|y| (4..116).step_by(3).map(move |x| (x, y)));
+    let pixels = (4..76).step_by(3).flat_map(|y| (4..116).step_by(3).map(move |x| (x, y)));
     pixels
         .map(|(x, y)| met(&Pose::identity(), Point2::new(f64::from(x), f64::from(y))).cast())
         .collect()
 }
 
 fn truth() -> Pose {
-    Pose::new(
-        Vector3::new(0.25, -0.1, -0.3),
-        Vector3::new(0.01, -0.02, 0.008),
-    )
+    Pose::new(Vector3::new(0.25, -0.1, -0.3), Vector3::new(0.01, -0.02, 0.008))
 }
 
 const AT: [f64; 6] = [0.05, -0.02, 0.1, 0.06, 0.04, -0.03];
@@ -88,12 +75,7 @@ fn the_slope_of_an_image_is_that_of_its_differences() {
 #[test]
 fn the_derivatives_of_the_differences_are_those_of_finite_differences() {
     let (reference, query) = (photo(&Pose::identity()), photo(&truth()));
-    let view = View::new(
-        (&query, &CAMERA),
-        (&reference, &CAMERA),
-        &cloud(),
-        &Pose::identity(),
-    );
+    let view = View::new((&query, &CAMERA), (&reference, &CAMERA), &cloud(), &Pose::identity());
     let (differences, _) = Differences::new(&view);
     let jacobian = differences.jacobian(&AT.to_vec()).expect("cannot fail");
     let step = 1e-5;
@@ -121,16 +103,9 @@ fn the_derivatives_of_the_differences_are_those_of_finite_differences() {
 fn the_gradient_of_the_distance_is_that_of_finite_differences() {
     let (reference, query) = (photo(&Pose::identity()), photo(&truth()));
     // The middle of the wall stays in view: what leaves it makes steps.
-    let middle: Vec<_> = cloud()
-        .into_iter()
-        .filter(|p| p.x.abs() < 4.0 && p.y.abs() < 2.5)
-        .collect();
-    let view = View::new(
-        (&query, &CAMERA),
-        (&reference, &CAMERA),
-        &middle,
-        &Pose::identity(),
-    );
+    let middle: Vec<_> =
+        cloud().into_iter().filter(|p| p.x.abs() < 4.0 && p.y.abs() < 2.5).collect();
+    let view = View::new((&query, &CAMERA), (&reference, &CAMERA), &middle, &Pose::identity());
     let distance = Distance::new(&view, 16);
     let gradient = distance.gradient(&AT.to_vec()).expect("cannot fail");
     let step = 1e-5;
@@ -138,10 +113,7 @@ fn the_gradient_of_the_distance_is_that_of_finite_differences() {
         let [more, less] =
             [step, -step].map(|by| distance.cost(&stepped(i, by)).expect("cannot fail"));
         let slope = (more - less) / (2.0 * step);
-        assert!(
-            (slope - said).abs() < 1e-5 + 1e-3 * slope.abs(),
-            "{i}: {slope} {said}"
-        );
+        assert!((slope - said).abs() < 1e-5 + 1e-3 * slope.abs(), "{i}: {slope} {said}");
     }
     assert!(gradient.iter().any(|slope| slope.abs() > 0.01));
 }
@@ -149,12 +121,7 @@ fn the_gradient_of_the_distance_is_that_of_finite_differences() {
 /// Where a descent from the reference ends, and its steps.
 fn ended(descend: impl Fn(&View<'_>, &mut dyn FnMut(Step))) -> (Pose, Vec<f64>) {
     let (reference, query) = (photo(&Pose::identity()), photo(&truth()));
-    let view = View::new(
-        (&query, &CAMERA),
-        (&reference, &CAMERA),
-        &cloud(),
-        &Pose::identity(),
-    );
+    let view = View::new((&query, &CAMERA), (&reference, &CAMERA), &cloud(), &Pose::identity());
     let (mut end, mut costs) = (Pose::identity(), Vec::new());
     descend(&view, &mut |step| {
         end = step.camera_from_reference;
@@ -181,10 +148,7 @@ fn both_go_down_to_the_truth_from_near_by() {
         let off = (end * truth().inverse()).translation.vector.norm();
         assert!(off < within_m, "{off} m off after {} steps", costs.len());
         assert!(costs.len() > 2);
-        assert!(
-            costs.windows(2).all(|pair| pair[1] <= pair[0] + 1e-12),
-            "{costs:?}"
-        );
+        assert!(costs.windows(2).all(|pair| pair[1] <= pair[0] + 1e-12), "{costs:?}");
     }
 }
 

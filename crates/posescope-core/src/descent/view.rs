@@ -100,9 +100,7 @@ pub(super) fn sampled(image: &FloatImage, x: f64, y: f64) -> Option<(f64, [f64; 
         let samples: &[f32] = &samples[at..at + 4];
         let along = |weights: &[f64; 4]| -> f64 {
             let terms = weights.iter().zip(samples);
-            terms
-                .map(|(weight, &sample)| weight * f64::from(sample))
-                .sum()
+            terms.map(|(weight, &sample)| weight * f64::from(sample)).sum()
         };
         let (here, slope) = (along(&columns), along(&column_slopes));
         value += rows[row] * here;
@@ -121,11 +119,7 @@ fn catmull_rom(t: f64) -> ([f64; 4], [f64; 4]) {
         0.5 * t + 2.0 * t2 - 1.5 * t3,
         -0.5 * t2 + 0.5 * t3,
     ];
-    let slopes = [
-        -0.5 + 2.0 * t - 1.5 * t2,
-        -5.0 * t + 4.5 * t2,
-        0.5 + 4.0 * t - 4.5 * t2,
-        -t + 1.5 * t2,
-    ];
+    let slopes =
+        [-0.5 + 2.0 * t - 1.5 * t2, -5.0 * t + 4.5 * t2, 0.5 + 4.0 * t - 4.5 * t2, -t + 1.5 * t2];
     (weights, slopes)
 }

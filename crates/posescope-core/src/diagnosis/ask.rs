@@ -64,10 +64,7 @@ impl Ask<'_> {
 
     /// One more round of a search on a grid.
     pub(super) fn rounds(&self) -> Change {
-        Change::Set(format!(
-            "grid.rounds={}",
-            (self.params.grid.rounds + 1).min(10)
-        ))
+        Change::Set(format!("grid.rounds={}", (self.params.grid.rounds + 1).min(10)))
     }
 
     /// A longer search of the method's kind; `None` for methods without a search.
@@ -95,10 +92,7 @@ impl Ask<'_> {
 
     /// Larger splats.
     pub(super) fn wider_splat(&self) -> Change {
-        Change::Set(format!(
-            "render.splat_px={}",
-            self.params.render.splat_px + 2
-        ))
+        Change::Set(format!("render.splat_px={}", self.params.render.splat_px + 2))
     }
 
     /// A looser or stricter ratio test.

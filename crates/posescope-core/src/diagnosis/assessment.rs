@@ -116,11 +116,7 @@ mod tests {
     fn the_tolerance_decides_and_an_error_that_is_no_number_is_wrong() {
         let right = Tolerance::default();
         let grade = |translation_m, rotation_deg| {
-            let error = PoseError {
-                translation_m,
-                rotation_deg,
-                max_euler_deg: rotation_deg,
-            };
+            let error = PoseError { translation_m, rotation_deg, max_euler_deg: rotation_deg };
             Grade::of(true, Some(&error), right)
         };
         assert_eq!(grade(1.0, 5.0), Grade::Right);

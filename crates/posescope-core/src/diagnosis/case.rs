@@ -137,10 +137,7 @@ pub struct Member<'a> {
 
 /// The member of most weight, of equals the first.
 pub(super) fn heaviest<'m, 'a>(members: &'m [Member<'a>]) -> Option<&'m Member<'a>> {
-    members
-        .iter()
-        .rev()
-        .max_by(|a, b| a.share.weight.total_cmp(&b.share.weight))
+    members.iter().rev().max_by(|a, b| a.share.weight.total_cmp(&b.share.weight))
 }
 
 /// A fused pose, and what each reference gave.

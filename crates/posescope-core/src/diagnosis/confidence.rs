@@ -220,10 +220,7 @@ pub fn accepted(subject: &Subject<'_>, asked: Option<f64>) -> Outcome {
     let needed = asked.unwrap_or(0.0).max(of_method);
     match subject.confidence.as_ref().map(|one| one.probability) {
         Some(probability) if probability < needed => Outcome {
-            pose: Err(Failure::LowConfidence {
-                probability,
-                needed,
-            }),
+            pose: Err(Failure::LowConfidence { probability, needed }),
             ..subject.outcome.clone()
         },
         _ => subject.outcome.clone(),
@@ -309,9 +306,7 @@ fn surface(evidence: &Evidence, phase: Phase) -> Option<&ScoredLattice> {
 }
 
 fn eligible_costs(surface: &ScoredLattice) -> Vec<f64> {
-    (0..surface.scores.len())
-        .filter_map(|cell| surface.eligible_cost(cell))
-        .collect()
+    (0..surface.scores.len()).filter_map(|cell| surface.eligible_cost(cell)).collect()
 }
 
 /// The median, and the standard deviation that a normal distribution of the same median absolute

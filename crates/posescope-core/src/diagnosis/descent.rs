@@ -23,10 +23,7 @@ pub(super) fn compass_search<const N: usize>(
 ) -> Option<Descended<N>> {
     /// A valley that is longer than this many steps is not followed to its end.
     const MOST_STEPS: usize = 24;
-    let mut best = Descended {
-        at: start,
-        cost: costs(&[start]).first().copied()??,
-    };
+    let mut best = Descended { at: start, cost: costs(&[start]).first().copied()?? };
     for _ in 0..=halvings {
         // The way back leads to what was dearer.
         let mut back = None;

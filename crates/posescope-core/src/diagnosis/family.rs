@@ -20,13 +20,7 @@ pub enum Family {
 
 impl Family {
     /// Every family.
-    pub const ALL: &[Self] = &[
-        Self::Features,
-        Self::Guided,
-        Self::Grid,
-        Self::Starts,
-        Self::Given,
-    ];
+    pub const ALL: &[Self] = &[Self::Features, Self::Guided, Self::Grid, Self::Starts, Self::Given];
     /// Those that match features.
     pub const MATCHING: &[Self] = &[Self::Features, Self::Guided];
     /// Those that search a cost.

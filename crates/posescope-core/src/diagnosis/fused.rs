@@ -27,13 +27,7 @@ pub fn diagnose_fusion(
     };
     let mut found = Vec::new();
     if let (false, Some(truth)) = (is_right, truth) {
-        let case = FusionCase {
-            pose,
-            members,
-            truth,
-            tolerance,
-            is_joint,
-        };
+        let case = FusionCase { pose, members, truth, tolerance, is_joint };
         found.extend(RULES.iter().filter_map(|rule| match rule.test {
             Test::Fusion(test) => test(&case),
             _ => None,
@@ -67,15 +61,9 @@ pub fn fused_confidence(pose: &Pose, members: &[Member<'_>]) -> Option<PoseConfi
             return member.share.support.map(|_| 0.0);
         };
         let apart = PoseError::between(pose, own).translation_m;
-        Some(if apart <= WITHIN_M {
-            member.share.weight * confidence.probability
-        } else {
-            0.0
-        })
+        Some(if apart <= WITHIN_M { member.share.weight * confidence.probability } else { 0.0 })
     };
-    let kept = members
-        .iter()
-        .filter(|member| member.share.outcome == ShareOutcome::Kept);
+    let kept = members.iter().filter(|member| member.share.outcome == ShareOutcome::Kept);
     let probability = kept.map(supports).sum::<Option<f64>>()?;
     Some(PoseConfidence::new(probability))
 }
@@ -87,11 +75,7 @@ pub fn diagnose_ranking(
     truth: &Pose,
     radius_m: f64,
 ) -> Option<Diagnosis> {
-    let case = RankingCase {
-        ranking,
-        truth,
-        radius_m,
-    };
+    let case = RankingCase { ranking, truth, radius_m };
     RULES.iter().find_map(|rule| match rule.test {
         Test::Ranking(test) => test(&case),
         _ => None,

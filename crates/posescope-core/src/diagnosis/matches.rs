@@ -149,12 +149,8 @@ impl TrueMatches {
             all_unique,
             reference_keypoints: reference.keypoints.len(),
         };
-        let epipolar = Epipolar::new(
-            &truth,
-            camera,
-            &subject.problem.reference.intrinsics,
-            threshold_px,
-        );
+        let epipolar =
+            Epipolar::new(&truth, camera, &subject.problem.reference.intrinsics, threshold_px);
         let refined = evidence.refined.as_ref();
         let query_from_reference_found = refined.map(|found| found.reference_from_query.inverse());
         let all_lifted = evidence.lifted.as_deref().unwrap_or_default();
@@ -180,9 +176,7 @@ impl TrueMatches {
                 .as_ref()
                 .and_then(|pose| camera.project(&(pose * point)));
             let is_inlier = at_result.is_some_and(|seen| (seen - pixel).norm() <= inlier_px);
-            matches
-                .correspondences
-                .push(Correspondence { pixel, point });
+            matches.correspondences.push(Correspondence { pixel, point });
             matches.is_true.push(is_true);
             matches.is_inlier.push(is_inlier);
             matches.wrong_depth += usize::from(on_line && !is_true && !is_inlier);
@@ -199,8 +193,7 @@ impl TrueMatches {
     /// The correspondences that the truth explains.
     pub(super) fn true_ones(&self) -> Vec<usize> {
         let all = self.is_true.iter().enumerate();
-        all.filter_map(|(at, is_true)| is_true.then_some(at))
-            .collect()
+        all.filter_map(|(at, is_true)| is_true.then_some(at)).collect()
     }
 
     /// Whether so many unique matches lie on their epipolar lines without the right depth that they cannot
@@ -240,10 +233,7 @@ impl TrueMatches {
 
     /// Inliers of the estimate.
     pub(super) fn inliers(&self) -> usize {
-        self.is_inlier
-            .iter()
-            .filter(|is_inlier| **is_inlier)
-            .count()
+        self.is_inlier.iter().filter(|is_inlier| **is_inlier).count()
     }
 }
 
@@ -346,10 +336,7 @@ mod tests {
     /// Of 200 reference keypoints this many have a depth; 40 true matches have none.
     fn lost(with_depth: usize) -> usize {
         let matches = TrueMatches {
-            funnel: Funnel {
-                with_depth,
-                ..Funnel::default()
-            },
+            funnel: Funnel { with_depth, ..Funnel::default() },
             correspondences: Vec::new(),
             is_true: Vec::new(),
             is_inlier: Vec::new(),

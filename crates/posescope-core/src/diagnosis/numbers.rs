@@ -3,10 +3,7 @@
 /// Two numbers to compare: three significant digits, and more where those are equal and the numbers are not.
 pub(super) fn pair(a: f64, b: f64) -> (String, String) {
     let texts = |digits| (with_digits(a, digits), with_digits(b, digits));
-    (3..=6)
-        .map(texts)
-        .find(|(a, b)| a != b)
-        .unwrap_or_else(|| texts(3))
+    (3..=6).map(texts).find(|(a, b)| a != b).unwrap_or_else(|| texts(3))
 }
 
 /// A distance with two decimals below 10 m and one above.
@@ -43,10 +40,7 @@ mod tests {
     #[test]
     fn numbers_have_three_digits_and_more_where_those_are_equal() {
         let digits = |value| with_digits(value, 3);
-        assert_eq!(
-            [0.91456, 7.2148, 32.06, 1234.5].map(digits),
-            ["0.915", "7.21", "32.1", "1234"]
-        );
+        assert_eq!([0.91456, 7.2148, 32.06, 1234.5].map(digits), ["0.915", "7.21", "32.1", "1234"]);
         assert_eq!([0.0, 0.000123].map(digits), ["0", "0.000123"]);
         let texts = |a, b| {
             let (a, b) = pair(a, b);
@@ -61,9 +55,7 @@ mod tests {
     fn ranks_are_written_as_people_say_them() {
         assert_eq!(
             [1, 2, 3, 4, 11, 12, 13, 21, 112].map(ordinal),
-            [
-                "1st", "2nd", "3rd", "4th", "11th", "12th", "13th", "21st", "112th"
-            ]
+            ["1st", "2nd", "3rd", "4th", "11th", "12th", "13th", "21st", "112th"]
         );
     }
 }

@@ -30,11 +30,7 @@ pub fn remedies(
     };
     let mut tried = match Family::of(responsible).filter(is_of) {
         None | Some(Family::Given) => Vec::new(),
-        Some(family) => (rule.remedies)(&Ask {
-            family,
-            params,
-            radius_m,
-        }),
+        Some(family) => (rule.remedies)(&Ask { family, params, radius_m }),
     };
     // Whatever it is, another method or another reference may do better; a search from many starts first.
     let others = [Method::named("mi6")].into_iter().chain(Method::PAPER);
@@ -103,10 +99,7 @@ mod tests {
                     );
                     // A search from many starts has one round and yaws of its own.
                     let is_grid_alone = ["grid.rounds", "grid.yaw_range"].contains(&key);
-                    assert!(
-                        !is_grid_alone || family == Family::Grid,
-                        "{method}: {assignment}"
-                    );
+                    assert!(!is_grid_alone || family == Family::Grid, "{method}: {assignment}");
                 }
             }
         }

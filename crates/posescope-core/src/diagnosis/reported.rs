@@ -30,10 +30,6 @@ impl Code {
 impl Diagnosis {
     /// What an estimator that has no pose reports.
     pub fn of_failure(failure: &Failure) -> Self {
-        Self {
-            code: Code::of(failure),
-            text: failure.to_string(),
-            evidence: serde_json::json!({}),
-        }
+        Self { code: Code::of(failure), text: failure.to_string(), evidence: serde_json::json!({}) }
     }
 }

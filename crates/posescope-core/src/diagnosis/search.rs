@@ -110,11 +110,8 @@ impl Search<'_, '_> {
         is_given: bool,
         work: impl FnOnce(Option<&Search<'_, '_>>) -> T,
     ) -> T {
-        let responsible = if is_given {
-            JUDGE
-        } else {
-            confidence::responsible(subject.method, subject.outcome)
-        };
+        let responsible =
+            if is_given { JUDGE } else { confidence::responsible(subject.method, subject.outcome) };
         let entry = estimator::find(responsible);
         let cost = entry.and_then(|entry| entry.cost());
         let measure = cost.and_then(|cost| Some(subject.params.costs.of(cost)?.cost()));
@@ -125,34 +122,32 @@ impl Search<'_, '_> {
         };
         let mut work = Some(work);
         let mut done = None;
-        entry
-            .make(subject.params)
-            .with_scorer(subject.problem, &mut |scorer| {
-                let Some(work) = work.take() else { return };
-                let ended = if is_given {
-                    ended_as_given(subject, scorer, measure.as_ref())
-                } else {
-                    ended(subject)
-                };
-                done = Some(match ended {
-                    None => work(None),
-                    Some(ended) => work(Some(&Search {
-                        subject,
-                        scorer,
-                        grid: &subject.params.grid,
-                        truth,
-                        result: ended.offset,
-                        result_cost: ended.cost,
-                        shuffled_cost: ended.shuffled,
-                        least_covered: ended.least_covered,
-                        judge: is_given.then_some(JUDGE),
-                        measure: measure.as_ref(),
-                        near_truth: OnceLock::new(),
-                        rivals: OnceLock::new(),
-                        against_chance: Mutex::default(),
-                    })),
-                });
+        entry.make(subject.params).with_scorer(subject.problem, &mut |scorer| {
+            let Some(work) = work.take() else { return };
+            let ended = if is_given {
+                ended_as_given(subject, scorer, measure.as_ref())
+            } else {
+                ended(subject)
+            };
+            done = Some(match ended {
+                None => work(None),
+                Some(ended) => work(Some(&Search {
+                    subject,
+                    scorer,
+                    grid: &subject.params.grid,
+                    truth,
+                    result: ended.offset,
+                    result_cost: ended.cost,
+                    shuffled_cost: ended.shuffled,
+                    least_covered: ended.least_covered,
+                    judge: is_given.then_some(JUDGE),
+                    measure: measure.as_ref(),
+                    near_truth: OnceLock::new(),
+                    rivals: OnceLock::new(),
+                    against_chance: Mutex::default(),
+                })),
             });
+        });
         match (done, work) {
             (Some(done), _) => done,
             (None, Some(work)) => work(None),
@@ -171,10 +166,7 @@ impl Search<'_, '_> {
             let elsewhere = is_lower.then(|| self.lower_elsewhere(near.cost)).flatten();
             let is_changed = self.is_changed(&near);
             let can_win = self.can_be_right(&near.offset) && !is_changed;
-            let winner = elsewhere.unwrap_or(Place {
-                offset: self.result,
-                cost: result_cost,
-            });
+            let winner = elsewhere.unwrap_or(Place { offset: self.result, cost: result_cost });
             Some(Rivals {
                 near,
                 winner,
@@ -187,9 +179,7 @@ impl Search<'_, '_> {
 
     fn eligible(&self, scores: Vec<Score>) -> Vec<Option<f64>> {
         let costs = scores.into_iter();
-        costs
-            .map(|score| score.eligible_cost(self.least_covered))
-            .collect()
+        costs.map(|score| score.eligible_cost(self.least_covered)).collect()
     }
 
     pub(super) fn truth_offset(&self) -> Offset {
@@ -260,10 +250,8 @@ impl Search<'_, '_> {
         let within_m = self.subject.tolerance.translation_m;
         let within_rad = self.subject.tolerance.rotation_deg.to_radians();
         let is_near = |offset: &Offset| {
-            let (right, forward) = (
-                offset.right_m - centre.right_m,
-                offset.forward_m - centre.forward_m,
-            );
+            let (right, forward) =
+                (offset.right_m - centre.right_m, offset.forward_m - centre.forward_m);
             right.hypot(forward) <= within_m
                 && (offset.yaw_rad - centre.yaw_rad).abs() <= within_rad
                 && self.is_reachable(offset)
@@ -282,17 +270,11 @@ impl Search<'_, '_> {
         let best = lattice
             .iter()
             .zip(costs)
-            .filter_map(|(offset, cost)| {
-                Some(Place {
-                    offset: *offset,
-                    cost: cost?,
-                })
-            })
+            .filter_map(|(offset, cost)| Some(Place { offset: *offset, cost: cost? }))
             .reduce(|best, next| if next.cost < best.cost { next } else { best });
         let best = best.map(|place| place.offset);
-        let starts: Vec<Offset> = std::iter::once(centre)
-            .chain(best.filter(|best| *best != centre))
-            .collect();
+        let starts: Vec<Offset> =
+            std::iter::once(centre).chain(best.filter(|best| *best != centre)).collect();
         self.lowest(&starts, &is_near)
     }
 
@@ -303,10 +285,8 @@ impl Search<'_, '_> {
         starts: &[Offset],
         is_allowed: &(dyn Fn(&Offset) -> bool + Sync),
     ) -> Option<Place> {
-        let minima: Vec<Option<Place>> = starts
-            .par_iter()
-            .map(|start| self.descended(*start, is_allowed))
-            .collect();
+        let minima: Vec<Option<Place>> =
+            starts.par_iter().map(|start| self.descended(*start, is_allowed)).collect();
         minima
             .into_iter()
             .flatten()
@@ -326,32 +306,16 @@ impl Search<'_, '_> {
     ) -> Option<Place> {
         const HALVINGS: usize = 2;
         let grid = self.grid;
-        let steps = [
-            grid.fine_step_m,
-            grid.fine_step_m,
-            (4.0 * grid.yaw_fine_step_deg).to_radians(),
-        ];
-        let offset = |at: &[f64; 3]| Offset {
-            right_m: at[0],
-            forward_m: at[1],
-            yaw_rad: at[2],
-        };
-        let Offset {
-            right_m,
-            forward_m,
-            yaw_rad,
-        } = start;
+        let steps =
+            [grid.fine_step_m, grid.fine_step_m, (4.0 * grid.yaw_fine_step_deg).to_radians()];
+        let offset = |at: &[f64; 3]| Offset { right_m: at[0], forward_m: at[1], yaw_rad: at[2] };
+        let Offset { right_m, forward_m, yaw_rad } = start;
         let found = compass_search([right_m, forward_m, yaw_rad], steps, HALVINGS, |places| {
             let offsets: Vec<Offset> = places.iter().map(offset).collect();
             let costs = self.costs(&offsets).into_iter().zip(&offsets);
-            costs
-                .map(|(cost, offset)| cost.filter(|_| is_allowed(offset)))
-                .collect()
+            costs.map(|(cost, offset)| cost.filter(|_| is_allowed(offset))).collect()
         })?;
-        Some(Place {
-            offset: offset(&found.at),
-            cost: found.cost,
-        })
+        Some(Place { offset: offset(&found.at), cost: found.cost })
     }
 
     /// A pose away from the truth that costs less than this: the minimum of the result's own basin, or,
@@ -459,17 +423,13 @@ impl Search<'_, '_> {
         let distance = |offset: &Offset| offset.right_m.hypot(offset.forward_m);
         let is_allowed = |offset: &Offset| distance(offset) <= reach_m + beyond_m;
         let minimum = self.descended(self.result, &is_allowed);
-        minimum
-            .zip(self.result_cost)
-            .is_some_and(|(minimum, cost)| {
-                let is_outside = distance(&minimum.offset)
-                    > self.subject.problem.uncertainty_radius_m
-                    || minimum.offset.yaw_rad.abs() > self.grid.yaw_range_deg.to_radians();
-                let against = self.against_chance(&minimum.offset);
-                let is_beyond =
-                    against.is_some_and(|against| against.deviations() >= BEYOND_CHANCE);
-                is_outside && minimum.cost < cost && is_beyond
-            })
+        minimum.zip(self.result_cost).is_some_and(|(minimum, cost)| {
+            let is_outside = distance(&minimum.offset) > self.subject.problem.uncertainty_radius_m
+                || minimum.offset.yaw_rad.abs() > self.grid.yaw_range_deg.to_radians();
+            let against = self.against_chance(&minimum.offset);
+            let is_beyond = against.is_some_and(|against| against.deviations() >= BEYOND_CHANCE);
+            is_outside && minimum.cost < cost && is_beyond
+        })
     }
 
     /// How far the truth is from the searched pose that is at its place, with its heading.
@@ -488,10 +448,7 @@ impl Search<'_, '_> {
                 self.eligible(self.scorer.score(&poses))
             })?;
             let error = PoseError::between(&self.truth, &moved(start, &found.at));
-            self.subject
-                .tolerance
-                .contains(&error)
-                .then_some(found.cost)
+            self.subject.tolerance.contains(&error).then_some(found.cost)
         };
         let starts = [self.truth, lifted_to(&near.offset, &self.truth)];
         let found: Vec<Option<f64>> = starts.par_iter().map(from).collect();

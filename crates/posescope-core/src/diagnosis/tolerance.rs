@@ -20,10 +20,7 @@ pub struct Tolerance {
 
 impl Default for Tolerance {
     fn default() -> Self {
-        Self {
-            translation_m: 1.0,
-            rotation_deg: 5.0,
-        }
+        Self { translation_m: 1.0, rotation_deg: 5.0 }
     }
 }
 
@@ -71,10 +68,7 @@ mod tests {
 
     #[test]
     fn a_tolerance_is_read_back_and_what_is_none_is_refused() {
-        let tolerance = Tolerance {
-            translation_m: 0.25,
-            rotation_deg: 2.0,
-        };
+        let tolerance = Tolerance { translation_m: 0.25, rotation_deg: 2.0 };
         assert_eq!(tolerance.to_string(), "0.25m,2deg");
         assert_eq!("0.25m, 2deg".parse(), Ok(tolerance));
         for text in ["1m", "1,5", "0m,5deg", "1m,-5deg", "nanm,5deg", ""] {

@@ -40,10 +40,7 @@ impl FoundConsensus {
                 counted: self.counted,
             })
         } else if self.slack.is_some_and(is_too_far) {
-            Err(Failure::OutsideRadius {
-                distance_m,
-                radius_m,
-            })
+            Err(Failure::OutsideRadius { distance_m, radius_m })
         } else {
             Ok(())
         };

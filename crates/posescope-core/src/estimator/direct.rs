@@ -67,19 +67,15 @@ impl Direct {
 
 impl Estimator for Direct {
     fn estimate(&self, problem: &Problem, trace: &mut Trace<'_>) -> Result<Outcome, Cancelled> {
-        let found = trace.stage(Stage::Estimator(self.method), |trace| {
-            match self.cost.descended() {
+        let found =
+            trace.stage(Stage::Estimator(self.method), |trace| match self.cost.descended() {
                 None => self.search(problem, trace),
                 Some(smooth) => self.descend(smooth, problem, trace),
-            }
-        });
+            });
         Ok(match separate_failure(found)? {
-            Ok((pose, cost)) => Outcome {
-                pose: Ok(pose),
-                counts: None,
-                cost: Some(cost),
-                fell_back: false,
-            },
+            Ok((pose, cost)) => {
+                Outcome { pose: Ok(pose), counts: None, cost: Some(cost), fell_back: false }
+            }
             Err(failure) => Outcome::failed(failure),
         })
     }
@@ -121,10 +117,7 @@ impl Direct {
         let initial = scorer.score(&[start.reference_from_camera()])[0];
         let mut search = Search {
             scorer: &scorer,
-            memory: Memory {
-                direct: self,
-                problem,
-            },
+            memory: Memory { direct: self, problem },
             covered_at_reference: initial.covered,
             least_covered: least_covered(self.grid.coverage_floor, initial.covered),
             evaluations: 1,
@@ -152,12 +145,7 @@ impl Direct {
         }
 
         trace.stage(Stage::Assess, |trace| {
-            let Search {
-                best,
-                best_score,
-                evaluations,
-                ..
-            } = search;
+            let Search { best, best_score, evaluations, .. } = search;
             let Some(best_cost) = best_score.cost else {
                 let hypotheses = evaluations as usize;
                 return Err(Halt::from(Failure::NothingComparable { hypotheses }));
@@ -182,10 +170,7 @@ impl Direct {
                 shuffled: summary.shuffled,
                 runner_up: summary.runner_up,
             })?;
-            Ok((
-                problem.world_from_query(&best.reference_from_camera()),
-                summary,
-            ))
+            Ok((problem.world_from_query(&best.reference_from_camera()), summary))
         })
     }
 
@@ -195,14 +180,9 @@ impl Direct {
         trace: &mut Trace<'_>,
     ) -> Result<Arc<ColoredCloud>, Halt> {
         trace.stage(Stage::Color, |trace| {
-            let Recalled {
-                value: cloud,
-                reused,
-            } = self.colored(problem);
+            let Recalled { value: cloud, reused } = self.colored(problem);
             trace.note_reuse(reused);
-            trace.emit(|| CloudColored {
-                cloud: Arc::clone(&cloud),
-            })?;
+            trace.emit(|| CloudColored { cloud: Arc::clone(&cloud) })?;
             if cloud.points.is_empty() {
                 let points = problem.reference.cloud.len();
                 return Err(Halt::from(Failure::NothingInView { points }));
@@ -225,9 +205,9 @@ impl Direct {
 
     pub(super) fn scorer<'a>(&'a self, problem: &Problem, cloud: &'a ColoredCloud) -> Scorer<'a> {
         let query = &problem.query;
-        let channel = query.memo.recall(self.cost.query_channel_key(), || {
-            self.cost.query_channel(&query.photo.gray)
-        });
+        let channel = query
+            .memo
+            .recall(self.cost.query_channel_key(), || self.cost.query_channel(&query.photo.gray));
         Scorer::new(
             &cloud.points,
             channel.value,
@@ -329,10 +309,8 @@ impl Search<'_, '_> {
                 if some.is_empty() {
                     break;
                 }
-                let poses: Vec<Pose> = some
-                    .iter()
-                    .map(|(_, offset)| offset.reference_from_camera())
-                    .collect();
+                let poses: Vec<Pose> =
+                    some.iter().map(|(_, offset)| offset.reference_from_camera()).collect();
                 for ((cell, offset), score) in some.into_iter().zip(scorer.score(&poses)) {
                     surface.scores[cell] = Some(score);
                     self.tell(lattice.phase, offset, score, &mut least, trace)?;

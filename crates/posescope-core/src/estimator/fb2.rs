@@ -128,10 +128,7 @@ struct Solved {
 impl Guided {
     /// The estimator with these parameters.
     pub fn new(params: &Params) -> Self {
-        Self {
-            params: params.fb2.clone(),
-            render: params.render.clone(),
-        }
+        Self { params: params.fb2.clone(), render: params.render.clone() }
     }
 
     /// What the estimator answers, with the consensus behind it, accepted or not.
@@ -145,17 +142,11 @@ impl Guided {
         let pose = trace.stage(Stage::Estimator(ENTRY.method), |trace| {
             let detected = self.detect(problem, &mut counts, trace)?;
             let mut states = FeatureStates::new(detected.query.keypoints.len());
-            let run = Run {
-                counts: &mut counts,
-                agreed: &mut agreed,
-                states: &mut states,
-            };
+            let run = Run { counts: &mut counts, agreed: &mut agreed, states: &mut states };
             let outcome = self.match_and_solve(problem, &detected, run, trace);
             // A failed query has states too: they show where its features went.
             if !matches!(outcome, Err(Halt::Cancelled)) {
-                trace.emit(|| FeaturesClassified {
-                    states: states.shared(),
-                })?;
+                trace.emit(|| FeaturesClassified { states: states.shared() })?;
             }
             outcome
         });
@@ -192,12 +183,8 @@ impl Guided {
             run.states.after_pose(each, threshold_px);
         }
         *run.counts = run.states.counts(detected.reference.keypoints.len());
-        *run.agreed = Some(Agreed {
-            reference_from_query: solved.pose.inverse(),
-        });
-        trace.emit(|| MatchesGuided {
-            matches: detected.last_matches(&free, &solved.pairings),
-        })?;
+        *run.agreed = Some(Agreed { reference_from_query: solved.pose.inverse() });
+        trace.emit(|| MatchesGuided { matches: detected.last_matches(&free, &solved.pairings) })?;
         trace.stage(Stage::Accept, |trace| self.accept(problem, &solved, trace))
     }
 
@@ -244,12 +231,7 @@ impl Guided {
 
     /// The point of each reference feature, by the visible points alone.
     fn lifted(&self, tuple: &ReferenceTuple, features: &SiftFeatures) -> Arc<ReferencePoints> {
-        let GuidedParams {
-            sift,
-            depth_radius_px,
-            depth_spread,
-            ..
-        } = &self.params;
+        let GuidedParams { sift, depth_radius_px, depth_spread, .. } = &self.params;
         let key = PointsKey {
             sift: Exact::of(sift),
             render: Exact::of(&self.render),
@@ -257,9 +239,7 @@ impl Guided {
             spread: Exact::of(depth_spread),
         };
         let lifted = tuple.memo.recall(key, || {
-            let visible = Cloud {
-                points: tuple.visible_cloud(&self.render).positions().collect(),
-            };
+            let visible = Cloud { points: tuple.visible_cloud(&self.render).positions().collect() };
             let index = ProjectedCloudIndex::new(&visible, &tuple.intrinsics);
             let lift = |(number, keypoint): (usize, &Keypoint)| {
                 let pixel = keypoint.pixel();
@@ -294,9 +274,7 @@ impl Guided {
             let ratio = self.params.ratio as f32;
             let decisions: Arc<[Option<Match>]> =
                 best_matches_interruptible(query, reference, ratio, checkpoint)?.into();
-            trace.emit(|| MatchesDecided {
-                decisions: Arc::clone(&decisions),
-            })?;
+            trace.emit(|| MatchesDecided { decisions: Arc::clone(&decisions) })?;
             Ok::<_, Halt>(decisions)
         })?;
         let unique = states.after_matching(&decisions);
@@ -311,26 +289,16 @@ impl Guided {
         let pairings = trace.stage(Stage::DepthLift, |trace| {
             trace.emit(|| ProjectedCloud {
                 points: problem.reference.cloud.len(),
-                in_view: problem
-                    .reference
-                    .visible_cloud(&self.render)
-                    .positions()
-                    .len(),
+                in_view: problem.reference.visible_cloud(&self.render).positions().len(),
             })?;
             let lifted: Arc<[LiftedMatch]> = unique
                 .iter()
-                .map(|&(query, reference)| LiftedMatch {
-                    query,
-                    ..detected.lifted.0[reference]
-                })
+                .map(|&(query, reference)| LiftedMatch { query, ..detected.lifted.0[reference] })
                 .collect();
-            trace.emit(|| DepthsLifted {
-                matches: Arc::clone(&lifted),
-            })?;
+            trace.emit(|| DepthsLifted { matches: Arc::clone(&lifted) })?;
             states.after_depth_lift(&lifted);
-            let pairings = lifted
-                .iter()
-                .filter_map(|lifted| detected.pairing(lifted.query, lifted.reference));
+            let pairings =
+                lifted.iter().filter_map(|lifted| detected.pairing(lifted.query, lifted.reference));
             Ok::<_, Halt>(pairings.collect::<Vec<_>>())
         })?;
         counts.with_depth = pairings.len();
@@ -342,9 +310,7 @@ impl Guided {
         }
         let pixels: Vec<Point2<f64>> = pairings.iter().map(|p| p.correspondence.pixel).collect();
         let area_px = effective_area_px(&pixels, problem.query.intrinsics.area());
-        trace.stage(Stage::Consensus, |trace| {
-            self.consensus(problem, pairings, area_px, trace)
-        })
+        trace.stage(Stage::Consensus, |trace| self.consensus(problem, pairings, area_px, trace))
     }
 
     fn consensus(
@@ -372,10 +338,9 @@ impl Guided {
         let consensus = match found {
             Ok(consensus) => consensus,
             Err(MlesacError::TooFewCorrespondences { .. }) => return Err(no_consensus(0, 0)),
-            Err(MlesacError::NoModel {
-                trials,
-                best_inliers,
-            }) => return Err(no_consensus(best_inliers, trials)),
+            Err(MlesacError::NoModel { trials, best_inliers }) => {
+                return Err(no_consensus(best_inliers, trials));
+            }
             Err(MlesacError::Cancelled(cancelled)) => return Err(Halt::from(cancelled)),
         };
         trace.emit(|| PoseRefined {
@@ -439,9 +404,7 @@ impl Guided {
         before: &Solved,
         trace: &mut Trace<'_>,
     ) -> Result<Option<Solved>, Cancelled> {
-        let Solved {
-            pose, acceptance, ..
-        } = before;
+        let Solved { pose, acceptance, .. } = before;
         let camera = &problem.query.intrinsics;
         let windows = Windows::new(&detected.query.keypoints, camera, self.params.window_px);
         // The best reference feature of each query feature.
@@ -485,9 +448,8 @@ impl Guided {
             pose = refine(&agreeing, camera, &pose, self.params.mlesac.loss()).pose;
             residuals_px = residuals(&correspondences, camera, &pose);
         }
-        let inliers: Vec<usize> = (0..pairings.len())
-            .filter(|&i| residuals_px[i] <= threshold)
-            .collect();
+        let inliers: Vec<usize> =
+            (0..pairings.len()).filter(|&i| residuals_px[i] <= threshold).collect();
         Ok(Some(Solved {
             pose,
             acceptance: *acceptance,
@@ -540,9 +502,7 @@ impl Guided {
             }
         }
         let stands_out = least < self.params.window_ratio as f32 * second;
-        nearest
-            .filter(|_| stands_out && least < MOST_DISTANCE)
-            .map(|query| (query, least))
+        nearest.filter(|_| stands_out && least < MOST_DISTANCE).map(|query| (query, least))
     }
 
     /// Whether so many inliers are more than chance explains, where a false match lies anywhere in an
@@ -562,9 +522,7 @@ impl Guided {
         let pixels: Vec<_> = correspondences.iter().map(|c| c.pixel).collect();
         let area_px = effective_area_px(&pixels, intrinsics.area());
         let acceptance = self.chance(inliers.len(), correspondences.len(), area_px);
-        acceptance
-            .needed
-            .is_some_and(|needed| inliers.len() >= needed)
+        acceptance.needed.is_some_and(|needed| inliers.len() >= needed)
     }
 
     fn accept(
@@ -579,9 +537,7 @@ impl Guided {
             acceptance,
             tested: solved.pairings.len(),
             counted: Counted::Correspondences,
-            is_enough: acceptance
-                .needed
-                .is_some_and(|needed| acceptance.inliers >= needed),
+            is_enough: acceptance.needed.is_some_and(|needed| acceptance.inliers >= needed),
             slack: Some(self.params.radius_slack),
         };
         found.judged(problem, trace)
@@ -616,10 +572,8 @@ impl Detected {
         };
         let mut matches = by_query(free);
         matches.extend(by_query(last));
-        let lifted = |(query, reference): (usize, usize)| LiftedMatch {
-            query,
-            ..self.lifted.0[reference]
-        };
+        let lifted =
+            |(query, reference): (usize, usize)| LiftedMatch { query, ..self.lifted.0[reference] };
         matches.into_iter().map(lifted).collect()
     }
 }

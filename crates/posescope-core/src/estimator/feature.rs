@@ -84,11 +84,7 @@ struct Found<'a> {
 impl FeatureBased {
     /// The estimator with these parameters.
     pub fn new(params: &Params) -> Self {
-        Self {
-            surf: params.surf,
-            params: params.fb.clone(),
-            render: params.render.clone(),
-        }
+        Self { surf: params.surf, params: params.fb.clone(), render: params.render.clone() }
     }
 
     /// What [`Estimator::estimate`] answers, with the consensus behind it.
@@ -135,9 +131,7 @@ impl FeatureBased {
         let outcome = self.match_and_solve(problem, &query, &reference, &mut states, found, trace);
         // The states are told for a failed query too: they show where its features went.
         if !matches!(outcome, Err(Halt::Cancelled)) {
-            trace.emit(|| FeaturesClassified {
-                states: states.shared(),
-            })?;
+            trace.emit(|| FeaturesClassified { states: states.shared() })?;
         }
         outcome
     }
@@ -162,9 +156,7 @@ impl FeatureBased {
             let decisions = self.best_matches(problem, query, reference, trace)?;
             trace.note_reuse(decisions.reused);
             let Decisions(decisions) = &*decisions.value;
-            trace.emit(|| MatchesDecided {
-                decisions: Arc::clone(decisions),
-            })?;
+            trace.emit(|| MatchesDecided { decisions: Arc::clone(decisions) })?;
             Ok::<_, Halt>(states.after_matching(decisions))
         })?;
         counts.ratio_passed = states.passed_ratio_test();
@@ -178,9 +170,7 @@ impl FeatureBased {
 
         let lifted = trace.stage(Stage::DepthLift, |trace| {
             let lifted = self.lift(&matches, reference, &problem.reference, trace)?;
-            trace.emit(|| DepthsLifted {
-                matches: Arc::clone(&lifted),
-            })?;
+            trace.emit(|| DepthsLifted { matches: Arc::clone(&lifted) })?;
             Ok::<_, Halt>(lifted)
         })?;
         states.after_depth_lift(&lifted);
@@ -212,13 +202,10 @@ impl FeatureBased {
         })?;
         states.after_consensus(&members, &consensus);
         counts.inliers = consensus.inliers.len();
-        *agreed = Some(Agreed {
-            reference_from_query: consensus.pose.inverse(),
-        });
+        *agreed = Some(Agreed { reference_from_query: consensus.pose.inverse() });
 
-        trace.stage(Stage::Accept, |trace| {
-            self.accept(problem, &correspondences, &consensus, trace)
-        })
+        trace
+            .stage(Stage::Accept, |trace| self.accept(problem, &correspondences, &consensus, trace))
     }
 
     fn detect(
@@ -241,10 +228,7 @@ impl FeatureBased {
                 remembered_interruptible(&photo.gray, memo, &self.surf, checkpoint)?
             }
         };
-        trace.emit(|| FeaturesDetected {
-            side,
-            features: Arc::clone(&features.value),
-        })?;
+        trace.emit(|| FeaturesDetected { side, features: Arc::clone(&features.value) })?;
         Ok(features)
     }
 
@@ -284,10 +268,7 @@ impl FeatureBased {
         trace: &mut Trace<'_>,
     ) -> Result<Arc<[LiftedMatch]>, Cancelled> {
         let cloud = projected_cloud(tuple, self.params.visible.then_some(&self.render));
-        trace.emit(|| ProjectedCloud {
-            points: tuple.cloud.len(),
-            in_view: cloud.len(),
-        })?;
+        trace.emit(|| ProjectedCloud { points: tuple.cloud.len(), in_view: cloud.len() })?;
         let mut lifted = Vec::with_capacity(matches.len());
         for matches in matches.chunks(LIFTED_AT_A_TIME) {
             trace.checkpoint()?;
@@ -299,9 +280,7 @@ impl FeatureBased {
                     reference: reference_index,
                     lidar_distance_px: reading.distance_px,
                     depth_range_m: reading.within.map(|depths| (depths.least, depths.greatest)),
-                    point: self
-                        .depth(&reading)
-                        .map(|z| tuple.intrinsics.unproject(&pixel, z)),
+                    point: self.depth(&reading).map(|z| tuple.intrinsics.unproject(&pixel, z)),
                 }
             }));
         }
@@ -389,12 +368,8 @@ impl FeatureBased {
         trace: &mut Trace<'_>,
     ) -> Result<Pose, Halt> {
         let intrinsics = &problem.query.intrinsics;
-        let beyond = self.beyond_chance(
-            correspondences,
-            &consensus.inliers,
-            intrinsics,
-            f64::NEG_INFINITY,
-        );
+        let beyond =
+            self.beyond_chance(correspondences, &consensus.inliers, intrinsics, f64::NEG_INFINITY);
         let found = FoundConsensus {
             reference_from_query: consensus.pose.inverse(),
             acceptance: beyond.acceptance,
@@ -414,10 +389,7 @@ fn found_elsewhere(problem: &Problem) -> Result<Option<&FoundMatches>, Failure> 
         Some(PairMatches::Found(found)) => Ok(Some(found)),
         Some(PairMatches::Absent) => Err(Failure::NotAnswered {
             answers: "the folder of matches".to_owned(),
-            missing: format!(
-                "matches of {} with {}",
-                problem.query.name, problem.reference.name
-            ),
+            missing: format!("matches of {} with {}", problem.query.name, problem.reference.name),
         }),
     }
 }
@@ -449,10 +421,7 @@ pub fn projected_cloud(
     tuple: &ReferenceTuple,
     visible: Option<&RenderParams>,
 ) -> Arc<ProjectedCloudIndex> {
-    let visible = visible.map(|render| RenderParams {
-        visibility: true,
-        ..render.clone()
-    });
+    let visible = visible.map(|render| RenderParams { visibility: true, ..render.clone() });
     let key = visible.as_ref().map(Exact::of);
     let cloud = tuple.memo.recall(key, || match &visible {
         None => ProjectedCloudIndex::new(&tuple.cloud, &tuple.intrinsics),
@@ -471,9 +440,5 @@ pub fn count_matches(query: &Features, reference: &Features, params: &FeaturePar
         return 0;
     }
     let Ok(matches) = best_matches(query, reference, params, || Ok::<_, Infallible>(()));
-    matches
-        .iter()
-        .flatten()
-        .filter(|found| found.verdict == MatchVerdict::Candidate)
-        .count()
+    matches.iter().flatten().filter(|found| found.verdict == MatchVerdict::Candidate).count()
 }

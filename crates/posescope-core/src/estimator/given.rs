@@ -27,12 +27,9 @@ impl Estimator for Given {
         let query = &problem.query.name;
         trace.stage(Stage::Estimator(self.method), |_| {
             Ok(match self.estimates.get(query) {
-                Some(pose) => Outcome {
-                    pose: Ok(*pose),
-                    counts: None,
-                    cost: None,
-                    fell_back: false,
-                },
+                Some(pose) => {
+                    Outcome { pose: Ok(*pose), counts: None, cost: None, fell_back: false }
+                }
                 None => Outcome::failed(Failure::NotAnswered {
                     answers: self.method.name().to_owned(),
                     missing: format!("pose of {query}"),

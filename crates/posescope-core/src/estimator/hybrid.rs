@@ -48,11 +48,7 @@ pub fn hybrid_outcome(first: &Outcome, second: &Outcome) -> Outcome {
     if first.pose.is_ok() {
         return first.clone();
     }
-    Outcome {
-        counts: first.counts,
-        fell_back: true,
-        ..second.clone()
-    }
+    Outcome { counts: first.counts, fell_back: true, ..second.clone() }
 }
 
 impl Hybrid {
@@ -79,10 +75,7 @@ impl Hybrid {
                 }
                 Err(failure) => failure,
             };
-            trace.emit(|| BranchTaken {
-                method: second,
-                why: failure.to_string(),
-            })?;
+            trace.emit(|| BranchTaken { method: second, why: failure.to_string() })?;
             let fallback = self.second.estimate(problem, trace)?;
             Ok(hybrid_outcome(&outcome, &fallback))
         })

@@ -64,10 +64,7 @@ pub trait JointEstimator: Send + Sync {
 impl JointOutcome {
     /// No pose from so many references.
     pub fn failed(failure: Failure, references: usize) -> Self {
-        Self {
-            pose: Err(failure),
-            supports: vec![None; references],
-        }
+        Self { pose: Err(failure), supports: vec![None; references] }
     }
 
     /// The share of each reference in the pose: as much of it as it supports.

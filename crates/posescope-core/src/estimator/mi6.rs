@@ -88,15 +88,11 @@ impl Spread {
         let cells = surfaces
             .iter()
             .flat_map(|surface| (0..surface.scores.len()).map(move |cell| (surface, cell)));
-        let mut costs: Vec<f64> = cells
-            .filter_map(|(surface, cell)| surface.eligible_cost(cell))
-            .collect();
+        let mut costs: Vec<f64> =
+            cells.filter_map(|(surface, cell)| surface.eligible_cost(cell)).collect();
         let median = middle(&mut costs);
         let mut away: Vec<f64> = costs.iter().map(|cost| (cost - median).abs()).collect();
-        Self {
-            median,
-            deviation: 1.4826 * middle(&mut away),
-        }
+        Self { median, deviation: 1.4826 * middle(&mut away) }
     }
 
     /// How far a cost is below the middle, in standard deviations.
@@ -178,10 +174,7 @@ impl SixFreedoms {
         let lattices = self.lattices(problem, self.params.yaws)?;
         self.view.color(problem, trace)?;
         let initial = judge.score(&[Pose::identity()])[0];
-        trace.emit(|| {
-            self.view
-                .render(problem, Moment::Start, 0, &Pose::identity(), initial)
-        })?;
+        trace.emit(|| self.view.render(problem, Moment::Start, 0, &Pose::identity(), initial))?;
         let mut search = Search {
             judge,
             covered_at_reference: initial.covered,
@@ -214,9 +207,8 @@ impl SixFreedoms {
         })?;
         let mut finalists = apart(refined, self.params.finalists, price);
         if self.params.coarse_shrink > 1 {
-            let more = trace.stage(Stage::SearchCoarse, |trace| {
-                self.coarse_poses(problem, trace)
-            })?;
+            let more =
+                trace.stage(Stage::SearchCoarse, |trace| self.coarse_poses(problem, trace))?;
             search.evaluations += more.len() as u64;
             let costs = judge.costs(&more, search.least_covered);
             let more = more.into_iter().zip(costs);
@@ -252,13 +244,7 @@ impl SixFreedoms {
                 evaluations: search.evaluations,
             };
             trace.emit(|| {
-                self.view.render(
-                    problem,
-                    Moment::End,
-                    search.evaluations - 1,
-                    &best.pose,
-                    score,
-                )
+                self.view.render(problem, Moment::End, search.evaluations - 1, &best.pose, score)
             })?;
             trace.emit(|| MinimumAssessed {
                 offset: Offset::of(&best.pose),
@@ -267,11 +253,7 @@ impl SixFreedoms {
                 shuffled: summary.shuffled,
                 runner_up: summary.runner_up,
             })?;
-            Ok(Found {
-                refined,
-                summary,
-                spread,
-            })
+            Ok(Found { refined, summary, spread })
         })
     }
 
@@ -284,10 +266,7 @@ impl SixFreedoms {
             .collect();
         yaws.sort_by(|a, b| b.abs().total_cmp(&a.abs()).then(a.total_cmp(b)));
         let lattices = yaws.into_iter().map(|yaw_rad| {
-            let centre = Offset {
-                yaw_rad,
-                ..Offset::default()
-            };
+            let centre = Offset { yaw_rad, ..Offset::default() };
             let radius = problem.uncertainty_radius_m;
             Lattice::new(Phase::PositionCoarse, centre, radius, &self.grid).map_err(Failure::from)
         });
@@ -307,19 +286,13 @@ impl SixFreedoms {
             let mut scores = vec![None; lattice.cells()];
             for some in hypotheses.chunks(judge.at_a_time()) {
                 trace.checkpoint()?;
-                let poses: Vec<Pose> = some
-                    .iter()
-                    .map(|(_, offset)| offset.reference_from_camera())
-                    .collect();
+                let poses: Vec<Pose> =
+                    some.iter().map(|(_, offset)| offset.reference_from_camera()).collect();
                 for (&(cell, _), score) in some.iter().zip(judge.score(&poses)) {
                     scores[cell] = Some(score);
                 }
             }
-            surfaces.push(Arc::new(ScoredLattice {
-                lattice,
-                scores,
-                least_covered,
-            }));
+            surfaces.push(Arc::new(ScoredLattice { lattice, scores, least_covered }));
         }
         let mut costs = |poses: &[Pose]| {
             trace.checkpoint()?;
@@ -329,10 +302,7 @@ impl SixFreedoms {
         let price = |pose: &Pose, cost: f64| self.price(&spread, pose, cost);
         let starts = starts(&surfaces, 2 * self.params.starts, price);
         let most_m = self.most_m();
-        let plan = Shrinking {
-            last_m: most_m.min(0.1),
-            ..self.in_the_plane()
-        };
+        let plan = Shrinking { last_m: most_m.min(0.1), ..self.in_the_plane() };
         let plane = shrink(&starts, &plan, &mut costs)?;
         let plan = Shrinking {
             freedoms: Freedoms::Six,
@@ -354,10 +324,7 @@ impl SixFreedoms {
             .zip(costs(&poses)?)
             .filter_map(|(&pose, cost)| Some(Start { pose, cost: cost? }))
             .collect();
-        let plan = Shrinking {
-            last_m: most_m.min(0.025),
-            ..plan
-        };
+        let plan = Shrinking { last_m: most_m.min(0.025), ..plan };
         let refined = shrink(&starts, &plan, &mut costs)?;
         let best = apart(refined, self.params.finalists, price);
         Ok(best.into_iter().map(|start| start.pose).collect())
@@ -408,10 +375,8 @@ impl Search<'_> {
         let hypotheses: Vec<_> = lattice.hypotheses().collect();
         for some in hypotheses.chunks(self.judge.at_a_time()) {
             trace.checkpoint()?;
-            let poses: Vec<Pose> = some
-                .iter()
-                .map(|(_, offset)| offset.reference_from_camera())
-                .collect();
+            let poses: Vec<Pose> =
+                some.iter().map(|(_, offset)| offset.reference_from_camera()).collect();
             for ((cell, offset), score) in some.iter().copied().zip(self.judge.score(&poses)) {
                 scores[cell] = Some(score);
                 let cost = score.eligible_cost(self.least_covered);
@@ -432,15 +397,10 @@ impl Search<'_> {
                 })?;
             }
         }
-        let surface = Arc::new(ScoredLattice {
-            lattice,
-            scores,
-            least_covered: self.least_covered,
-        });
+        let surface =
+            Arc::new(ScoredLattice { lattice, scores, least_covered: self.least_covered });
         trace.emit(|| PhaseSearched {
-            best: surface
-                .minimum()
-                .and_then(|cell| surface.lattice.offset(cell)),
+            best: surface.minimum().and_then(|cell| surface.lattice.offset(cell)),
             surface: Arc::clone(&surface),
         })?;
         Ok(surface)
@@ -481,10 +441,7 @@ fn starts(
             let minima = surface.local_minima().into_iter();
             minima.filter_map(|(cell, cost)| {
                 let offset = surface.lattice.offset(cell)?;
-                Some(Start {
-                    pose: offset.reference_from_camera(),
-                    cost,
-                })
+                Some(Start { pose: offset.reference_from_camera(), cost })
             })
         })
         .collect();
@@ -499,10 +456,7 @@ fn apart(mut refined: Vec<Refined>, most: usize, price: impl Fn(&Pose, f64) -> f
     let mut kept: Vec<Start> = Vec::new();
     for one in refined {
         if kept.len() < most && kept.iter().all(|known| is_apart(&known.pose, &one.pose)) {
-            kept.push(Start {
-                pose: one.pose,
-                cost: one.cost,
-            });
+            kept.push(Start { pose: one.pose, cost: one.cost });
         }
     }
     kept

@@ -45,9 +45,7 @@ impl View {
     pub(super) fn new(params: &Params) -> Self {
         let entry = cost::ALL.iter().find(|entry| entry.name == "mi");
         let entry = entry.expect("the paper's cost is registered");
-        Self {
-            direct: Direct::new(entry, params),
-        }
+        Self { direct: Direct::new(entry, params) }
     }
 
     /// Tells of the coloured cloud.
@@ -56,9 +54,7 @@ impl View {
             let colored = self.direct.colored(problem);
             trace.note_reuse(colored.reused);
             let cloud = colored.value;
-            trace.emit(|| CloudColored {
-                cloud: Arc::clone(&cloud),
-            })?;
+            trace.emit(|| CloudColored { cloud: Arc::clone(&cloud) })?;
             if cloud.points.is_empty() {
                 let points = problem.reference.cloud.len();
                 return Err(Halt::from(Failure::NothingInView { points }));
@@ -70,10 +66,7 @@ impl View {
     /// The view at a pose beside the query, with the score that the judge gave it.
     pub(super) fn compare(&self, problem: &Problem, pose: &Pose, score: Score) -> Comparison {
         let cloud = self.direct.colored(problem).value;
-        Comparison {
-            score,
-            ..self.direct.scorer(problem, &cloud).compare(pose)
-        }
+        Comparison { score, ..self.direct.scorer(problem, &cloud).compare(pose) }
     }
 
     pub(super) fn render(

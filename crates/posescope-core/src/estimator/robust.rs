@@ -77,11 +77,7 @@ impl Robust {
         });
         let found = separate_failure(found)?;
         trace.stage(Stage::Judge, |trace| {
-            let Found {
-                refined,
-                summary,
-                spread,
-            } = match found {
+            let Found { refined, summary, spread } = match found {
                 Ok(found) => found,
                 Err(failure) => return unjudged(problem, proposed, failure, trace),
             };
@@ -132,15 +128,9 @@ impl Robust {
                     needed,
                 }));
             }
-            trace.emit(|| BranchTaken {
-                method: best.method,
-                why: why.clone(),
-            })?;
+            trace.emit(|| BranchTaken { method: best.method, why: why.clone() })?;
             let pose = problem.world_from_query(&best.refined.pose);
-            let summary = CostSummary {
-                best: best.refined.cost,
-                ..summary
-            };
+            let summary = CostSummary { best: best.refined.cost, ..summary };
             Ok((pose, Some(summary)))
         })
     }
@@ -169,15 +159,8 @@ fn unjudged(
 fn why(candidates: &[JudgedPose]) -> String {
     let best = &candidates[0];
     let said = |candidate: &JudgedPose| {
-        let refused = if candidate.accepted {
-            ""
-        } else {
-            " (refused by itself)"
-        };
-        format!(
-            "{}{refused} {:.4}",
-            candidate.method, candidate.refined.cost
-        )
+        let refused = if candidate.accepted { "" } else { " (refused by itself)" };
+        format!("{}{refused} {:.4}", candidate.method, candidate.refined.cost)
     };
     let mut methods = vec![best.method];
     let mut others = Vec::new();
@@ -206,24 +189,17 @@ impl Estimator for Robust {
             ]
             .into_iter()
             .filter_map(|(method, agreed, outcome)| {
-                Some(Proposed {
-                    method,
-                    agreed: agreed?,
-                    accepted: outcome.pose.is_ok(),
-                })
+                Some(Proposed { method, agreed: agreed?, accepted: outcome.pose.is_ok() })
             })
             .collect();
             let decided = self.decide(problem, &proposed, trace);
             let outcome = match separate_failure(decided)? {
-                Ok((pose, summary)) => Outcome {
-                    pose: Ok(pose),
-                    cost: summary,
-                    ..proposal.outcome
-                },
-                Err(failure) => Outcome {
-                    counts: proposal.outcome.counts,
-                    ..Outcome::failed(failure)
-                },
+                Ok((pose, summary)) => {
+                    Outcome { pose: Ok(pose), cost: summary, ..proposal.outcome }
+                }
+                Err(failure) => {
+                    Outcome { counts: proposal.outcome.counts, ..Outcome::failed(failure) }
+                }
             };
             Ok(outcome)
         })

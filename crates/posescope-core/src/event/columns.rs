@@ -195,9 +195,7 @@ mod tests {
             verdict: MatchVerdict::Ambiguous,
         };
         assert_eq!(
-            data(MatchesDecided {
-                decisions: [None, Some(one)].into(),
-            }),
+            data(MatchesDecided { decisions: [None, Some(one)].into() }),
             json!({"kind": "MatchesDecided", "query_keypoint": [3], "reference_keypoint": [4],
                 "distance": [0.25], "ratio": [0.5], "verdict": ["ratio_failed"]})
         );
@@ -209,18 +207,8 @@ mod tests {
             point: Some([1.0, 2.0, 3.0].into()),
         };
         for (kind, event) in [
-            (
-                "DepthsLifted",
-                data(DepthsLifted {
-                    matches: [lifted].into(),
-                }),
-            ),
-            (
-                "MatchesGuided",
-                data(MatchesGuided {
-                    matches: [lifted].into(),
-                }),
-            ),
+            ("DepthsLifted", data(DepthsLifted { matches: [lifted].into() })),
+            ("MatchesGuided", data(MatchesGuided { matches: [lifted].into() })),
         ] {
             assert_eq!(
                 event,
@@ -231,36 +219,22 @@ mod tests {
         let states = [
             FeatureState::RatioFailed { ratio: 0.5 },
             FeatureState::NotUnique { rival: 7 },
-            FeatureState::Outlier {
-                residual_px: f64::INFINITY,
-            },
+            FeatureState::Outlier { residual_px: f64::INFINITY },
         ];
         assert_eq!(
-            data(FeaturesClassified {
-                states: states.into()
-            }),
+            data(FeaturesClassified { states: states.into() }),
             json!({"kind": "FeaturesClassified", "number": [0.5, 7.0, null],
                 "state": ["ratio_failed", "not_unique", "outlier"]})
         );
         let cloud = Arc::default();
-        assert_eq!(
-            data(CloudColored { cloud }),
-            json!({"kind": "CloudColored", "points": 0})
-        );
+        assert_eq!(data(CloudColored { cloud }), json!({"kind": "CloudColored", "points": 0}));
     }
 
     #[test]
     fn a_number_has_the_name_and_unit_that_readers_know() {
-        let offset = Offset {
-            right_m: 1.0,
-            forward_m: 2.0,
-            yaw_rad: 0.0,
-        };
+        let offset = Offset { right_m: 1.0, forward_m: 2.0, yaw_rad: 0.0 };
         let offset_text = json!({"right_m": 1.0, "forward_m": 2.0, "yaw_deg": 0.0});
-        let score = Score {
-            cost: Some(0.5),
-            covered: 9,
-        };
+        let score = Score { cost: Some(0.5), covered: 9 };
         assert_eq!(
             data(PoseScored {
                 phase: Phase::YawFine,
@@ -276,11 +250,7 @@ mod tests {
         );
         let hypothesis = Hypothesis {
             pose: Pose::identity(),
-            score: LikelihoodScore {
-                log_likelihood: -2.0,
-                mixing: 0.5,
-                inliers: 8,
-            },
+            score: LikelihoodScore { log_likelihood: -2.0, mixing: 0.5, inliers: 8 },
         };
         assert_eq!(
             data(HypothesisTried {
@@ -299,11 +269,7 @@ mod tests {
         );
         assert_eq!(
             data(ConsensusJudged {
-                acceptance: Acceptance {
-                    inliers: 8,
-                    log10_nfa: -3.0,
-                    needed: None,
-                },
+                acceptance: Acceptance { inliers: 8, log10_nfa: -3.0, needed: None },
                 counted: Counted::Places,
                 distance_m: 1.5,
                 accepted: true,
@@ -312,24 +278,14 @@ mod tests {
                 "counted": "places", "distance_m": 1.5, "accepted": true})
         );
         let refined = Refined {
-            start: Start {
-                pose: Pose::identity(),
-                cost: 0.9,
-            },
+            start: Start { pose: Pose::identity(), cost: 0.9 },
             pose: Pose::translation(1.0, 2.0, 3.0),
             cost: 0.5,
             evaluations: 70,
         };
-        let pose = json!([
-            [1.0, 0.0, 0.0, 1.0],
-            [0.0, 1.0, 0.0, 2.0],
-            [0.0, 0.0, 1.0, 3.0]
-        ]);
+        let pose = json!([[1.0, 0.0, 0.0, 1.0], [0.0, 1.0, 0.0, 2.0], [0.0, 0.0, 1.0, 3.0]]);
         assert_eq!(
-            data(StartsRefined {
-                freedoms: Freedoms::Six,
-                refinements: [refined].into(),
-            }),
+            data(StartsRefined { freedoms: Freedoms::Six, refinements: [refined].into() }),
             json!({"kind": "StartsRefined", "freedoms": "Six", "cost": [0.5],
                 "evaluations": [70], "reference_from_camera": [pose]})
         );
@@ -345,11 +301,7 @@ mod tests {
         let frame = RankedReference {
             name: "000004".to_owned(),
             world_from_camera: None,
-            ranked: Ranked {
-                frame: 4,
-                score: 0.5,
-                geometry: Geometry::Refused,
-            },
+            ranked: Ranked { frame: 4, score: 0.5, geometry: Geometry::Refused },
         };
         assert_eq!(
             data(ReferencesRanked {
@@ -376,10 +328,7 @@ mod tests {
                 "smooth_cost": 0.25, "score": {"cost": 0.5, "covered": 9}})
         );
         assert_eq!(
-            data(BranchTaken {
-                method: Method::MI,
-                why: "few".to_owned(),
-            }),
+            data(BranchTaken { method: Method::MI, why: "few".to_owned() }),
             json!({"kind": "BranchTaken", "taken": "mi", "why": "few"})
         );
     }

@@ -22,12 +22,7 @@ impl<const N: usize> Spans<N> {
     /// Spans about each of the centres, as one alone would be made.
     #[inline(always)]
     pub(super) fn new(centres: &[f32; N], side: f32, extent: usize) -> Self {
-        let mut spans = Self {
-            first: [0; N],
-            last: [0; N],
-            head: [0.0; N],
-            tail: [0.0; N],
-        };
+        let mut spans = Self { first: [0; N], last: [0; N], head: [0.0; N], tail: [0.0; N] };
         let room = (extent as f32 - side).max(0.0);
         let furthest = extent as i32 - 1;
         for (i, centre) in centres.iter().enumerate() {
@@ -65,10 +60,7 @@ pub(super) struct Strips {
 
 impl Default for Strips {
     fn default() -> Self {
-        Self {
-            sums: [[0; WIDEST]; 3],
-            columns: [0.0; WIDEST],
-        }
+        Self { sums: [[0; WIDEST]; 3], columns: [0.0; WIDEST] }
     }
 }
 
@@ -123,11 +115,7 @@ impl Strips {
     fn fill(&mut self, integral: &IntegralImage, rows: Span, left: usize, width: usize) {
         let table = |row: usize| &integral.row(row)[left..][..width];
         let [upper, whole, lower] = &mut self.sums;
-        let (upper, whole, lower) = (
-            &mut upper[..width],
-            &mut whole[..width],
-            &mut lower[..width],
-        );
+        let (upper, whole, lower) = (&mut upper[..width], &mut whole[..width], &mut lower[..width]);
         let (a, b) = (table(rows.first), table(rows.first + 1));
         let (c, d) = (table(rows.last), table(rows.last + 1));
         for i in 0..width {

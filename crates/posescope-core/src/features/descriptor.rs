@@ -190,14 +190,7 @@ mod tests {
     use super::*;
 
     fn keypoint(x: f32, y: f32, scale: f32, angle: f32) -> Keypoint {
-        Keypoint {
-            x,
-            y,
-            scale,
-            angle,
-            response: 1.0,
-            laplacian_positive: false,
-        }
+        Keypoint { x, y, scale, angle, response: 1.0, laplacian_positive: false }
     }
 
     fn describe(image: &GrayImage, keypoint: Keypoint) -> Descriptor {

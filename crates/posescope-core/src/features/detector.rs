@@ -77,9 +77,8 @@ mod tests {
     }
 
     fn found(image: &GrayImage, params: &SurfParams) -> Vec<Keypoint> {
-        let Ok(keypoints) = detect(&IntegralImage::new(image), params, &mut || {
-            Ok::<_, Infallible>(())
-        });
+        let Ok(keypoints) =
+            detect(&IntegralImage::new(image), params, &mut || Ok::<_, Infallible>(()));
         keypoints
     }
 
@@ -121,16 +120,8 @@ mod tests {
             let near = (x as f32 - 29.5).hypot(y as f32 - 29.5) < 4.0;
             Luma([if near { 220 } else { 40 }])
         });
-        let found = found(
-            &image,
-            &SurfParams {
-                octaves: 1,
-                ..SurfParams::default()
-            },
-        );
-        let central = found
-            .iter()
-            .filter(|k| (k.x - 29.5).hypot(k.y - 29.5) < 2.0);
+        let found = found(&image, &SurfParams { octaves: 1, ..SurfParams::default() });
+        let central = found.iter().filter(|k| (k.x - 29.5).hypot(k.y - 29.5) < 2.0);
         assert_eq!(central.count(), 1);
     }
 }

@@ -61,9 +61,7 @@ impl FoundMatches {
     /// How many query keypoints have a partner of their own.
     pub fn count(&self) -> usize {
         let decisions = self.decisions.iter().flatten();
-        decisions
-            .filter(|found| found.verdict == MatchVerdict::Candidate)
-            .count()
+        decisions.filter(|found| found.verdict == MatchVerdict::Candidate).count()
     }
 }
 
@@ -78,10 +76,7 @@ fn features(positions: &[[f32; 2]]) -> Features {
         response: 0.0,
         laplacian_positive: true,
     };
-    Features {
-        keypoints: positions.iter().map(keypoint).collect(),
-        descriptors: Vec::new(),
-    }
+    Features { keypoints: positions.iter().map(keypoint).collect(), descriptors: Vec::new() }
 }
 
 #[cfg(test)]
@@ -92,21 +87,11 @@ mod tests {
     fn a_keypoint_that_two_claim_goes_to_the_first() {
         let query = [[1.0, 2.0], [3.0, 4.0], [5.0, 6.0]];
         let found = FoundMatches::new(&query, &[[7.0, 8.0]], &[None, Some(0), Some(0)]);
-        let verdicts: Vec<_> = found
-            .decisions
-            .iter()
-            .map(|d| d.map(|d| d.verdict))
-            .collect();
-        let expected = [
-            None,
-            Some(MatchVerdict::Candidate),
-            Some(MatchVerdict::NotUnique { rival: 1 }),
-        ];
+        let verdicts: Vec<_> = found.decisions.iter().map(|d| d.map(|d| d.verdict)).collect();
+        let expected =
+            [None, Some(MatchVerdict::Candidate), Some(MatchVerdict::NotUnique { rival: 1 })];
         assert_eq!(verdicts, expected);
         assert_eq!(found.count(), 1);
-        assert_eq!(
-            found.query.keypoints[2].pixel(),
-            nalgebra::Point2::new(5.0, 6.0)
-        );
+        assert_eq!(found.query.keypoints[2].pixel(), nalgebra::Point2::new(5.0, 6.0));
     }
 }

@@ -166,11 +166,7 @@ pub(super) struct Room {
 
 impl Default for Room {
     fn default() -> Self {
-        Self {
-            level: Level::new(),
-            sums: Default::default(),
-            dense: Vec::new(),
-        }
+        Self { level: Level::new(), sums: Default::default(), dense: Vec::new() }
     }
 }
 

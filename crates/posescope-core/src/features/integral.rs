@@ -24,9 +24,7 @@ impl IntegralImage {
         let stride = width + 1;
         let mut sums = vec![0u32; stride * (height + 1)];
         // A band of rows for each thread, as if nothing were above it; then what is above it is added.
-        let rows = height
-            .div_ceil(rayon::current_num_threads())
-            .max(LEAST_BAND);
+        let rows = height.div_ceil(rayon::current_num_threads()).max(LEAST_BAND);
         let (_, table) = sums.split_at_mut(stride);
         let pixels = image.as_raw().par_chunks((rows * width).max(1));
         let bands = table.par_chunks_mut(rows * stride).zip(pixels);
@@ -44,11 +42,7 @@ impl IntegralImage {
             let rows = band.chunks_exact_mut(stride);
             rows.for_each(|row| add(row, &above));
         });
-        Self {
-            width,
-            height,
-            sums,
-        }
+        Self { width, height, sums }
     }
 
     /// Width of the image \[px\].
@@ -108,10 +102,7 @@ impl IntegralImage {
 fn sum_up(sums: &mut [u32], pixels: &[u8], width: usize) {
     let stride = width + 1;
     let mut above: &[u32] = &vec![0; stride];
-    for (row, pixels) in sums
-        .chunks_exact_mut(stride)
-        .zip(pixels.chunks_exact(width.max(1)))
-    {
+    for (row, pixels) in sums.chunks_exact_mut(stride).zip(pixels.chunks_exact(width.max(1))) {
         let mut row_sum = 0u32;
         for x in 0..width {
             row_sum = row_sum.wrapping_add(u32::from(pixels[x]));
@@ -173,12 +164,7 @@ impl Span {
         let end = start + side;
         let first = (start as usize).min(extent - 1);
         let last = (end as usize).min(extent - 1);
-        Self {
-            first,
-            head: 1.0 - (start - first as f32),
-            last,
-            tail: end - last as f32,
-        }
+        Self { first, head: 1.0 - (start - first as f32), last, tail: end - last as f32 }
     }
 }
 

@@ -67,10 +67,7 @@ pub fn best_matches_interruptible<const N: usize, E>(
     mut checkpoint: impl FnMut() -> Result<(), E>,
 ) -> Result<Vec<Option<Match>>, E> {
     let forward = nearest_neighbours_interruptible(query, reference, &mut checkpoint)?;
-    let distinct = forward
-        .iter()
-        .flatten()
-        .filter(|found| is_distinct(found, max_ratio));
+    let distinct = forward.iter().flatten().filter(|found| is_distinct(found, max_ratio));
     let mut chosen: Vec<usize> = distinct.map(|found| found.nearest).collect();
     chosen.sort_unstable();
     chosen.dedup();
@@ -151,11 +148,7 @@ mod tests {
         let query = [at(0.0), at(3.0), at(45.0), at(170.0)];
         let reference = [at(1.0), at(90.0), at(172.0)];
         let matches = both_ways(&query, &reference);
-        let verdicts: Vec<_> = matches
-            .iter()
-            .flatten()
-            .map(|m| (m.reference, m.verdict))
-            .collect();
+        let verdicts: Vec<_> = matches.iter().flatten().map(|m| (m.reference, m.verdict)).collect();
         assert_eq!(
             verdicts,
             [
@@ -175,10 +168,7 @@ mod tests {
             (0..count).map(|i| at(angle(i))).collect()
         };
         let matches = both_ways(&spread(300, 0), &spread(200, 1000));
-        let unique = matches
-            .iter()
-            .flatten()
-            .filter(|m| m.verdict == MatchVerdict::Candidate);
+        let unique = matches.iter().flatten().filter(|m| m.verdict == MatchVerdict::Candidate);
         assert!(unique.count() > 20);
     }
 }

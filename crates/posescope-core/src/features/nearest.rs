@@ -80,10 +80,8 @@ pub fn nearest_neighbours_interruptible<const N: usize, E>(
     let margin = margin::<N>(query.iter().chain(reference));
     let level = Level::new();
     let search = |block: &[[f32; N]]| {
-        let mut groups: Vec<Group<N>> = block
-            .chunks(QUERIES)
-            .map(|queries| Group::new(queries, margin))
-            .collect();
+        let mut groups: Vec<Group<N>> =
+            block.chunks(QUERIES).map(|queries| Group::new(queries, margin)).collect();
         dispatch!(level, simd => search(simd, &panels, &mut groups));
         let found = groups.into_iter().flat_map(|group| group.near);
         block
@@ -127,10 +125,7 @@ struct Panel<const N: usize> {
 
 impl<const N: usize> Panel<N> {
     fn new(references: &[[f32; N]]) -> Self {
-        let mut panel = Self {
-            numbers: [[0.0; LANES]; N],
-            half_squares: [f32::NAN; LANES],
-        };
+        let mut panel = Self { numbers: [[0.0; LANES]; N], half_squares: [f32::NAN; LANES] };
         for (lane, reference) in references.iter().enumerate() {
             for (numbers, &value) in panel.numbers.iter_mut().zip(reference) {
                 numbers[lane] = value;
@@ -256,10 +251,9 @@ impl Near {
         for &(_, index) in near {
             let distance = distance(query, &reference[index]);
             found = Some(match found {
-                Some(found) if distance >= found.distance => Neighbours {
-                    second_distance: found.second_distance.min(distance),
-                    ..found
-                },
+                Some(found) if distance >= found.distance => {
+                    Neighbours { second_distance: found.second_distance.min(distance), ..found }
+                }
                 _ => Neighbours {
                     nearest: index,
                     distance,
@@ -303,9 +297,7 @@ mod tests {
         Some(Neighbours {
             nearest,
             distance: distances[nearest],
-            second_distance: order
-                .get(1)
-                .map_or(f32::INFINITY, |&second| distances[second]),
+            second_distance: order.get(1).map_or(f32::INFINITY, |&second| distances[second]),
         })
     }
 
@@ -367,11 +359,7 @@ mod tests {
     #[test]
     fn descriptors_that_say_nothing_are_all_as_near() {
         let found = nearest_neighbours(&[[0.0; 64]; 7], &[[0.0; 64]; 100]);
-        let expected = Some(Neighbours {
-            nearest: 0,
-            distance: 0.0,
-            second_distance: 0.0,
-        });
+        let expected = Some(Neighbours { nearest: 0, distance: 0.0, second_distance: 0.0 });
         assert_eq!(found, [expected; 7]);
     }
 
@@ -398,11 +386,7 @@ mod tests {
         let mut checkpoints = 0;
         let stopped = nearest_neighbours_interruptible(&query, &reference, || {
             checkpoints += 1;
-            if checkpoints == 3 {
-                Err("stopped")
-            } else {
-                Ok(())
-            }
+            if checkpoints == 3 { Err("stopped") } else { Ok(()) }
         });
         assert_eq!((stopped, checkpoints), (Err("stopped"), 3));
     }

@@ -72,23 +72,16 @@ impl Octave<'_> {
         let found = bands.into_par_iter().map_init(room, |room, (first, kept)| {
             let band = first..(first + height).min(rows);
             self.search_band(band, room, |row, responses| {
-                let kept = kept
-                    .chunks_exact_mut(half)
-                    .skip((row - first) / 2 * shared.len());
+                let kept = kept.chunks_exact_mut(half).skip((row - first) / 2 * shared.len());
                 for (&layer, kept) in shared.iter().zip(kept) {
                     let samples = responses.row(layer, row).iter().step_by(2);
-                    kept.iter_mut()
-                        .zip(samples)
-                        .for_each(|(kept, &sample)| *kept = sample);
+                    kept.iter_mut().zip(samples).for_each(|(kept, &sample)| *kept = sample);
                 }
             })
         });
         let found = found.flatten_iter().collect();
         let lobes = shared.iter().map(|&layer| self.filters[layer].lobe());
-        let known = Known {
-            lobes: lobes.collect(),
-            responses: kept,
-        };
+        let known = Known { lobes: lobes.collect(), responses: kept };
         (found, known)
     }
 
@@ -119,11 +112,7 @@ impl Octave<'_> {
     fn respond(&self, row: usize, room: &mut BandRoom) {
         for (layer, filter) in self.filters.iter().enumerate() {
             let samples = room.responses.row_mut(layer, row);
-            let known = self
-                .known
-                .lobes
-                .iter()
-                .position(|&lobe| lobe == filter.lobe());
+            let known = self.known.lobes.iter().position(|&lobe| lobe == filter.lobe());
             match known {
                 Some(known) => samples.copy_from_slice(self.known.responses.row(known, row)),
                 None => {

@@ -70,10 +70,7 @@ impl OrientationEstimator {
             }
         });
         debug_assert!(places.next().is_none());
-        Self {
-            level: Level::new(),
-            wavelets,
-        }
+        Self { level: Level::new(), wavelets }
     }
 
     /// The direction of the longest sum of responses whose directions lie within a window of 60°
@@ -122,11 +119,8 @@ impl OrientationEstimator {
         strips: &mut Strips,
     ) -> Responses {
         let sums = corner_sums(integral, keypoint, strips);
-        let mut responses = Responses {
-            directions: [0.0; WAVELETS],
-            dx: [0.0; WAVELETS],
-            dy: [0.0; WAVELETS],
-        };
+        let mut responses =
+            Responses { directions: [0.0; WAVELETS], dx: [0.0; WAVELETS], dy: [0.0; WAVELETS] };
         for (i, wavelet) in self.wavelets.iter().enumerate() {
             [responses.dx[i], responses.dy[i]] = wavelet.response(&sums);
         }
@@ -147,11 +141,7 @@ impl Responses {
         // Numbers in the order of the directions, with the responses' own below.
         let mut keys: [u64; WAVELETS] = array::from_fn(|i| {
             let bits = self.directions[i].to_bits();
-            let ordered = if bits >> 31 == 0 {
-                bits | 1 << 31
-            } else {
-                !bits
-            };
+            let ordered = if bits >> 31 == 0 { bits | 1 << 31 } else { !bits };
             (u64::from(ordered) << 32) | i as u64
         });
         keys.sort_unstable();
@@ -183,11 +173,7 @@ fn direction(y: f32, x: f32) -> f32 {
         sum = (sum + coefficient) * squared;
     }
     let octant = slope + slope * sum;
-    let quadrant = if across > along {
-        FRAC_PI_2 - octant
-    } else {
-        octant
-    };
+    let quadrant = if across > along { FRAC_PI_2 - octant } else { octant };
     let half = if x < 0.0 { PI - quadrant } else { quadrant };
     half.copysign(y)
 }
@@ -242,14 +228,7 @@ mod tests {
     use super::*;
 
     fn keypoint(x: f32, y: f32, scale: f32) -> Keypoint {
-        Keypoint {
-            x,
-            y,
-            scale,
-            angle: 0.0,
-            response: 1.0,
-            laplacian_positive: false,
-        }
+        Keypoint { x, y, scale, angle: 0.0, response: 1.0, laplacian_positive: false }
     }
 
     fn angle(image: &GrayImage, keypoint: &Keypoint) -> f32 {
@@ -280,9 +259,7 @@ mod tests {
             members.fold([0.0, 0.0], |[x, y], i| [x + dx[i], y + dy[i]])
         };
         let windows = directions.iter();
-        windows
-            .map(|&start| WIDTHS.map(|width| sum_from(start, width)))
-            .collect()
+        windows.map(|&start| WIDTHS.map(|width| sum_from(start, width))).collect()
     }
 
     proptest! {
@@ -331,9 +308,8 @@ mod tests {
 
     #[test]
     fn quarter_turns_of_the_image_turn_the_angle() {
-        let image = GrayImage::from_fn(61, 61, |x, y| {
-            Luma([((x * x + 7 * y + x * y / 3) % 251) as u8])
-        });
+        let image =
+            GrayImage::from_fn(61, 61, |x, y| Luma([((x * x + 7 * y + x * y / 3) % 251) as u8]));
         let turned = image::imageops::rotate90(&image);
         let before = angle(&image, &keypoint(28.0, 33.0, 2.3));
         // Rotated by 90° clockwise, (x, y) lies at (60 − y, x).

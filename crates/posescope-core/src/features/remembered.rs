@@ -30,9 +30,7 @@ pub fn remembered_interruptible<E>(
     params: &SurfParams,
     checkpoint: impl FnMut() -> Result<(), E>,
 ) -> Result<Recalled<Features>, E> {
-    memo.try_recall(Exact::of(params), || {
-        surf_interruptible(image, params, checkpoint)
-    })
+    memo.try_recall(Exact::of(params), || surf_interruptible(image, params, checkpoint))
 }
 
 #[cfg(test)]
@@ -48,10 +46,7 @@ mod tests {
         });
         let memo = Memo::of(2);
         let params = SurfParams::default();
-        let few = SurfParams {
-            max_keypoints: 3,
-            ..params
-        };
+        let few = SurfParams { max_keypoints: 3, ..params };
         for reused in [false, true] {
             for params in [params, few] {
                 let found = remembered(&image, &memo, &params);

@@ -13,12 +13,7 @@ pub(super) struct Responses {
 
 impl Responses {
     pub(super) fn new(layers: usize, columns: usize, held: usize) -> Self {
-        Self {
-            layers,
-            columns,
-            held,
-            samples: vec![0.0; layers * columns * held],
-        }
+        Self { layers, columns, held, samples: vec![0.0; layers * columns * held] }
     }
 
     /// One of the rows that are held.

@@ -105,12 +105,7 @@ pub fn sift_interruptible<E>(
     let mut found: Vec<(usize, Extremum)> = Vec::new();
     for (number, octave) in octaves.iter().enumerate() {
         checkpoint()?;
-        found.extend(
-            octave
-                .extrema(params)
-                .into_iter()
-                .map(|extremum| (number, extremum)),
-        );
+        found.extend(octave.extrema(params).into_iter().map(|extremum| (number, extremum)));
     }
     found.sort_by(|(_, a), (_, b)| {
         let strength = b.response.total_cmp(&a.response);
@@ -178,21 +173,14 @@ mod tests {
         // Off the middle between pixels of any octave, where two of them would be equally extreme.
         let image = blobs(&[(40.3, 30.6, 3.0, 90.0), (80.4, 54.4, 6.0, -90.0)]);
         for enlarge in [false, true] {
-            let params = SiftParams {
-                enlarge,
-                ..SiftParams::default()
-            };
+            let params = SiftParams { enlarge, ..SiftParams::default() };
             let found = sift(&image, &params).keypoints;
             for (x, y, sigma, is_dark) in [(40.3, 30.6, 3.0, false), (80.4, 54.4, 6.0, true)] {
                 let near = found
                     .iter()
                     .find(|k| (k.x - x).hypot(k.y - y) < 0.3 && k.laplacian_positive == is_dark)
                     .unwrap_or_else(|| panic!("{enlarge} {sigma}: {found:?}"));
-                assert!(
-                    (near.scale / sigma).ln().abs() < 0.35,
-                    "{enlarge}: {}",
-                    near.scale
-                );
+                assert!((near.scale / sigma).ln().abs() < 0.35, "{enlarge}: {}", near.scale);
             }
         }
     }
@@ -207,9 +195,7 @@ mod tests {
     }
 
     fn image(of: impl Fn(f32, f32) -> f32) -> GrayImage {
-        GrayImage::from_fn(160, 120, |x, y| {
-            Luma([of(x as f32, y as f32).round() as u8])
-        })
+        GrayImage::from_fn(160, 120, |x, y| Luma([of(x as f32, y as f32).round() as u8]))
     }
 
     /// The share of features that match a feature at the place where `moved` puts it.
@@ -223,16 +209,12 @@ mod tests {
             params,
         );
         let matches = nearest_neighbours(&after.descriptors, &before.descriptors);
-        let good = after
-            .keypoints
-            .iter()
-            .zip(&matches)
-            .filter(|(keypoint, found)| {
-                let Some(found) = found else { return false };
-                let (u, v) = moved(keypoint.x, keypoint.y);
-                let known = before.keypoints[found.nearest];
-                (known.x - u).hypot(known.y - v) < 1.5
-            });
+        let good = after.keypoints.iter().zip(&matches).filter(|(keypoint, found)| {
+            let Some(found) = found else { return false };
+            let (u, v) = moved(keypoint.x, keypoint.y);
+            let known = before.keypoints[found.nearest];
+            (known.x - u).hypot(known.y - v) < 1.5
+        });
         good.count() as f64 / after.keypoints.len().max(1) as f64
     }
 
@@ -246,10 +228,7 @@ mod tests {
             let (u, v) = (x - 80.0, y - 60.0);
             (80.0 + cos * u - sin * v, 60.0 + sin * u + cos * v)
         };
-        let free = SiftParams {
-            upright: false,
-            ..params
-        };
+        let free = SiftParams { upright: false, ..params };
         let (free, upright) = (repeated(&free, turned), repeated(&params, turned));
         assert!(free > 0.4 && upright < 0.1, "{free} {upright}");
     }
@@ -259,8 +238,7 @@ mod tests {
         let image = image(texture);
         let on = |threads: usize| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-            pool.expect("threads")
-                .install(|| sift(&image, &SiftParams::default()))
+            pool.expect("threads").install(|| sift(&image, &SiftParams::default()))
         };
         let features = on(1);
         assert!(features.keypoints.len() > 20);

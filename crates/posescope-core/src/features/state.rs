@@ -32,13 +32,8 @@ pub enum FeatureState {
 
 impl FeatureState {
     /// The names of all states, in the order of the funnel.
-    pub const NAMES: [&'static str; 5] = [
-        "ratio_failed",
-        "not_unique",
-        "no_depth",
-        "outlier",
-        "inlier",
-    ];
+    pub const NAMES: [&'static str; 5] =
+        ["ratio_failed", "not_unique", "no_depth", "outlier", "inlier"];
 
     /// Position in [`Self::NAMES`].
     pub fn index(&self) -> usize {

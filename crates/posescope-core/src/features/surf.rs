@@ -63,20 +63,15 @@ pub fn surf_interruptible<E>(
     let mut descriptors = Vec::with_capacity(keypoints.len());
     for keypoints in keypoints.chunks_mut(KEYPOINTS_AT_A_TIME) {
         checkpoint()?;
-        let described = keypoints
-            .par_iter_mut()
-            .map_init(Strips::default, |strips, keypoint| {
-                if !params.upright {
-                    keypoint.angle = estimator.angle(&integral, keypoint, strips);
-                }
-                describer.describe(&integral, keypoint, strips)
-            });
+        let described = keypoints.par_iter_mut().map_init(Strips::default, |strips, keypoint| {
+            if !params.upright {
+                keypoint.angle = estimator.angle(&integral, keypoint, strips);
+            }
+            describer.describe(&integral, keypoint, strips)
+        });
         descriptors.par_extend(described);
     }
-    Ok(Features {
-        keypoints,
-        descriptors,
-    })
+    Ok(Features { keypoints, descriptors })
 }
 
 fn strongest_first(a: &Keypoint, b: &Keypoint) -> std::cmp::Ordering {
@@ -109,10 +104,7 @@ mod tests {
         assert!(all.keypoints.len() > 10);
         assert_eq!(all.keypoints.len(), all.descriptors.len());
         assert!(all.keypoints.is_sorted_by(|a, b| a.response >= b.response));
-        let params = SurfParams {
-            max_keypoints: 7,
-            ..SurfParams::default()
-        };
+        let params = SurfParams { max_keypoints: 7, ..SurfParams::default() };
         let few = surf(&scene(), &params);
         assert_eq!(few.keypoints, all.keypoints[..7]);
         assert_eq!(few.descriptors, all.descriptors[..7]);
@@ -123,10 +115,7 @@ mod tests {
     #[test]
     fn upright_features_have_the_same_places() {
         let [turned, upright] = [false, true].map(|upright| {
-            let params = SurfParams {
-                upright,
-                ..SurfParams::default()
-            };
+            let params = SurfParams { upright, ..SurfParams::default() };
             surf(&scene(), &params)
         });
         for (turned, upright) in turned.keypoints.iter().zip(&upright.keypoints) {
@@ -139,8 +128,7 @@ mod tests {
     fn thread_count_does_not_matter() {
         let on = |threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-            pool.expect("a thread pool")
-                .install(|| surf(&scene(), &SurfParams::default()))
+            pool.expect("a thread pool").install(|| surf(&scene(), &SurfParams::default()))
         };
         assert_eq!(on(1), on(5));
     }
@@ -148,10 +136,7 @@ mod tests {
     #[test]
     fn every_pass_can_be_stopped_and_stopping_none_changes_nothing() {
         for upright in [true, false] {
-            let params = SurfParams {
-                upright,
-                ..SurfParams::default()
-            };
+            let params = SurfParams { upright, ..SurfParams::default() };
             let mut passes = 0;
             let all = surf_interruptible(&scene(), &params, || {
                 passes += 1;
@@ -166,11 +151,7 @@ mod tests {
                     pass += 1;
                     if pass > stop { Err(pass) } else { Ok(()) }
                 });
-                assert_eq!(
-                    stopped,
-                    Err(stop + 1),
-                    "nothing follows the pass that was stopped"
-                );
+                assert_eq!(stopped, Err(stop + 1), "nothing follows the pass that was stopped");
             }
         }
     }

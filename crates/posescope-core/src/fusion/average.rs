@@ -20,10 +20,8 @@ pub fn average_pose(members: &[(f64, &Pose)]) -> Option<Pose> {
     if total.is_nan() || total <= 0.0 {
         return None;
     }
-    let centre: Vector3<f64> = members
-        .iter()
-        .map(|(weight, pose)| pose.translation.vector * (weight / total))
-        .sum();
+    let centre: Vector3<f64> =
+        members.iter().map(|(weight, pose)| pose.translation.vector * (weight / total)).sum();
     let outer: Matrix4<f64> = members
         .iter()
         .map(|(weight, pose)| {
@@ -31,10 +29,7 @@ pub fn average_pose(members: &[(f64, &Pose)]) -> Option<Pose> {
             q * q.transpose() * (weight / total)
         })
         .sum();
-    Some(Pose::from_parts(
-        Translation3::from(centre),
-        principal_rotation(outer),
-    ))
+    Some(Pose::from_parts(Translation3::from(centre), principal_rotation(outer)))
 }
 
 fn principal_rotation(outer: Matrix4<f64>) -> UnitQuaternion<f64> {
@@ -52,10 +47,7 @@ mod tests {
 
     fn turned(axis: [f64; 3], angle: f64) -> Pose {
         let axis = nalgebra::Unit::new_normalize(Vector3::from(axis));
-        Pose::from_parts(
-            Translation3::identity(),
-            UnitQuaternion::from_axis_angle(&axis, angle),
-        )
+        Pose::from_parts(Translation3::identity(), UnitQuaternion::from_axis_angle(&axis, angle))
     }
 
     fn mean(members: &[(f64, Pose)]) -> Pose {
@@ -99,9 +91,7 @@ mod tests {
     fn rotation() -> impl Strategy<Value = UnitQuaternion<f64>> {
         let component = || -1.0..1.0f64;
         (component(), component(), component(), component())
-            .prop_filter("not zero", |(a, b, c, d)| {
-                a * a + b * b + c * c + d * d > 0.01
-            })
+            .prop_filter("not zero", |(a, b, c, d)| a * a + b * b + c * c + d * d > 0.01)
             .prop_map(|(a, b, c, d)| UnitQuaternion::from_quaternion(Quaternion::new(a, b, c, d)))
     }
 
@@ -115,10 +105,7 @@ mod tests {
         (rotation(), prop::collection::vec(member, 2..6)).prop_map(|(middle, members)| {
             let pose = |(weight, turn, place): (f64, [f64; 3], [f64; 3])| {
                 let rotation = middle * UnitQuaternion::from_scaled_axis(Vector3::from(turn));
-                (
-                    weight,
-                    Pose::from_parts(Translation3::from(place), rotation),
-                )
+                (weight, Pose::from_parts(Translation3::from(place), rotation))
             };
             members.into_iter().map(pose).collect()
         })

@@ -12,7 +12,5 @@ pub(super) const ENTRY: Entry = Entry {
 fn weigh(matches: &[usize]) -> Vec<f64> {
     let most = matches.iter().max();
     let winner = matches.iter().position(|count| Some(count) == most);
-    (0..matches.len())
-        .map(|index| if Some(index) == winner { 1.0 } else { 0.0 })
-        .collect()
+    (0..matches.len()).map(|index| if Some(index) == winner { 1.0 } else { 0.0 }).collect()
 }

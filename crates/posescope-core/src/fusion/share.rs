@@ -53,18 +53,15 @@ impl Support {
     /// In words: `12 of 40 correspondences agree`.
     pub fn words(&self) -> String {
         match *self {
-            Self::Inliers {
-                inliers,
-                correspondences,
-            } => format!("{inliers} of {correspondences} correspondences agree"),
-            Self::Cost {
-                cost: Some(cost),
-                coverage,
-            } => format!("cost {cost:.4} over {:.1} % of the image", 100.0 * coverage),
-            Self::Cost {
-                cost: None,
-                coverage,
-            } => format!("{:.1} % of the image, too little", 100.0 * coverage),
+            Self::Inliers { inliers, correspondences } => {
+                format!("{inliers} of {correspondences} correspondences agree")
+            }
+            Self::Cost { cost: Some(cost), coverage } => {
+                format!("cost {cost:.4} over {:.1} % of the image", 100.0 * coverage)
+            }
+            Self::Cost { cost: None, coverage } => {
+                format!("{:.1} % of the image, too little", 100.0 * coverage)
+            }
         }
     }
 }

@@ -40,10 +40,7 @@ impl ScoredLattice {
             .min_by(|a, b| a.0.total_cmp(&b.0))?;
         let (distance, target, cost) = nearest;
         if distance > reach_m {
-            return Some(Basin {
-                radius_m: 0.0,
-                margin: None,
-            });
+            return Some(Basin { radius_m: 0.0, margin: None });
         }
         let elsewhere = minima.iter().find(|(cell, _)| *cell != target);
         Some(Basin {
@@ -109,24 +106,14 @@ mod tests {
             .expect("it is small");
         let mut scores = vec![None; lattice.cells()];
         for (cell, offset) in lattice.hypotheses() {
-            scores[cell] = Some(Score {
-                cost: Some(cost(offset.right_m, offset.forward_m)),
-                covered: 1000,
-            });
+            scores[cell] =
+                Some(Score { cost: Some(cost(offset.right_m, offset.forward_m)), covered: 1000 });
         }
-        ScoredLattice {
-            lattice,
-            scores,
-            least_covered: 1,
-        }
+        ScoredLattice { lattice, scores, least_covered: 1 }
     }
 
     fn at(right_m: f64, forward_m: f64) -> Offset {
-        Offset {
-            right_m,
-            forward_m,
-            yaw_rad: 0.0,
-        }
+        Offset { right_m, forward_m, yaw_rad: 0.0 }
     }
 
     #[test]
@@ -155,10 +142,7 @@ mod tests {
     #[test]
     fn a_place_without_a_minimum_has_no_basin() {
         let surface = scored(|x, z| (x - 5.0).powi(2) + z.powi(2));
-        let nothing = Basin {
-            radius_m: 0.0,
-            margin: None,
-        };
+        let nothing = Basin { radius_m: 0.0, margin: None };
         assert_eq!(surface.basin(&at(-5.0, 0.0)), Some(nothing));
     }
 
@@ -168,10 +152,7 @@ mod tests {
         let cells: Vec<(usize, Offset)> = surface.lattice.hypotheses().collect();
         for (cell, offset) in cells {
             if offset.right_m.hypot(offset.forward_m) > 3.5 {
-                surface.scores[cell] = Some(Score {
-                    cost: None,
-                    covered: 0,
-                });
+                surface.scores[cell] = Some(Score { cost: None, covered: 0 });
             }
         }
         let basin = surface.basin(&at(0.0, 0.0)).expect("positions");

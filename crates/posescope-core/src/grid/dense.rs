@@ -36,10 +36,8 @@ impl DenseSurface {
     ) -> Result<Self, LatticeTooLarge> {
         let around = |phase| Lattice::new(phase, Offset::default(), radius_m, grid);
         let lattice = around(Phase::PositionCoarse)?;
-        let mut headings: Vec<f64> = around(Phase::YawCoarse)?
-            .hypotheses()
-            .map(|(_, offset)| offset.yaw_rad)
-            .collect();
+        let mut headings: Vec<f64> =
+            around(Phase::YawCoarse)?.hypotheses().map(|(_, offset)| offset.yaw_rad).collect();
         headings.sort_by(|a, b| a.abs().total_cmp(&b.abs()).then(a.total_cmp(b)));
         Ok(Self {
             yaws_rad: vec![0.0; lattice.cells()],
@@ -146,10 +144,7 @@ mod tests {
 
     /// 13 positions, 5 headings.
     fn surface(least_covered: u32) -> DenseSurface {
-        let grid = GridParams {
-            yaw_range_deg: 2.0,
-            ..GridParams::default()
-        };
+        let grid = GridParams { yaw_range_deg: 2.0, ..GridParams::default() };
         DenseSurface::new(2.0, &grid, least_covered).expect("small")
     }
 
@@ -163,10 +158,7 @@ mod tests {
                 break;
             }
             assert!(next.iter().all(|one| one.yaw_rad == next[0].yaw_rad));
-            let score = Score {
-                cost: Some(1.0),
-                covered: 1,
-            };
+            let score = Score { cost: Some(1.0), covered: 1 };
             surface.take(&vec![score; next.len()]);
             seen.extend(next);
         }
@@ -184,10 +176,7 @@ mod tests {
 
     #[test]
     fn a_surface_of_too_many_positions_is_refused() {
-        let grid = GridParams {
-            coarse_step_m: 0.05,
-            ..GridParams::default()
-        };
+        let grid = GridParams { coarse_step_m: 0.05, ..GridParams::default() };
         assert!(DenseSurface::new(500.0, &grid, 0).is_err());
     }
 

@@ -43,14 +43,7 @@ pub struct Lattice {
     reach_m: f64,
 }
 
-bits_of_fields!(Lattice {
-    phase,
-    columns,
-    rows,
-    step,
-    centre,
-    reach_m,
-});
+bits_of_fields!(Lattice { phase, columns, rows, step, centre, reach_m });
 
 impl Lattice {
     /// The hypotheses of `phase` around `centre`, for an uncertainty radius \[m\].
@@ -66,14 +59,12 @@ impl Lattice {
         let (half_range, step) = match phase {
             Phase::PositionCoarse => (radius_m, params.coarse_step_m),
             Phase::PositionFine => (params.fine_range_m, params.fine_step_m),
-            Phase::YawCoarse => (
-                params.yaw_range_deg.to_radians(),
-                params.yaw_step_deg.to_radians(),
-            ),
-            Phase::YawFine => (
-                params.yaw_fine_range_deg.to_radians(),
-                params.yaw_fine_step_deg.to_radians(),
-            ),
+            Phase::YawCoarse => {
+                (params.yaw_range_deg.to_radians(), params.yaw_step_deg.to_radians())
+            }
+            Phase::YawFine => {
+                (params.yaw_fine_range_deg.to_radians(), params.yaw_fine_step_deg.to_radians())
+            }
         };
         // The tolerance keeps 1.0 / 0.2 from becoming 4 steps.
         let steps = (half_range / step + 1e-9).floor().max(0.0);
@@ -136,10 +127,7 @@ mod tests {
     #[test]
     fn a_lattice_beyond_the_limit_is_refused_and_one_at_the_limit_is_not() {
         let coarse = |radius_m, coarse_step_m| {
-            let params = GridParams {
-                coarse_step_m,
-                ..GridParams::default()
-            };
+            let params = GridParams { coarse_step_m, ..GridParams::default() };
             Lattice::new(Phase::PositionCoarse, Offset::default(), radius_m, &params)
                 .map(|lattice| lattice.cells())
         };
@@ -154,22 +142,14 @@ mod tests {
         for radius_m in [1e300, f64::INFINITY] {
             assert!(coarse(radius_m, 0.05).is_err());
         }
-        let params = GridParams {
-            fine_range_m: 10.0,
-            fine_step_m: 0.01,
-            ..GridParams::default()
-        };
+        let params = GridParams { fine_range_m: 10.0, fine_step_m: 0.01, ..GridParams::default() };
         let refused = Lattice::new(Phase::PositionFine, Offset::default(), 1.0, &params);
         assert_eq!(refused.expect_err("4 million").cells, 2001.0 * 2001.0);
     }
 
     #[test]
     fn a_later_round_stays_within_the_disc_of_the_reference() {
-        let centre = Offset {
-            right_m: 8.0,
-            forward_m: -1.0,
-            yaw_rad: 0.1,
-        };
+        let centre = Offset { right_m: 8.0, forward_m: -1.0, yaw_rad: 0.1 };
         let lattice = lattice(Phase::PositionCoarse, centre, 10.0);
         let distances: Vec<f64> = lattice
             .hypotheses()
@@ -181,11 +161,7 @@ mod tests {
 
     #[test]
     fn the_fine_lattice_reaches_both_ends_and_contains_its_centre() {
-        let centre = Offset {
-            right_m: 3.0,
-            forward_m: -2.0,
-            yaw_rad: 0.0,
-        };
+        let centre = Offset { right_m: 3.0, forward_m: -2.0, yaw_rad: 0.0 };
         let lattice = lattice(Phase::PositionFine, centre, 10.0);
         assert_eq!((lattice.columns, lattice.rows), (11, 11));
         assert_eq!(lattice.offset(60), Some(centre));

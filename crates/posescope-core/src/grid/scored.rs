@@ -45,10 +45,10 @@ impl ScoredLattice {
     /// apart: they differ by less than 1e-9.
     pub fn flat_cost(&self) -> Option<(f64, usize)> {
         let costs = (0..self.scores.len()).filter_map(|cell| self.eligible_cost(cell));
-        let (least, most, count) = costs.fold(
-            (f64::INFINITY, f64::NEG_INFINITY, 0),
-            |(least, most, count), cost| (cost.min(least), cost.max(most), count + 1),
-        );
+        let (least, most, count) = costs
+            .fold((f64::INFINITY, f64::NEG_INFINITY, 0), |(least, most, count), cost| {
+                (cost.min(least), cost.max(most), count + 1)
+            });
         (count > 1 && most - least < LEAST_DIFFERENCE).then_some((least, count))
     }
 
@@ -101,10 +101,7 @@ mod tests {
         lattice.rows = costs.len() / columns;
         ScoredLattice {
             lattice,
-            scores: costs
-                .iter()
-                .map(|&cost| Some(Score { cost, covered }))
-                .collect(),
+            scores: costs.iter().map(|&cost| Some(Score { cost, covered })).collect(),
             least_covered: 10,
         }
     }
@@ -120,23 +117,14 @@ mod tests {
     #[test]
     fn a_hypothesis_below_the_coverage_floor_cannot_win() {
         let mut surface = scored(&[Some(1.0), Some(2.0)], 20, 2);
-        surface.scores[0] = Some(Score {
-            cost: Some(1.0),
-            covered: 9,
-        });
+        surface.scores[0] = Some(Score { cost: Some(1.0), covered: 9 });
         assert_eq!(surface.minimum(), Some(1));
     }
 
     #[test]
     fn a_surface_is_flat_only_if_several_costs_are_all_equal() {
-        assert_eq!(
-            scored(&[Some(2.0), None, Some(2.0)], 20, 3).flat_cost(),
-            Some((2.0, 2))
-        );
-        assert_eq!(
-            scored(&[Some(2.0), Some(2.0 + 1e-12)], 20, 2).flat_cost(),
-            Some((2.0, 2))
-        );
+        assert_eq!(scored(&[Some(2.0), None, Some(2.0)], 20, 3).flat_cost(), Some((2.0, 2)));
+        assert_eq!(scored(&[Some(2.0), Some(2.0 + 1e-12)], 20, 2).flat_cost(), Some((2.0, 2)));
         assert_eq!(scored(&[Some(2.0), Some(2.1)], 20, 2).flat_cost(), None);
         assert_eq!(scored(&[Some(2.0), None], 20, 2).flat_cost(), None);
     }
@@ -159,11 +147,7 @@ mod tests {
         let score = (cost, 0_u32..40).prop_map(|(cost, covered)| Score { cost, covered });
         let cell = prop::option::weighted(0.9, score);
         (prop::collection::vec(cell, 12), 0_u32..40).prop_map(|(scores, least_covered)| {
-            ScoredLattice {
-                scores,
-                least_covered,
-                ..scored(&[None; 12], 0, 4)
-            }
+            ScoredLattice { scores, least_covered, ..scored(&[None; 12], 0, 4) }
         })
     }
 

@@ -16,11 +16,7 @@ impl ScoredLattice {
         if !scorer.is_from_device() {
             return;
         }
-        let mut cells: Vec<usize> = self
-            .local_minima()
-            .iter()
-            .map(|minimum| minimum.0)
-            .collect();
+        let mut cells: Vec<usize> = self.local_minima().iter().map(|minimum| minimum.0).collect();
         let least = self.minimum().and_then(|cell| self.eligible_cost(cell));
         let is_near = |&cell: &usize| {
             let costs = self.eligible_cost(cell).zip(least);

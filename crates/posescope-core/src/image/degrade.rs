@@ -119,10 +119,7 @@ impl Degradation {
             }
             None => {
                 let names: Vec<String> = steps.into_iter().map(|step| step.key).collect();
-                Err(DegradationError::Unknown {
-                    name: name.to_owned(),
-                    known: names.join(", "),
-                })
+                Err(DegradationError::Unknown { name: name.to_owned(), known: names.join(", ") })
             }
         }
     }
@@ -294,13 +291,8 @@ mod tests {
     }
 
     fn degradations() -> impl Strategy<Value = Degradation> {
-        let strengths = (
-            0.0..=1.0_f64,
-            0.0..=3.0_f64,
-            -3.0..=3.0_f64,
-            0.05..=10.0_f64,
-            0.0..=40.0_f64,
-        );
+        let strengths =
+            (0.0..=1.0_f64, 0.0..=3.0_f64, -3.0..=3.0_f64, 0.05..=10.0_f64, 0.0..=40.0_f64);
         (strengths, any::<bool>()).prop_map(
             |((fog, blur_px, exposure_stops, gamma, noise_levels), invert)| Degradation {
                 fog,
@@ -413,15 +405,9 @@ mod tests {
         );
         assert_eq!(said("gamma=0"), "`gamma` takes 0.05 … 10, not `0`");
         assert_eq!(said("blur=-1"), "`blur` takes 0 … 20 px, not `-1`");
-        assert_eq!(
-            said("noise=nan"),
-            "`noise` takes 0 … 128 grey levels, not `nan`"
-        );
+        assert_eq!(said("noise=nan"), "`noise` takes 0 … 128 grey levels, not `nan`");
         assert_eq!(said("noise"), "`noise` takes 0 … 128 grey levels, not ``");
-        assert_eq!(
-            said("invert=maybe"),
-            "`invert` takes true | false, not `maybe`"
-        );
+        assert_eq!(said("invert=maybe"), "`invert` takes true | false, not `maybe`");
         assert_eq!(said("fog=0.1,fog=0.2"), "`fog` is given twice");
         for empty in ["", ",", "gamma=1,"] {
             assert!(said(empty).contains("such as gamma=0.4"), "{empty}");

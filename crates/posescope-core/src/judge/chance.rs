@@ -15,11 +15,7 @@ pub fn corrected_distance(counts: &[u32], bins: usize, corrected: bool) -> Optio
     if larger <= LEAST_ENTROPY {
         return None;
     }
-    let by_chance = if corrected {
-        chance_level(counts, bins)
-    } else {
-        0.0
-    };
+    let by_chance = if corrected { chance_level(counts, bins) } else { 0.0 };
     Some(1.0 - (entropies.mutual_information() - by_chance) / larger)
 }
 
@@ -82,12 +78,7 @@ mod tests {
         let expected = 15.0 * 15.0 / 3200.0 / larger;
         let cost = corrected_distance(&counts, 16, true).expect("textured");
         assert!((cost - expected).abs() < 1e-12);
-        assert!(
-            corrected_distance(&counts, 16, false)
-                .expect("textured")
-                .abs()
-                < 1e-12
-        );
+        assert!(corrected_distance(&counts, 16, false).expect("textured").abs() < 1e-12);
         let mut constant = vec![0; 256];
         constant[37] = 200;
         assert_eq!(corrected_distance(&constant, 16, true), None);

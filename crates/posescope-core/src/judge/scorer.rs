@@ -81,20 +81,12 @@ impl Judge {
         shrink: u32,
     ) -> Self {
         let query = &problem.query;
-        let bins = query.memo.recall(
-            QueryKey {
-                params: Exact::of(params),
-                shrink,
-            },
-            || query_bins(&query.photo.gray, params, shrink),
-        );
+        let bins = query.memo.recall(QueryKey { params: Exact::of(params), shrink }, || {
+            query_bins(&query.photo.gray, params, shrink)
+        });
         let reference = &problem.reference;
         let points = reference.memo.recall(
-            ReferenceKey {
-                params: Exact::of(params),
-                render: Exact::of(render),
-                shrink,
-            },
+            ReferenceKey { params: Exact::of(params), render: Exact::of(render), shrink },
             || reference_points(problem, render, params, shrink),
         );
         Self {
@@ -121,10 +113,7 @@ impl Judge {
             let idle = self.idle().pop();
             let Some(mut worker) = idle.or_else(|| Worker::new(&self.intrinsics, self.splat_px))
             else {
-                let nothing = Score {
-                    cost: None,
-                    covered: 0,
-                };
+                let nothing = Score { cost: None, covered: 0 };
                 return vec![nothing; poses.len()];
             };
             let scores = poses.iter().map(|pose| worker.score(self, pose)).collect();
@@ -137,9 +126,7 @@ impl Judge {
     /// The costs of some poses, `None` for those that cover fewer than `least_covered` pixels.
     pub fn costs(&self, reference_from_camera: &[Pose], least_covered: u32) -> Vec<Option<f64>> {
         let scores = self.score(reference_from_camera).into_iter();
-        scores
-            .map(|score| score.eligible_cost(least_covered))
-            .collect()
+        scores.map(|score| score.eligible_cost(least_covered)).collect()
     }
 
     /// The cost at a pose if the view's pixels had nothing to do with the query's: what a minimum must
@@ -160,10 +147,7 @@ impl Judge {
     }
 
     fn values(&self) -> Values<'_, Bins> {
-        Values {
-            query: &self.query.0,
-            points: &self.reference.bins,
-        }
+        Values { query: &self.query.0, points: &self.reference.bins }
     }
 
     /// How many poses to score at a time, so that a run can be stopped soon: at most
@@ -185,10 +169,7 @@ struct Worker {
 
 impl Worker {
     fn new(intrinsics: &Intrinsics, splat_px: usize) -> Option<Self> {
-        Some(Self {
-            canvas: DepthCanvas::new(intrinsics, splat_px)?,
-            counts: Vec::new(),
-        })
+        Some(Self { canvas: DepthCanvas::new(intrinsics, splat_px)?, counts: Vec::new() })
     }
 
     fn score(&mut self, judge: &Judge, reference_from_camera: &Pose) -> Score {
@@ -197,21 +178,13 @@ impl Worker {
         let positions = &judge.reference.positions;
         let keep = |query, synthetic| Pair { query, synthetic };
         let pairs = canvas.draw(positions, judge.values(), &camera_from_points, keep);
-        Score {
-            cost: cost_of(pairs, &judge.params, counts),
-            covered: pairs.len() as u32,
-        }
+        Score { cost: cost_of(pairs, &judge.params, counts), covered: pairs.len() as u32 }
     }
 }
 
 /// The mean cost of the channels over the pairs.
 fn cost_of(pairs: &[Pair<Bins>], params: &JudgeParams, counts: &mut Vec<u32>) -> Option<f64> {
-    let &JudgeParams {
-        bins,
-        channels,
-        corrected,
-        ..
-    } = params;
+    let &JudgeParams { bins, channels, corrected, .. } = params;
     count(pairs, bins, channels, counts);
     let cells = bins * bins;
     let mut costs = [None; 3];
@@ -297,10 +270,7 @@ fn reference_points(
         let values = [intensity, channels.value(1, x, y), channels.value(2, x, y)];
         binned(values, params.bins)
     });
-    ReferencePoints {
-        bins: bins.collect(),
-        positions: PointArrays::new(points.iter().copied()),
-    }
+    ReferencePoints { bins: bins.collect(), positions: PointArrays::new(points.iter().copied()) }
 }
 
 /// The photo with squares of `shrink` × `shrink` pixels as its pixels, and the parameters for it.

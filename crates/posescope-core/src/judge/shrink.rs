@@ -99,12 +99,7 @@ pub fn shrink<E>(
     let mut walks: Vec<Walk> = starts
         .iter()
         .map(|&start| Walk {
-            refined: Refined {
-                start,
-                pose: start.pose,
-                cost: start.cost,
-                evaluations: 0,
-            },
+            refined: Refined { start, pose: start.pose, cost: start.cost, evaluations: 0 },
             step_m: plan.first_m,
         })
         .collect();
@@ -117,10 +112,8 @@ pub fn shrink<E>(
     };
     let axes = plan.freedoms.axes();
     for _ in 0..MOST_ROUNDS {
-        let mut active: Vec<&mut Walk> = walks
-            .iter_mut()
-            .filter(|walk| walk.step_m >= plan.last_m)
-            .collect();
+        let mut active: Vec<&mut Walk> =
+            walks.iter_mut().filter(|walk| walk.step_m >= plan.last_m).collect();
         if active.is_empty() {
             break;
         }
@@ -142,15 +135,10 @@ pub fn shrink<E>(
             .zip(costs.chunks(2 * axes.len()))
             .map(|(walk, costs)| vertex(walk, costs, plan))
             .collect();
-        let combined: Vec<Pose> = active
-            .iter()
-            .zip(&vertices)
-            .map(|(walk, by)| moved(&walk.refined.pose, by))
-            .collect();
+        let combined: Vec<Pose> =
+            active.iter().zip(&vertices).map(|(walk, by)| moved(&walk.refined.pose, by)).collect();
         let at_vertices = scored(&combined)?;
-        let per_walk = probes
-            .chunks(2 * axes.len())
-            .zip(costs.chunks(2 * axes.len()));
+        let per_walk = probes.chunks(2 * axes.len()).zip(costs.chunks(2 * axes.len()));
         let per_walk = per_walk.zip(combined.iter().zip(&at_vertices).zip(&vertices));
         for (walk, ((probes, costs), ((combined, at_vertex), by))) in
             active.iter_mut().zip(per_walk)
@@ -225,12 +213,7 @@ mod tests {
     }
 
     fn plan(freedoms: Freedoms) -> Shrinking {
-        Shrinking {
-            freedoms,
-            first_m: 0.5,
-            last_m: 1e-4,
-            rad_per_m: 0.1,
-        }
+        Shrinking { freedoms, first_m: 0.5, last_m: 1e-4, rad_per_m: 0.1 }
     }
 
     fn refined(truth: &Pose, start: Pose, plan: &Shrinking) -> Refined {
@@ -250,21 +233,14 @@ mod tests {
         let start = moved(&truth, &[0.6, 0.2, -0.9, 0.02, 0.05, -0.03]);
         let found = refined(&truth, start, &plan(Freedoms::Six));
         let error = PoseError::between(&truth, &found.pose);
-        assert!(
-            error.translation_m < 0.01 && error.rotation_deg < 0.05,
-            "{error}"
-        );
+        assert!(error.translation_m < 0.01 && error.rotation_deg < 0.05, "{error}");
         assert!(found.cost < valley(&truth, &start) && found.evaluations > 0);
     }
 
     #[test]
     fn in_the_plane_height_roll_and_pitch_stay() {
         let truth = moved(&Pose::identity(), &[0.0, -0.4, 0.0, 0.03, 0.0, 0.02]);
-        let found = refined(
-            &truth,
-            Pose::translation(0.5, 0.0, 0.8),
-            &plan(Freedoms::Plane),
-        );
+        let found = refined(&truth, Pose::translation(0.5, 0.0, 0.8), &plan(Freedoms::Plane));
         assert!(found.pose.translation.y.abs() < 1e-9);
         let axis = found.pose.rotation.scaled_axis();
         assert!(axis.x.abs() < 1e-9 && axis.z.abs() < 1e-9);
@@ -276,10 +252,7 @@ mod tests {
 
     #[test]
     fn where_nothing_has_a_cost_a_start_stays_and_ends() {
-        let start = Start {
-            pose: Pose::identity(),
-            cost: 0.7,
-        };
+        let start = Start { pose: Pose::identity(), cost: 0.7 };
         let nothing = |poses: &[Pose]| Ok::<_, Infallible>(vec![None; poses.len()]);
         let Ok(refined) = shrink(&[start], &plan(Freedoms::Six), nothing);
         assert_eq!((refined[0].pose, refined[0].cost), (start.pose, 0.7));

@@ -52,9 +52,7 @@ impl Chooser<'_> {
                     .collect()
             }
             (None, _) => {
-                return Err(ChoiceError::UnknownPosition {
-                    query: name.clone(),
-                });
+                return Err(ChoiceError::UnknownPosition { query: name.clone() });
             }
         };
         let count = self.selection.count();
@@ -65,10 +63,7 @@ impl Chooser<'_> {
                 within.into()
             }
             Selection::Matched(_) => {
-                let by_matches = ByMatches {
-                    scene: references,
-                    params: self.params,
-                };
+                let by_matches = ByMatches { scene: references, params: self.params };
                 self.ranked(query, &within, &by_matches, observer)?
             }
             Selection::Retrieved(_) => {
@@ -76,10 +71,7 @@ impl Chooser<'_> {
                 self.ranked(query, &within, index, observer)?
             }
         };
-        Ok(References {
-            within_m: place.map(|_| self.radius_m),
-            ..chosen
-        })
+        Ok(References { within_m: place.map(|_| self.radius_m), ..chosen })
     }
 
     fn ranked(

@@ -142,10 +142,7 @@ impl<'a> Localizer<'a> {
     /// result, to see what would have helped.
     #[must_use]
     pub fn explaining(self, runs: usize) -> Self {
-        Self {
-            runs_to_explain: runs,
-            ..self
-        }
+        Self { runs_to_explain: runs, ..self }
     }
 
     /// The same localizer, for which a pose is right that is within `tolerance` of the truth.
@@ -158,10 +155,7 @@ impl<'a> Localizer<'a> {
     /// probability.
     #[must_use]
     pub fn accepting_from(self, least_probability: Option<f64>) -> Self {
-        Self {
-            least_probability,
-            ..self
-        }
+        Self { least_probability, ..self }
     }
 
     /// The same localizer, with what other systems answered about the queries: their poses are methods
@@ -277,22 +271,13 @@ impl<'a> Localizer<'a> {
         for &method in methods {
             for (request, members) in requests.clone() {
                 let mut emit = |result: QueryResult, times: StageTimes, asked: Request| {
-                    emit(Answer {
-                        result: self.marked(result, request.setting),
-                        times,
-                        asked,
-                    })
+                    emit(Answer { result: self.marked(result, request.setting), times, asked })
                 };
                 if members.is_empty() {
-                    let failure = Failure::NoReference {
-                        radius_m: request.references.within_m,
-                    };
+                    let failure = Failure::NoReference { radius_m: request.references.within_m };
                     let fusions = request.fusions.iter().copied().map(Some);
-                    let lines = if request.fusions.is_empty() {
-                        vec![None]
-                    } else {
-                        fusions.collect()
-                    };
+                    let lines =
+                        if request.fusions.is_empty() { vec![None] } else { fusions.collect() };
                     for fusion in lines {
                         let result = self.without_pose(work, method, fusion, &failure);
                         let result = self.with_ranking_judged(result, request, work.truth.as_ref());
@@ -317,10 +302,7 @@ impl<'a> Localizer<'a> {
                 for &fusion in &request.fusions {
                     let (result, times) =
                         self.fuse(work, members, method, fusion, request, observer)?;
-                    let asked = Request {
-                        fusions: vec![fusion],
-                        ..request.clone()
-                    };
+                    let asked = Request { fusions: vec![fusion], ..request.clone() };
                     emit(result, times, asked)?;
                 }
             }
@@ -335,10 +317,7 @@ impl<'a> Localizer<'a> {
         observer: &mut dyn LocalizeObserver,
     ) -> Result<(), Cancelled> {
         let mut reported: Vec<&Arc<ReferenceRanking>> = Vec::new();
-        for ranking in requests
-            .iter()
-            .filter_map(|r| r.references.ranking.as_ref())
-        {
+        for ranking in requests.iter().filter_map(|r| r.references.ranking.as_ref()) {
             if !reported.iter().any(|known| Arc::ptr_eq(known, ranking)) {
                 observer.begin_retrieval();
                 let sink: &mut dyn Sink = &mut *observer;
@@ -413,12 +392,7 @@ impl<'a> Localizer<'a> {
                 };
                 // A fallback has the verdicts of the method that it fell back to.
                 let verdicts = outcome.fell_back.then(|| direct.result.diagnosis.clone());
-                let estimated = Estimated {
-                    outcome,
-                    evidence,
-                    times,
-                    verdicts,
-                };
+                let estimated = Estimated { outcome, evidence, times, verdicts };
                 self.judged(work, problem, method, estimated)
             }
             None => self.estimate(work, problem, method, observer)?,
@@ -456,12 +430,8 @@ impl<'a> Localizer<'a> {
             }
             None => self.ask(current, method, &mut trace)?,
         };
-        let estimated = Estimated {
-            outcome,
-            evidence,
-            times: timings.into_times(),
-            verdicts: None,
-        };
+        let estimated =
+            Estimated { outcome, evidence, times: timings.into_times(), verdicts: None };
         Ok(self.judged(work, problem, method, estimated))
     }
 

@@ -283,14 +283,8 @@ pub struct CostAtPose {
 fn costs_at(subject: &Subject<'_>, pose: &Pose) -> Vec<CostAtPose> {
     let problem = subject.problem;
     let mut poses = vec![problem.reference_from_query(pose)];
-    poses.extend(
-        subject
-            .truth
-            .map(|truth| problem.reference_from_query(truth)),
-    );
-    let searching = estimator::all()
-        .iter()
-        .filter(|entry| entry.cost().is_some());
+    poses.extend(subject.truth.map(|truth| problem.reference_from_query(truth)));
+    let searching = estimator::all().iter().filter(|entry| entry.cost().is_some());
     let mut costs = Vec::new();
     for entry in searching {
         let estimator = entry.make(subject.params);
@@ -318,25 +312,17 @@ pub(super) fn evaluate_as(
     subject: &Subject<'_>,
     assessment: Assessment,
 ) -> QueryResult {
-    let Subject {
-        problem,
-        method,
-        outcome,
-        truth,
-        ..
-    } = *subject;
-    let cost_at_truth = truth
-        .filter(|_| outcome.cost.is_some())
-        .and_then(|truth_pose| {
-            let estimator = estimator::find(method)?.make(subject.params);
-            let truth = [problem.reference_from_query(truth_pose)];
-            let mut cost = None;
-            if estimator.with_scorer(problem, &mut |scorer| cost = scorer.score(&truth)[0].cost) {
-                cost
-            } else {
-                estimator.score_at(problem, truth_pose)?.cost
-            }
-        });
+    let Subject { problem, method, outcome, truth, .. } = *subject;
+    let cost_at_truth = truth.filter(|_| outcome.cost.is_some()).and_then(|truth_pose| {
+        let estimator = estimator::find(method)?.make(subject.params);
+        let truth = [problem.reference_from_query(truth_pose)];
+        let mut cost = None;
+        if estimator.with_scorer(problem, &mut |scorer| cost = scorer.score(&truth)[0].cost) {
+            cost
+        } else {
+            estimator.score_at(problem, truth_pose)?.cost
+        }
+    });
     let basin = truth.and_then(|truth| {
         let place = Offset::of(&problem.reference_from_query(truth));
         subject.evidence.coarse()?.basin(&place)
@@ -385,9 +371,7 @@ impl QueryResult {
         truth: Option<&Pose>,
         right: Tolerance,
     ) -> Self {
-        let error = truth
-            .zip(pose.ok())
-            .map(|(truth, pose)| PoseError::between(truth, pose));
+        let error = truth.zip(pose.ok()).map(|(truth, pose)| PoseError::between(truth, pose));
         Self {
             schema: SCHEMA.to_owned(),
             scene: scene.to_owned(),
@@ -399,16 +383,11 @@ impl QueryResult {
             seed,
             degraded: None,
             setting: None,
-            status: if pose.is_ok() {
-                Status::Ok
-            } else {
-                Status::Failed
-            },
+            status: if pose.is_ok() { Status::Ok } else { Status::Failed },
             grade: Grade::of(pose.is_ok(), error.as_ref(), right),
-            reason: pose.err().map(|failure| Reason {
-                code: Code::of(failure),
-                text: failure.to_string(),
-            }),
+            reason: pose
+                .err()
+                .map(|failure| Reason { code: Code::of(failure), text: failure.to_string() }),
             pose: pose.ok().map(PoseReport::from),
             error,
             initial_error: None,
@@ -442,9 +421,7 @@ impl QueryResult {
         shown.error = None;
         shown.initial_error = None;
         shown.explanation = None;
-        shown
-            .diagnosis
-            .retain(|found| !found.code.rule().needs_truth);
+        shown.diagnosis.retain(|found| !found.code.rule().needs_truth);
         if let Some(cost) = &mut shown.cost {
             cost.truth = None;
         }
@@ -467,10 +444,7 @@ impl QueryResult {
     /// The same result, graded by another tolerance.
     #[must_use]
     pub fn graded(self, right: Tolerance) -> Self {
-        Self {
-            grade: Grade::of(self.status == Status::Ok, self.error.as_ref(), right),
-            ..self
-        }
+        Self { grade: Grade::of(self.status == Status::Ok, self.error.as_ref(), right), ..self }
     }
 
     /// Its confidence in one word, where it has one.
@@ -486,10 +460,7 @@ impl QueryResult {
 
     /// The same, as it stands in the list of another result.
     pub fn nested(&self) -> Self {
-        Self {
-            per_reference: None,
-            ..self.clone()
-        }
+        Self { per_reference: None, ..self.clone() }
     }
 }
 
@@ -512,10 +483,7 @@ mod tests {
             "explanation": {"helped": [], "runs": 3, "complete": true}
         });
         let alone: QueryResult = serde_json::from_value(result).expect("a result");
-        let fused = QueryResult {
-            per_reference: Some(vec![alone.clone()]),
-            ..alone
-        };
+        let fused = QueryResult { per_reference: Some(vec![alone.clone()]), ..alone };
         assert_eq!(fused.shown(true), fused);
         let hidden = fused.shown(false);
         let inside = hidden.per_reference.as_ref().expect("kept")[0].clone();

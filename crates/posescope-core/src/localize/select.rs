@@ -133,11 +133,7 @@ pub struct References {
 
 impl From<Vec<usize>> for References {
     fn from(frames: Vec<usize>) -> Self {
-        Self {
-            frames,
-            ranking: None,
-            within_m: None,
-        }
+        Self { frames, ranking: None, within_m: None }
     }
 }
 
@@ -152,9 +148,7 @@ pub fn report_ranking(
 ) -> Result<(), Cancelled> {
     let photo = |reference: &RankedReference| {
         let read = references.query(reference.ranked.frame);
-        read.inspect_err(|error| log::warn!("{error}"))
-            .ok()
-            .map(|frame| Arc::clone(&frame.photo))
+        read.inspect_err(|error| log::warn!("{error}")).ok().map(|frame| Arc::clone(&frame.photo))
     };
     trace.stage(Stage::Retrieve, |trace| {
         trace.emit(|| ReferencesRanked {
@@ -293,10 +287,7 @@ mod tests {
     fn a_draw_follows_from_seed_and_query_and_not_from_the_order_of_the_candidates() {
         let all: Vec<usize> = (0..40).collect();
         let drawn = draw(all.clone(), 5, "000070", 0);
-        assert_eq!(
-            drawn,
-            draw(all.iter().rev().copied().collect(), 5, "000070", 0)
-        );
+        assert_eq!(drawn, draw(all.iter().rev().copied().collect(), 5, "000070", 0));
         assert_eq!(draw(all.clone(), 2, "000070", 0), drawn[..2]);
         assert_ne!(drawn, draw(all.clone(), 5, "000071", 0));
         assert_ne!(drawn, draw(all, 5, "000070", 1));

@@ -37,9 +37,8 @@ pub fn localize_traced(
         return estimate_traced(problem, method, params, trace);
     }
     let mut evidence = Evidence::default();
-    let outcome = trace.heard_by(&mut evidence, |trace| {
-        estimate_traced(problem, method, params, trace)
-    })?;
+    let outcome =
+        trace.heard_by(&mut evidence, |trace| estimate_traced(problem, method, params, trace))?;
     let subject = Subject::new(problem, method, params, &outcome, &evidence);
     Ok(confidence::accepted(&subject, None))
 }
@@ -91,9 +90,7 @@ pub fn localize_jointly(
     params: &Params,
     trace: &mut Trace<'_>,
 ) -> Result<(Result<Pose, Failure>, Vec<Share>), Cancelled> {
-    let fused = catch_unwind(AssertUnwindSafe(|| {
-        fuse_jointly(method, params, references, trace)
-    }));
+    let fused = catch_unwind(AssertUnwindSafe(|| fuse_jointly(method, params, references, trace)));
     fused.unwrap_or_else(|panic| {
         let message = words_of(panic.as_ref());
         Ok((Err(Failure::Internal { message }), Vec::new()))

@@ -116,14 +116,8 @@ mod tests {
         let short = times(&[("fb.detect", 2), ("fb", 3)]);
         let whole = times(&[("fb.detect", 4), ("fb.match", 5), ("fb", 10)]);
         let sum = StageTimes::sum([&short, &whole]);
-        assert_eq!(
-            sum.0,
-            times(&[("fb.detect", 6), ("fb.match", 5), ("fb", 13)]).0
-        );
+        assert_eq!(sum.0, times(&[("fb.detect", 6), ("fb.match", 5), ("fb", 13)]).0);
         let inside = StageTimes::inside("hy", [&short]);
-        assert_eq!(
-            inside.0,
-            times(&[("hy.fb.detect", 2), ("hy.fb", 3), ("hy", 3)]).0
-        );
+        assert_eq!(inside.0, times(&[("hy.fb.detect", 2), ("hy.fb", 3), ("hy", 3)]).0);
     }
 }

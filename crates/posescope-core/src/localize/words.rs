@@ -36,9 +36,7 @@ impl QueryResult {
         let Some((primary, others)) = self.diagnosis.split_first() else {
             return Vec::new();
         };
-        let also = others
-            .iter()
-            .map(|one| format!("also {}: {}", one.code, one.text));
+        let also = others.iter().map(|one| format!("also {}: {}", one.code, one.text));
         let mut paragraphs: Vec<String> = also.collect();
         let Some(explanation) = &self.explanation else {
             if self.grade.is_failure() {
@@ -90,17 +88,12 @@ impl QueryResult {
             let part = |words: &str, cost: Option<f64>| {
                 cost.map_or(String::new(), |cost| format!(", {words} {cost:.4}"))
             };
-            let (truth, shuffled) = (
-                part("at truth", cost.truth),
-                part("shuffled", cost.shuffled),
-            );
+            let (truth, shuffled) = (part("at truth", cost.truth), part("shuffled", cost.shuffled));
             return format!("cost {:.4}{truth}{shuffled}", cost.best);
         }
         if !self.costs_at_pose.is_empty() {
             let costs = self.costs_at_pose.iter().map(|one| {
-                let cost = one
-                    .cost
-                    .map_or("none".to_owned(), |cost| format!("{cost:.4}"));
+                let cost = one.cost.map_or("none".to_owned(), |cost| format!("{cost:.4}"));
                 let truth = one.truth.map(|truth| format!(" (truth {truth:.4})"));
                 format!("{} {cost}{}", one.method, truth.unwrap_or_default())
             });
@@ -136,10 +129,7 @@ mod tests {
             "error": error(12.5), "diagnosis": [finding("D2"), finding("L1")]
         });
         let mut result: QueryResult = serde_json::from_value(result).expect("a result");
-        assert_eq!(
-            result.headline(),
-            "000070 mi avg, 12.500 m: D2 The cost is wrong."
-        );
+        assert_eq!(result.headline(), "000070 mi avg, 12.500 m: D2 The cost is wrong.");
         assert!(result.evidence().starts_with("D2 "));
         let [also, advice] = result.paragraphs().try_into().expect("two paragraphs");
         assert_eq!(also, "also L1: The cost is wrong.");
@@ -150,10 +140,7 @@ mod tests {
         });
         result.explanation = serde_json::from_value(explanation).expect("an explanation");
         let paragraphs = result.paragraphs();
-        assert!(
-            paragraphs[1].starts_with("helped: --radius 20 (0.500 m"),
-            "{paragraphs:?}"
-        );
+        assert!(paragraphs[1].starts_with("helped: --radius 20 (0.500 m"), "{paragraphs:?}");
         assert_eq!(paragraphs[2], "stopped before all remedies were tried");
 
         result.diagnosis.clear();

@@ -37,10 +37,7 @@ impl Key {
     /// The key of this value.
     pub fn new<T: Any + Hash + Eq + Send + Sync>(key: T) -> Self {
         let hasher = BuildHasherDefault::<DefaultHasher>::default();
-        Self {
-            hash: hasher.hash_one((TypeId::of::<T>(), &key)),
-            key: Arc::new(key),
-        }
+        Self { hash: hasher.hash_one((TypeId::of::<T>(), &key)), key: Arc::new(key) }
     }
 }
 
@@ -77,19 +74,13 @@ impl<T: Bits + ?Sized> Exact<T> {
     pub fn of(value: &T) -> Self {
         let mut words = Vec::new();
         value.write(&mut words);
-        Self {
-            words: words.into(),
-            of: PhantomData,
-        }
+        Self { words: words.into(), of: PhantomData }
     }
 }
 
 impl<T: ?Sized> Clone for Exact<T> {
     fn clone(&self) -> Self {
-        Self {
-            words: self.words.clone(),
-            of: PhantomData,
-        }
+        Self { words: self.words.clone(), of: PhantomData }
     }
 }
 
@@ -161,11 +152,7 @@ impl Bits for Point3<f64> {
 
 impl Bits for Pose {
     fn write(&self, words: &mut Vec<u64>) {
-        let numbers = self
-            .translation
-            .vector
-            .iter()
-            .chain(self.rotation.coords.iter());
+        let numbers = self.translation.vector.iter().chain(self.rotation.coords.iter());
         words.extend(numbers.map(|value| value.to_bits()));
     }
 }

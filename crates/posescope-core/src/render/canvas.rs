@@ -27,9 +27,7 @@ impl PointArrays {
         let padding = points.len().next_multiple_of(LANES) - points.len();
         let along = |axis: usize| {
             let coordinates = points.clone().map(|point| point[axis]);
-            coordinates
-                .chain(std::iter::repeat_n(f32::NAN, padding))
-                .collect()
+            coordinates.chain(std::iter::repeat_n(f32::NAN, padding)).collect()
         };
         static COUNT: AtomicU64 = AtomicU64::new(0);
         Self {
@@ -123,11 +121,7 @@ impl<T: Copy + Default> Canvas<T> {
             drawing: 0,
             slots: vec![0; pixels],
             projected: Projected::default(),
-            covered: Covered {
-                depths: Vec::new(),
-                pairs: Vec::new(),
-                count: 0,
-            },
+            covered: Covered { depths: Vec::new(), pairs: Vec::new(), count: 0 },
         })
     }
 
@@ -152,9 +146,7 @@ impl<T: Copy + Default> Canvas<T> {
         let most = (values.points.len() * side * side).min(self.slots.len());
         self.covered.make_room(most);
 
-        let Self {
-            level, projected, ..
-        } = self;
+        let Self { level, projected, .. } = self;
         let (level, reach) = (*level, self.reach);
         let projection = Projection::new(&self.intrinsics, reach, camera_from_points);
         let projection = match reach {
@@ -180,10 +172,7 @@ impl<T: Copy + Default> Canvas<T> {
         for ((&pixel, &depth), &synthetic) in pixels.iter().zip(depths).zip(values.points) {
             let pixel = pixel as usize;
             if pixel < slots.len() {
-                let pair = Pair {
-                    query: query[pixel],
-                    synthetic,
-                };
+                let pair = Pair { query: query[pixel], synthetic };
                 self.covered.put(&mut slots[pixel], first_slot, depth, pair);
             }
         }
@@ -211,8 +200,7 @@ impl<T: Copy + Default> Canvas<T> {
                 for _ in 0..SIDE {
                     let slots = &mut slots[begin..][..SIDE];
                     for (slot, &query) in slots.iter_mut().zip(&query[begin..][..SIDE]) {
-                        self.covered
-                            .put(slot, first_slot, depth, Pair { query, synthetic });
+                        self.covered.put(slot, first_slot, depth, Pair { query, synthetic });
                     }
                     begin += width as usize;
                 }
@@ -224,8 +212,7 @@ impl<T: Copy + Default> Canvas<T> {
                 let pixels = begin..begin + columns.len();
                 let slots = slots[pixels.clone()].iter_mut();
                 for (slot, &query) in slots.zip(&query[pixels]) {
-                    self.covered
-                        .put(slot, first_slot, depth, Pair { query, synthetic });
+                    self.covered.put(slot, first_slot, depth, Pair { query, synthetic });
                 }
             }
         }
@@ -319,10 +306,7 @@ mod tests {
             let made = points.into_iter().map(|(x, y, depth, intensity)| {
                 let z = depth as f32 / 10.0 - 1.0;
                 let intensity = intensity.round();
-                ColoredPoint {
-                    position: Point3::new(x * z, y * z, z),
-                    intensity,
-                }
+                ColoredPoint { position: Point3::new(x * z, y * z, z), intensity }
             });
             made.collect()
         })
@@ -330,17 +314,11 @@ mod tests {
 
     /// What the plain way draws.
     fn plainly(points: &[ColoredPoint], splat_px: usize, pose: &Pose) -> Vec<SplattedPixel> {
-        Rasterizer::new(&small_camera(), splat_px)
-            .splat(points, pose)
-            .to_vec()
+        Rasterizer::new(&small_camera(), splat_px).splat(points, pose).to_vec()
     }
 
     fn level(baseline: bool) -> Level {
-        if baseline {
-            Level::baseline()
-        } else {
-            Level::new()
-        }
+        if baseline { Level::baseline() } else { Level::new() }
     }
 
     proptest! {
@@ -383,10 +361,7 @@ mod tests {
                 intensity: i as f32,
             })
             .collect();
-        let values = Values {
-            query: &[0; 63],
-            points: &[0; 9],
-        };
+        let values = Values { query: &[0; 63], points: &[0; 9] };
         let [all, one, none] = [9, 1, 0]
             .map(|count| PointArrays::new(points[..count].iter().map(|point| point.position)));
         let mut canvas = Canvas::new(&small_camera(), 1).expect("a small image");
@@ -402,11 +377,7 @@ mod tests {
 
     #[test]
     fn a_huge_image_has_no_canvas() {
-        let huge = Intrinsics {
-            width: 1 << 13,
-            height: (1 << 11) + 1,
-            ..small_camera()
-        };
+        let huge = Intrinsics { width: 1 << 13, height: (1 << 11) + 1, ..small_camera() };
         assert!(Canvas::<u8>::new(&huge, 1).is_none());
     }
 }

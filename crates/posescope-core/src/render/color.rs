@@ -89,11 +89,8 @@ impl VisibleCloud {
             let is_seen = |point: &Projected| hidden_beyond.shows(point);
             in_view.into_par_iter().filter(is_seen).collect()
         };
-        let counts = ColoringCounts {
-            colored: points.len(),
-            outside,
-            occluded: projected - points.len(),
-        };
+        let counts =
+            ColoringCounts { colored: points.len(), outside, occluded: projected - points.len() };
         Self { points, counts }
     }
 
@@ -108,10 +105,7 @@ impl VisibleCloud {
             position: point.position,
             intensity: value(point.u, point.v),
         };
-        ColoredCloud {
-            points: self.points.par_iter().map(colored).collect(),
-            counts: self.counts,
-        }
+        ColoredCloud { points: self.points.par_iter().map(colored).collect(), counts: self.counts }
     }
 }
 
@@ -196,9 +190,7 @@ mod tests {
 
     #[test]
     fn a_point_takes_the_value_of_its_own_pixel() {
-        let cloud = Cloud {
-            points: vec![Point3::new(0.2, -0.1, 1.0)],
-        };
+        let cloud = Cloud { points: vec![Point3::new(0.2, -0.1, 1.0)] };
         let colored = color_cloud(&cloud, &photo(), &small_camera(), &RenderParams::default());
         assert_eq!(colored.points[0].intensity, 122.0);
     }
@@ -216,11 +208,7 @@ mod tests {
         };
         let mut params = RenderParams::default();
         let colored = color_cloud(&cloud, &photo(), &small_camera(), &params);
-        let expected = ColoringCounts {
-            colored: 2,
-            outside: 2,
-            occluded: 1,
-        };
+        let expected = ColoringCounts { colored: 2, outside: 2, occluded: 1 };
         assert_eq!(colored.counts, expected);
 
         params.visibility = false;

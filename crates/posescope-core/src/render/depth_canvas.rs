@@ -306,23 +306,13 @@ mod tests {
 
     #[test]
     fn a_point_so_far_away_that_no_number_says_how_far_is_not_seen() {
-        let point = ColoredPoint {
-            position: Point3::new(0.0, 0.0, f32::MAX),
-            intensity: 7.0,
-        };
+        let point = ColoredPoint { position: Point3::new(0.0, 0.0, f32::MAX), intensity: 7.0 };
         let twice_as_far = Pose::translation(0.0, 0.0, f64::from(f32::MAX));
         let arrays = PointArrays::new([point.position].into_iter());
-        let values = Values {
-            query: &[0.0; 63],
-            points: &[7.0],
-        };
+        let values = Values { query: &[0.0; 63], points: &[7.0] };
         for splat_px in [1, 3] {
             let mut canvas = DepthCanvas::new(&small_camera(), splat_px).expect("a small image");
-            assert!(
-                canvas
-                    .draw(&arrays, values, &twice_as_far, |_, seen| seen)
-                    .is_empty()
-            );
+            assert!(canvas.draw(&arrays, values, &twice_as_far, |_, seen| seen).is_empty());
             let mut plainly = Rasterizer::new(&small_camera(), splat_px);
             assert!(plainly.splat(&[point], &twice_as_far).is_empty());
         }
@@ -330,11 +320,7 @@ mod tests {
 
     #[test]
     fn a_huge_image_has_no_canvas() {
-        let huge = Intrinsics {
-            width: 1 << 13,
-            height: (1 << 11) + 1,
-            ..small_camera()
-        };
+        let huge = Intrinsics { width: 1 << 13, height: (1 << 11) + 1, ..small_camera() };
         assert!(DepthCanvas::<u8>::new(&huge, 1).is_none());
     }
 }

@@ -73,18 +73,13 @@ impl Tally {
     /// What the hypothesis is worth.
     pub(super) fn score(&self, tallying: &Tallying) -> Score {
         match (self, *tallying) {
-            (Self::Counts(counts), Tallying::Counts { bins, cost }) => Score {
-                cost: cost(&Entropies::of(counts, bins)),
-                covered: counts.iter().sum(),
-            },
-            (Self::LesserHalf { covered, half }, _) => Score {
-                cost: half.mean(),
-                covered: *covered,
-            },
-            (Self::Counts(_), Tallying::LesserHalf) => Score {
-                cost: None,
-                covered: 0,
-            },
+            (Self::Counts(counts), Tallying::Counts { bins, cost }) => {
+                Score { cost: cost(&Entropies::of(counts, bins)), covered: counts.iter().sum() }
+            }
+            (Self::LesserHalf { covered, half }, _) => {
+                Score { cost: half.mean(), covered: *covered }
+            }
+            (Self::Counts(_), Tallying::LesserHalf) => Score { cost: None, covered: 0 },
         }
     }
 }

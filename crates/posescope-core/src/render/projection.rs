@@ -166,11 +166,7 @@ impl<S: Simd> ProjectionOfEight<S> {
 /// Three times eight numbers.
 #[inline(always)]
 pub(super) fn loaded<S: Simd>(simd: S, [a, b, c]: [&[f32; 8]; 3]) -> [f32x8<S>; 3] {
-    [
-        simd.load_array_ref_f32x8(a),
-        simd.load_array_ref_f32x8(b),
-        simd.load_array_ref_f32x8(c),
-    ]
+    [simd.load_array_ref_f32x8(a), simd.load_array_ref_f32x8(b), simd.load_array_ref_f32x8(c)]
 }
 
 /// [`f32::floor`] as a whole number. That of the standard library is a call for every point, unless

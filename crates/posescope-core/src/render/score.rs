@@ -13,7 +13,6 @@ pub struct Score {
 impl Score {
     /// The cost, if at least `least_covered` pixels support it and it is a number.
     pub fn eligible_cost(&self, least_covered: u32) -> Option<f64> {
-        self.cost
-            .filter(|cost| self.covered >= least_covered && !cost.is_nan())
+        self.cost.filter(|cost| self.covered >= least_covered && !cost.is_nan())
     }
 }

@@ -114,10 +114,7 @@ impl<'a> Scorer<'a> {
             .par_chunks(PER_JOB)
             .flat_map_iter(|poses| {
                 self.with_worker(prepared, |worker| {
-                    poses
-                        .iter()
-                        .map(|pose| score(worker, pose))
-                        .collect::<Vec<Score>>()
+                    poses.iter().map(|pose| score(worker, pose)).collect::<Vec<Score>>()
                 })
             })
             .collect()
@@ -147,8 +144,7 @@ impl<'a> Scorer<'a> {
     }
 
     fn prepared(&self) -> &Prepared {
-        self.prepared
-            .get_or_init(|| Arc::new(Prepared::new(self.points, &self.query, self.cost)))
+        self.prepared.get_or_init(|| Arc::new(Prepared::new(self.points, &self.query, self.cost)))
     }
 
     /// Work for an idle worker, or a new one; `None` where the plain way is the only one.
@@ -171,15 +167,10 @@ impl<'a> Scorer<'a> {
 
     /// The synthetic view of one camera beside the query.
     pub fn compare(&self, reference_from_camera: &Pose) -> Comparison {
-        let view = self
-            .rasterizer()
-            .view(self.points, &reference_from_camera.inverse());
+        let view = self.rasterizer().view(self.points, &reference_from_camera.inverse());
         let pairs: Vec<IntensityPair> = self.pair_up(&view.pixels).collect();
         Comparison {
-            score: Score {
-                cost: self.cost.evaluate(&pairs),
-                covered: pairs.len() as u32,
-            },
+            score: Score { cost: self.cost.evaluate(&pairs), covered: pairs.len() as u32 },
             explanation: self.cost.explain(&pairs),
             view,
             pairs,
@@ -242,12 +233,7 @@ mod tests {
             let scorer = Scorer::new(&points, query, &small_camera(), 1, cost.as_ref());
             let before = scorer.score(&[pose]);
             let expected = cameras.map(|camera| scorer.seen_by(&camera).compare(&pose).score);
-            assert_eq!(
-                scorer.score_seen_by(&cameras, &pose),
-                expected,
-                "{}",
-                entry.name
-            );
+            assert_eq!(scorer.score_seen_by(&cameras, &pose), expected, "{}", entry.name);
             assert_eq!(scorer.score(&[pose]), before, "{}", entry.name);
             let compared = scorer.compare(&pose);
             assert_eq!(scorer.pairs(&pose).len(), compared.pairs.len());

@@ -98,11 +98,7 @@ impl Rasterizer {
 
     #[inline]
     fn put(&mut self, index: u32, depth: f32, intensity: f32) {
-        let splat = SplattedPixel {
-            index,
-            depth,
-            intensity,
-        };
+        let splat = SplattedPixel { index, depth, intensity };
         let slot = &mut self.slots[index as usize];
         if *slot == EMPTY {
             *slot = self.pixels.len() as u32;
@@ -124,10 +120,7 @@ mod tests {
     use proptest::prelude::*;
 
     fn point(x: f32, y: f32, z: f32, intensity: f32) -> ColoredPoint {
-        ColoredPoint {
-            position: Point3::new(x, y, z),
-            intensity,
-        }
+        ColoredPoint { position: Point3::new(x, y, z), intensity }
     }
 
     #[test]
@@ -140,11 +133,7 @@ mod tests {
         ];
         let mut rasterizer = Rasterizer::new(&small_camera(), 1);
         let pixels = rasterizer.splat(&points, &Pose::identity());
-        let expected = SplattedPixel {
-            index: 3 * 9 + 4,
-            depth: 2.0,
-            intensity: 2.0,
-        };
+        let expected = SplattedPixel { index: 3 * 9 + 4, depth: 2.0, intensity: 2.0 };
         assert_eq!(pixels, [expected]);
     }
 
@@ -160,10 +149,7 @@ mod tests {
     #[test]
     fn a_point_without_a_depth_holds_no_pixel() {
         let mut rasterizer = Rasterizer::new(&small_camera(), 1);
-        let points = [
-            point(f32::NAN, f32::NAN, f32::NAN, 1.0),
-            point(-0.8, -0.6, 2.0, 2.0),
-        ];
+        let points = [point(f32::NAN, f32::NAN, f32::NAN, 1.0), point(-0.8, -0.6, 2.0, 2.0)];
         let pixels = rasterizer.splat(&points, &Pose::identity());
         assert_eq!(pixels.len(), 1);
         assert_eq!(pixels[0].intensity, 2.0);
@@ -175,10 +161,7 @@ mod tests {
         let corner = point(-0.4, -0.3, 1.0, 7.0);
         assert_eq!(rasterizer.splat(&[corner], &Pose::identity()).len(), 4);
         let just_outside = point(-0.5, 0.0, 1.0, 7.0);
-        assert_eq!(
-            rasterizer.splat(&[just_outside], &Pose::identity()).len(),
-            3
-        );
+        assert_eq!(rasterizer.splat(&[just_outside], &Pose::identity()).len(), 3);
     }
 
     #[test]

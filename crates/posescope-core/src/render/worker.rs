@@ -20,10 +20,7 @@ enum Shown {
     /// The points' values; the query's are there already.
     Values(Arc<Vec<f32>>),
     /// The bins of both.
-    Bins {
-        query: Arc<Vec<u8>>,
-        points: Arc<Vec<u8>>,
-    },
+    Bins { query: Arc<Vec<u8>>, points: Arc<Vec<u8>> },
 }
 
 impl Prepared {
@@ -41,10 +38,7 @@ impl Prepared {
                 Shown::Values(Arc::new(intensities.collect()))
             }
         };
-        Self {
-            positions: PointArrays::new(points.iter().map(|point| point.position)),
-            shown,
-        }
+        Self { positions: PointArrays::new(points.iter().map(|point| point.position)), shown }
     }
 }
 
@@ -124,20 +118,12 @@ impl<'a> Worker<'a> {
         camera_from_points: &Pose,
     ) -> Score {
         let (cost, covered) = match self {
-            Self::Ordered {
-                canvas,
-                points,
-                cost,
-            } => {
+            Self::Ordered { canvas, points, cost } => {
                 let values = Values { query, points };
                 let pairs = canvas.draw(&prepared.positions, values, camera_from_points);
                 (cost(pairs), pairs.len())
             }
-            Self::SquaredDifferences {
-                canvas,
-                points,
-                cost,
-            } => {
+            Self::SquaredDifferences { canvas, points, cost } => {
                 let values = Values { query, points };
                 let differences = canvas.draw(
                     &prepared.positions,
@@ -147,14 +133,7 @@ impl<'a> Worker<'a> {
                 );
                 (cost(differences), differences.len())
             }
-            Self::Counts {
-                canvas,
-                query,
-                points,
-                bins,
-                counts,
-                cost,
-            } => {
+            Self::Counts { canvas, query, points, bins, counts, cost } => {
                 let values = Values { query, points };
                 let pairs = canvas.draw(
                     &prepared.positions,
@@ -166,9 +145,6 @@ impl<'a> Worker<'a> {
                 (cost(counts), pairs.len())
             }
         };
-        Score {
-            cost,
-            covered: covered as u32,
-        }
+        Score { cost, covered: covered as u32 }
     }
 }

@@ -24,10 +24,7 @@ impl Affine {
         let (sin, cos) = (f64::from(reference.angle) - f64::from(query.angle)).sin_cos();
         // Angles grow from the x axis towards the y axis.
         let linear = scale * Matrix2::new(cos, -sin, sin, cos);
-        Self {
-            linear,
-            translation: reference.pixel().coords - linear * query.pixel().coords,
-        }
+        Self { linear, translation: reference.pixel().coords - linear * query.pixel().coords }
     }
 
     /// The transform with the least sum of squared distances, of pairs of query and reference; `None`
@@ -37,11 +34,9 @@ impl Affine {
             return None;
         }
         let count = pairs.len() as f64;
-        let sums = pairs
-            .iter()
-            .fold((Vector2::zeros(), Vector2::zeros()), |sums, pair| {
-                (sums.0 + pair.0.coords, sums.1 + pair.1.coords)
-            });
+        let sums = pairs.iter().fold((Vector2::zeros(), Vector2::zeros()), |sums, pair| {
+            (sums.0 + pair.0.coords, sums.1 + pair.1.coords)
+        });
         let (query_mean, reference_mean) = (sums.0 / count, sums.1 / count);
         let mut scatter = Matrix2::zeros();
         let mut cross = Matrix2::zeros();
@@ -56,10 +51,7 @@ impl Affine {
             return None;
         }
         let linear = cross * scatter.try_inverse()?;
-        let affine = Self {
-            linear,
-            translation: reference_mean - linear * query_mean,
-        };
+        let affine = Self { linear, translation: reference_mean - linear * query_mean };
         affine.is_finite().then_some(affine)
     }
 
@@ -93,14 +85,7 @@ mod tests {
     use super::*;
 
     fn keypoint(x: f32, y: f32, scale: f32, angle: f32) -> Keypoint {
-        Keypoint {
-            x,
-            y,
-            scale,
-            angle,
-            response: 1.0,
-            laplacian_positive: true,
-        }
+        Keypoint { x, y, scale, angle, response: 1.0, laplacian_positive: true }
     }
 
     #[test]

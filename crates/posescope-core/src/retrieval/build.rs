@@ -110,10 +110,7 @@ pub fn build<E: std::error::Error + Send + 'static>(
     features_of: impl Fn(usize) -> Result<Features, E> + Sync,
     mut progress: impl FnMut(BuildProgress),
 ) -> Result<BuildSummary, BuildError<E>> {
-    let io = |source| BuildError::Io {
-        path: path.to_owned(),
-        source,
-    };
+    let io = |source| BuildError::Io { path: path.to_owned(), source };
     let folder = match path.parent() {
         Some(folder) if folder.as_os_str().is_empty() => Path::new("."),
         Some(folder) => folder,
@@ -129,25 +126,16 @@ pub fn build<E: std::error::Error + Send + 'static>(
             waiting.push(&features).map_err(io)?;
         }
         let done = waiting.counts.len();
-        progress(BuildProgress {
-            step: BuildStep::Features,
-            done,
-            total,
-        });
+        progress(BuildProgress { step: BuildStep::Features, done, total });
     }
     let mut waiting = waiting.complete().map_err(io)?;
     let found: usize = waiting.counts.iter().sum();
     if found < request.words.max(1) {
-        return Err(BuildError::TooFewDescriptors {
-            found: found as u64,
-            words: request.words,
-        });
+        return Err(BuildError::TooFewDescriptors { found: found as u64, words: request.words });
     }
     let vocabulary = learn(&mut waiting, request, &mut progress).map_err(io)?;
-    write_whole_with(path, |file| {
-        write(file, waiting, request, &vocabulary, &mut progress)
-    })
-    .map_err(io)?;
+    write_whole_with(path, |file| write(file, waiting, request, &vocabulary, &mut progress))
+        .map_err(io)?;
     Ok(BuildSummary {
         frames: total,
         features: found,
@@ -193,11 +181,7 @@ fn learn(
         seed: seed_for(request.seed, "vocabulary"),
     };
     Ok(Vocabulary::learn(&sample, &clustering, |done| {
-        progress(BuildProgress {
-            step: BuildStep::Vocabulary,
-            done,
-            total: request.iterations,
-        });
+        progress(BuildProgress { step: BuildStep::Vocabulary, done, total: request.iterations });
     }))
 }
 
@@ -224,13 +208,7 @@ fn write(
             .iter()
             .zip(&places)
             .filter_map(|(word, &[x, y, scale, angle])| {
-                Some(IndexedFeature {
-                    word: (*word)?,
-                    x,
-                    y,
-                    scale,
-                    angle,
-                })
+                Some(IndexedFeature { word: (*word)?, x, y, scale, angle })
             })
             .collect();
         // Stable: of one word, the strongest stays first.
@@ -242,11 +220,7 @@ fn write(
         occurrences.push(&words);
         counts.features += features.len();
         starts.push(number(counts.features)?);
-        progress(BuildProgress {
-            step: BuildStep::Words,
-            done: done + 1,
-            total: counts.documents,
-        });
+        progress(BuildProgress { step: BuildStep::Words, done: done + 1, total: counts.documents });
     }
     let frames = request.frames.iter().copied().chain([0]);
     for (frame, start) in frames.zip(starts) {
@@ -298,10 +272,7 @@ struct FeatureSpool {
 
 impl FeatureSpool {
     fn new(folder: &Path) -> io::Result<Self> {
-        Ok(Self {
-            file: BufWriter::new(tempfile::tempfile_in(folder)?),
-            counts: Vec::new(),
-        })
+        Ok(Self { file: BufWriter::new(tempfile::tempfile_in(folder)?), counts: Vec::new() })
     }
 
     fn push(&mut self, features: &Features) -> io::Result<()> {
@@ -311,16 +282,12 @@ impl FeatureSpool {
                 self.file.write_all(&number.to_le_bytes())?;
             }
         }
-        self.counts
-            .push(features.keypoints.len().min(features.descriptors.len()));
+        self.counts.push(features.keypoints.len().min(features.descriptors.len()));
         Ok(())
     }
 
     fn complete(self) -> io::Result<SpooledFeatures> {
-        Ok(SpooledFeatures {
-            file: BufReader::new(self.file.into_inner()?),
-            counts: self.counts,
-        })
+        Ok(SpooledFeatures { file: BufReader::new(self.file.into_inner()?), counts: self.counts })
     }
 }
 
@@ -345,10 +312,7 @@ impl SpooledFeatures {
             .chunks_exact(NUMBERS)
             .map(|numbers| {
                 let number = |i: usize| f32::from_le_bytes(numbers[i]);
-                (
-                    std::array::from_fn(number),
-                    std::array::from_fn(|i| number(4 + i)),
-                )
+                (std::array::from_fn(number), std::array::from_fn(|i| number(4 + i)))
             })
             .unzip())
     }

@@ -101,10 +101,7 @@ impl Forest {
             .into_par_iter()
             .map(|tree| Tree::new(points, Pcg64::seed_from_u64(seed ^ (tree << 32))))
             .collect();
-        Self {
-            trees,
-            points: points.len(),
-        }
+        Self { trees, points: points.len() }
     }
 
     /// The nearest of the points that the forest was made from: best bin first over all trees
@@ -118,13 +115,7 @@ impl Forest {
         scratch: &mut Scratch,
     ) -> Option<Nearest> {
         scratch.begin(self.points);
-        let mut search = Search {
-            points,
-            query,
-            scratch,
-            best: None,
-            checks_left: checks.max(1),
-        };
+        let mut search = Search { points, query, scratch, best: None, checks_left: checks.max(1) };
         for (number, tree) in self.trees.iter().enumerate() {
             search.descend(tree, number as u32, 0, 0.0);
         }
@@ -162,17 +153,10 @@ impl Search<'_> {
     fn descend(&mut self, tree: &Tree, number: u32, mut node: u32, bound: f32) {
         loop {
             match &tree.nodes[node as usize] {
-                Node::Split {
-                    dimension,
-                    threshold,
-                    children: [below, above],
-                } => {
+                Node::Split { dimension, threshold, children: [below, above] } => {
                     let beyond = self.query[usize::from(*dimension)] - threshold;
-                    let (taken, other) = if beyond < 0.0 {
-                        (*below, *above)
-                    } else {
-                        (*above, *below)
-                    };
+                    let (taken, other) =
+                        if beyond < 0.0 { (*below, *above) } else { (*above, *below) };
                     self.scratch.branches.push(Reverse(Branch {
                         bound: bound + beyond * beyond,
                         tree: number,
@@ -198,14 +182,9 @@ impl Search<'_> {
         *seen = self.scratch.search;
         self.checks_left -= 1;
         let squared_distance = squared_distance(self.query, &self.points[index]);
-        let least = self
-            .best
-            .map_or(f32::INFINITY, |best| best.squared_distance);
+        let least = self.best.map_or(f32::INFINITY, |best| best.squared_distance);
         if squared_distance < least {
-            self.best = Some(Nearest {
-                index,
-                squared_distance,
-            });
+            self.best = Some(Nearest { index, squared_distance });
         }
     }
 }
@@ -226,9 +205,7 @@ impl Tree {
             let Some((dimension, threshold)) = split(points, members, &mut rng) else {
                 continue;
             };
-            let middle = partition(members, |index| {
-                points[index as usize][dimension] < threshold
-            });
+            let middle = partition(members, |index| points[index as usize][dimension] < threshold);
             if middle == 0 || middle == members.len() {
                 continue;
             }
@@ -274,9 +251,8 @@ fn split(points: &[Descriptor], members: &[u32], rng: &mut Pcg64) -> Option<(usi
     });
     let candidates = &mut dimensions[..CANDIDATE_DIMENSIONS];
     candidates.sort_unstable();
-    let varying: Vec<usize> = (candidates.iter().copied())
-        .filter(|&dimension| variance[dimension] > 0.0)
-        .collect();
+    let varying: Vec<usize> =
+        (candidates.iter().copied()).filter(|&dimension| variance[dimension] > 0.0).collect();
     if varying.is_empty() {
         return None;
     }

@@ -104,17 +104,9 @@ impl Index {
         recipe: impl IntoIterator<Item = (&'a String, &'a String)>,
     ) -> Result<(), IndexError> {
         let made = self.description();
-        let stale = |why| {
-            Err(IndexError::Stale {
-                path: self.path.clone(),
-                why,
-            })
-        };
+        let stale = |why| Err(IndexError::Stale { path: self.path.clone(), why });
         if made.scene != scene {
-            return stale(format!(
-                "it was built for {} instead of {scene}",
-                made.scene
-            ));
+            return stale(format!("it was built for {} instead of {scene}", made.scene));
         }
         if made.fingerprint != fingerprint_text(fingerprint) {
             return stale(format!("the frames of {scene} have changed"));
@@ -122,9 +114,7 @@ impl Index {
         for (key, wanted) in recipe {
             let made = made.recipe.get(key).map_or("nothing", String::as_str);
             if made != wanted {
-                return stale(format!(
-                    "it was built with {key} = {made} instead of {wanted}"
-                ));
+                return stale(format!("it was built with {key} = {made} instead of {wanted}"));
             }
         }
         Ok(())
@@ -137,10 +127,7 @@ impl Index {
     pub fn check_request(&self, request: &BuildRequest) -> Result<(), IndexError> {
         self.check(&request.scene, request.fingerprint, &request.recipe)?;
         let made = &self.description().recipe;
-        match made
-            .iter()
-            .find(|(key, _)| !request.recipe.contains_key(*key))
-        {
+        match made.iter().find(|(key, _)| !request.recipe.contains_key(*key)) {
             Some((key, made)) => Err(IndexError::Stale {
                 path: self.path.clone(),
                 why: format!("it was built with {key} = {made}, which is not set now"),
@@ -161,11 +148,8 @@ impl Index {
         allowed: impl Fn(usize) -> bool,
     ) -> Retrieval {
         let words = self.vocabulary.quantize(&features.descriptors);
-        let mut by_word: Vec<(u32, u32)> = words
-            .iter()
-            .zip(0..)
-            .filter_map(|(word, feature)| Some(((*word)?, feature)))
-            .collect();
+        let mut by_word: Vec<(u32, u32)> =
+            words.iter().zip(0..).filter_map(|(word, feature)| Some(((*word)?, feature))).collect();
         by_word.sort_unstable();
         let sorted: Vec<u32> = by_word.iter().map(|(word, _)| *word).collect();
         let mut scored = self.scored(&sorted, allowed);
@@ -183,11 +167,7 @@ impl Index {
             .into_iter()
             .zip(verified.into_iter().chain(repeat(Geometry::Unchecked)))
             .filter_map(|((document, score), geometry)| {
-                Some(Ranked {
-                    frame: self.stored.frame(document)?,
-                    score,
-                    geometry,
-                })
+                Some(Ranked { frame: self.stored.frame(document)?, score, geometry })
             })
             .collect();
         // Stable: of as many inliers, or none, the better score stays first.

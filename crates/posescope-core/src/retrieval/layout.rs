@@ -105,10 +105,7 @@ pub struct IndexWriter<W> {
 impl<W: Write> IndexWriter<W> {
     /// Begins with the magic.
     pub fn new(out: W) -> io::Result<Self> {
-        let mut writer = Self {
-            out,
-            sum: Xxh3::new(),
-        };
+        let mut writer = Self { out, sum: Xxh3::new() };
         writer.bytes(&KIND)?;
         writer.bytes(&[LAYOUT])?;
         Ok(writer)
@@ -129,23 +126,14 @@ impl<W: Write> IndexWriter<W> {
 
     /// Writes a feature.
     pub fn feature(&mut self, feature: &IndexedFeature) -> io::Result<()> {
-        let IndexedFeature {
-            word,
-            x,
-            y,
-            scale,
-            angle,
-        } = *feature;
+        let IndexedFeature { word, x, y, scale, angle } = *feature;
         self.bytes(&word.to_le_bytes())?;
-        [x, y, scale, angle]
-            .iter()
-            .try_for_each(|number| self.bytes(&number.to_le_bytes()))
+        [x, y, scale, angle].iter().try_for_each(|number| self.bytes(&number.to_le_bytes()))
     }
 
     /// Writes a visual word.
     pub fn word(&mut self, word: &Descriptor) -> io::Result<()> {
-        word.iter()
-            .try_for_each(|number| self.bytes(&number.to_le_bytes()))
+        word.iter().try_for_each(|number| self.bytes(&number.to_le_bytes()))
     }
 
     /// Ends with the description and the footer.
@@ -174,27 +162,17 @@ impl MappedIndex {
     /// Maps a file whose every byte was checked before.
     pub fn open(path: &Path) -> Result<Self, IndexError> {
         let io = |source: io::Error| match source.kind() {
-            io::ErrorKind::NotFound => IndexError::NotFound {
-                path: path.to_owned(),
-            },
-            _ => IndexError::Io {
-                path: path.to_owned(),
-                source,
-            },
+            io::ErrorKind::NotFound => IndexError::NotFound { path: path.to_owned() },
+            _ => IndexError::Io { path: path.to_owned(), source },
         };
-        let damaged = |what| IndexError::Damaged {
-            path: path.to_owned(),
-            what,
-        };
+        let damaged = |what| IndexError::Damaged { path: path.to_owned(), what };
         let mut file = File::open(path).map_err(io)?;
         let length = file.metadata().map_err(io)?.len();
         let length = usize::try_from(length).map_err(|_| damaged("it is too long"))?;
         let mut magic = [0; MAGIC];
         let read = file.read_exact(&mut magic);
         if read.is_err() || magic[..KIND.len()] != KIND {
-            return Err(IndexError::NotAnIndex {
-                path: path.to_owned(),
-            });
+            return Err(IndexError::NotAnIndex { path: path.to_owned() });
         }
         if length < MAGIC + FOOTER {
             return Err(damaged("it is cut off"));
@@ -260,10 +238,8 @@ impl MappedIndex {
         let list = |word| stored.pair(&stored.lists, word);
         let documents = &mut (0..=counts.documents).filter_map(document);
         let lists = &mut (0..=counts.words).filter_map(list);
-        let is_sound = rises(
-            &mut documents.map(|(_, start)| start as usize),
-            counts.features,
-        ) && rises(&mut lists.map(|(start, _)| start as usize), counts.postings);
+        let is_sound = rises(&mut documents.map(|(_, start)| start as usize), counts.features)
+            && rises(&mut lists.map(|(start, _)| start as usize), counts.postings);
         is_sound.then_some(stored)
     }
 
@@ -283,8 +259,7 @@ impl MappedIndex {
 
     /// The position of a document's frame in its scene.
     pub fn frame(&self, document: usize) -> Option<usize> {
-        self.pair(&self.documents, document)
-            .map(|(frame, _)| frame as usize)
+        self.pair(&self.documents, document).map(|(frame, _)| frame as usize)
     }
 
     /// The features of a document, in the order of their words.
@@ -338,10 +313,7 @@ impl MappedIndex {
 
 fn numbers(record: &[u8; 8]) -> (u32, u32) {
     let [a, b, c, d, e, f, g, h] = *record;
-    (
-        u32::from_le_bytes([a, b, c, d]),
-        u32::from_le_bytes([e, f, g, h]),
-    )
+    (u32::from_le_bytes([a, b, c, d]), u32::from_le_bytes([e, f, g, h]))
 }
 
 /// The checksum of the next `length` bytes. Read and not mapped, so that checking a large index

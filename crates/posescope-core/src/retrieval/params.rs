@@ -64,10 +64,7 @@ impl RetrievalParams {
 
     /// The limits of verification.
     pub fn tolerance(&self) -> VerificationLimits {
-        VerificationLimits {
-            inlier_px: self.inlier_px,
-            min_inliers: self.min_inliers,
-        }
+        VerificationLimits { inlier_px: self.inlier_px, min_inliers: self.min_inliers }
     }
 
     /// The features that are indexed and asked for: the strongest of those that `surf` finds.
@@ -76,9 +73,6 @@ impl RetrievalParams {
             0 => self.features,
             limit => limit.min(self.features),
         };
-        SurfParams {
-            max_keypoints,
-            ..*surf
-        }
+        SurfParams { max_keypoints, ..*surf }
     }
 }

@@ -59,9 +59,6 @@ mod tests {
 
     #[test]
     fn some_more_than_are_asked_for_are_told_about_but_no_crowd() {
-        assert_eq!(
-            [1, 5, 7, 10, 20].map(ReferenceRanking::depth),
-            [6, 10, 10, 10, 20]
-        );
+        assert_eq!([1, 5, 7, 10, 20].map(ReferenceRanking::depth), [6, 10, 10, 10, 20]);
     }
 }

@@ -8,9 +8,7 @@ use crate::features::Descriptor;
 /// Descriptors of unit norm in random directions.
 pub fn random_descriptors(count: usize, seed: u64) -> Vec<Descriptor> {
     let mut rng = Pcg64::seed_from_u64(seed);
-    (0..count)
-        .map(|_| normalized(std::array::from_fn(|_| rng.random_range(-1.0..1.0))))
-        .collect()
+    (0..count).map(|_| normalized(std::array::from_fn(|_| rng.random_range(-1.0..1.0)))).collect()
 }
 
 /// Descriptors of unit norm near the centres, dealt out to them in turn; `spread` is the greatest

@@ -57,16 +57,8 @@ fn request() -> BuildRequest {
 
 fn built(request: &BuildRequest) -> (TempDir, PathBuf) {
     let folder = tempfile::tempdir().expect("a folder");
-    let path = folder
-        .path()
-        .join("made on demand/landmarks.posescope-index");
-    build(
-        &path,
-        request,
-        |frame| Ok::<_, Infallible>(view(frame, 0)),
-        |_| (),
-    )
-    .expect("is built");
+    let path = folder.path().join("made on demand/landmarks.posescope-index");
+    build(&path, request, |frame| Ok::<_, Infallible>(view(frame, 0)), |_| ()).expect("is built");
     (folder, path)
 }
 
@@ -100,9 +92,8 @@ fn the_frames_around_a_new_view_come_first_and_are_verified() {
 fn only_allowed_frames_are_ranked() {
     let (_folder, path) = built(&request());
     let index = open(&path);
-    let far = index.query(&view(10, 9), &RetrievalParams::default(), |frame| {
-        frame.abs_diff(10) > 4
-    });
+    let far =
+        index.query(&view(10, 9), &RetrievalParams::default(), |frame| frame.abs_diff(10) > 4);
     assert!(!far.ranked.is_empty());
     assert!(frames(&far).iter().all(|frame| frame.abs_diff(10) > 4));
     let none = index.query(&view(10, 9), &RetrievalParams::default(), |_| false);
@@ -112,28 +103,18 @@ fn only_allowed_frames_are_ranked() {
 #[test]
 fn without_verification_the_order_is_that_of_the_scores() {
     let (_folder, path) = built(&request());
-    let params = RetrievalParams {
-        verify: 0,
-        ..RetrievalParams::default()
-    };
+    let params = RetrievalParams { verify: 0, ..RetrievalParams::default() };
     let retrieval = open(&path).query(&view(10, 9), &params, |_| true);
     let ranked = &retrieval.ranked;
     assert!(ranked.is_sorted_by(|a, b| a.score >= b.score));
-    assert!(
-        ranked
-            .iter()
-            .all(|ranked| ranked.geometry == Geometry::Unchecked)
-    );
+    assert!(ranked.iter().all(|ranked| ranked.geometry == Geometry::Unchecked));
     assert!(ranked.iter().all(|r| r.score > 0.0 && r.score < 1.0 + 1e-5));
 }
 
 #[test]
 fn verified_frames_stand_before_the_others_by_their_inliers() {
     let (_folder, path) = built(&request());
-    let params = RetrievalParams {
-        verify: 12,
-        ..RetrievalParams::default()
-    };
+    let params = RetrievalParams { verify: 12, ..RetrievalParams::default() };
     let ranked = open(&path).query(&view(10, 9), &params, |_| true).ranked;
     let inliers = |r: &Ranked| r.verification().map(|found| found.inliers);
     assert!(ranked.is_sorted_by(|a, b| inliers(a) >= inliers(b)));
@@ -208,36 +189,21 @@ fn an_index_of_something_else_is_stale_and_says_why() {
         error.to_string()
     };
     let scene = "street".to_owned();
-    let message = why(BuildRequest {
-        scene,
-        ..request.clone()
-    });
-    assert!(
-        message.contains("for landmarks instead of street"),
-        "{message}"
-    );
-    let message = why(BuildRequest {
-        fingerprint: 43,
-        ..request.clone()
-    });
+    let message = why(BuildRequest { scene, ..request.clone() });
+    assert!(message.contains("for landmarks instead of street"), "{message}");
+    let message = why(BuildRequest { fingerprint: 43, ..request.clone() });
     assert!(message.contains("have changed"), "{message}");
     let mut recipe = request.recipe.clone();
     recipe.insert("features".to_owned(), "500".to_owned());
     let message = why(BuildRequest { recipe, ..request });
-    assert!(
-        message.contains("built with features = 1000 instead of 500"),
-        "{message}"
-    );
+    assert!(message.contains("built with features = 1000 instead of 500"), "{message}");
 }
 
 #[test]
 fn a_vocabulary_too_large_is_refused_and_leaves_no_file() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("a.posescope-index");
-    let request = BuildRequest {
-        words: 5000,
-        ..request()
-    };
+    let request = BuildRequest { words: 5000, ..request() };
     let outcome = build(&path, &request, |f| Ok::<_, Infallible>(view(f, 0)), |_| ());
     let message = outcome.expect_err("900 descriptors").to_string();
     assert!(message.contains("900 descriptors"), "{message}");
@@ -283,11 +249,7 @@ fn files_that_are_none_are_told_apart() {
         Ok(_) => panic!("is no index"),
     };
     assert!(message().contains("the retrieval index does not exist"));
-    for content in [
-        "",
-        "short",
-        "a letter to somebody, and by no means an index",
-    ] {
+    for content in ["", "short", "a letter to somebody, and by no means an index"] {
         fs::write(&path, content).expect("writable");
         assert!(message().contains("not a retrieval index"), "{content}");
     }
@@ -311,11 +273,7 @@ fn another_layout_is_named() {
 }
 
 fn small_file() -> Vec<u8> {
-    let request = BuildRequest {
-        frames: (0..3).collect(),
-        words: 8,
-        ..request()
-    };
+    let request = BuildRequest { frames: (0..3).collect(), words: 8, ..request() };
     let (_folder, path) = built(&request);
     fs::read(path).expect("just written")
 }

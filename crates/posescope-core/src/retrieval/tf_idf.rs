@@ -23,10 +23,7 @@ pub struct InvertedIndex {
 impl InvertedIndexBuilder {
     /// An index without a document yet.
     pub fn new(words: usize) -> Self {
-        Self {
-            lists: vec![Vec::new(); words],
-            documents: 0,
-        }
+        Self { lists: vec![Vec::new(); words], documents: 0 }
     }
 
     /// The next document, by its words in ascending order.
@@ -128,10 +125,7 @@ mod tests {
             assert_eq!(list.len(), expected.len());
             for (found, expected) in list.iter().zip(expected) {
                 assert_eq!(found.0, expected.0);
-                assert!(
-                    (found.1 - expected.1).abs() < 1e-4,
-                    "{found:?} {expected:?}"
-                );
+                assert!((found.1 - expected.1).abs() < 1e-4, "{found:?} {expected:?}");
             }
         };
         close(&index.lists[1], &[(0, 1.0), (1, 0.3462)]);

@@ -68,11 +68,8 @@ pub fn verify(pairs: &[WordMatch], tolerance: &VerificationLimits) -> Option<Ver
         .iter()
         .map(|pair| (pair.query_keypoint.pixel(), pair.reference_keypoint.pixel()))
         .collect();
-    let fit = AffineFit {
-        pairs,
-        points: &points,
-        limit: tolerance.inlier_px * tolerance.inlier_px,
-    };
+    let fit =
+        AffineFit { pairs, points: &points, limit: tolerance.inlier_px * tolerance.inlier_px };
     let mut best: Option<(usize, Affine)> = None;
     let stride = pairs.len().div_ceil(HYPOTHESES).max(1);
     for pair in pairs.iter().step_by(stride) {
@@ -158,22 +155,15 @@ impl AffineFit<'_> {
         let mut matches: Vec<VerifiedMatch> = agreeing
             .into_iter()
             .filter_map(|(_, i)| {
-                let WordMatch {
-                    query,
-                    reference_keypoint: Keypoint { x, y, scale, .. },
-                    ..
-                } = self.pairs[i];
+                let WordMatch { query, reference_keypoint: Keypoint { x, y, scale, .. }, .. } =
+                    self.pairs[i];
                 let reference = [x, y, scale].map(f32::to_bits);
                 let is_free = !queries.contains(&query) && !references.contains(&reference);
                 is_free.then(|| {
                     queries.insert(query);
                     references.insert(reference);
                     let (query_pixel, reference_pixel) = self.points[i];
-                    VerifiedMatch {
-                        query: query as usize,
-                        query_pixel,
-                        reference_pixel,
-                    }
+                    VerifiedMatch { query: query as usize, query_pixel, reference_pixel }
                 })
             })
             .collect();
@@ -191,10 +181,7 @@ mod tests {
 
     use super::*;
 
-    const TOLERANCE: VerificationLimits = VerificationLimits {
-        inlier_px: 4.0,
-        min_inliers: 6,
-    };
+    const TOLERANCE: VerificationLimits = VerificationLimits { inlier_px: 4.0, min_inliers: 6 };
 
     fn keypoint(point: Point2<f64>, scale: f64, angle: f64) -> Keypoint {
         Keypoint {

@@ -39,11 +39,7 @@ impl Vocabulary {
     /// Words with their forest.
     pub fn new(words: Vec<Descriptor>, trees: usize, checks: usize, seed: u64) -> Self {
         let forest = Forest::new(&words, trees, seed);
-        Self {
-            words,
-            forest,
-            checks,
-        }
+        Self { words, forest, checks }
     }
 
     /// Clusters the sample by k-means whose nearest centres come from a forest over the centres.
@@ -57,13 +53,7 @@ impl Vocabulary {
         clustering: &Clustering,
         mut round: impl FnMut(usize),
     ) -> Self {
-        let Clustering {
-            words,
-            iterations,
-            trees,
-            checks,
-            seed,
-        } = *clustering;
+        let Clustering { words, iterations, trees, checks, seed } = *clustering;
         let words = words.min(sample.len());
         let mut rng = Pcg64::seed_from_u64(seed);
         let mut first = index::sample(&mut rng, sample.len(), words).into_vec();
@@ -109,9 +99,7 @@ impl Vocabulary {
 
     /// The word of one descriptor, and the squared distance from it.
     pub fn nearest(&self, descriptor: &Descriptor, scratch: &mut Scratch) -> Option<(u32, f32)> {
-        let found = self
-            .forest
-            .nearest(&self.words, descriptor, self.checks, scratch)?;
+        let found = self.forest.nearest(&self.words, descriptor, self.checks, scratch)?;
         Some((found.index as u32, found.squared_distance))
     }
 
@@ -129,11 +117,7 @@ impl Vocabulary {
                     let kept = squared_distance(descriptor, &self.words[word as usize]);
                     if found.1 < kept { found } else { (word, kept) }
                 };
-                descriptors
-                    .iter()
-                    .enumerate()
-                    .map(assign)
-                    .collect::<Vec<_>>()
+                descriptors.iter().enumerate().map(assign).collect::<Vec<_>>()
             })
             .flatten_iter()
             .collect()
@@ -178,13 +162,7 @@ mod tests {
     use super::*;
     use crate::retrieval::synthetic::{around, random_descriptors};
 
-    const FOUR: Clustering = Clustering {
-        words: 4,
-        iterations: 20,
-        trees: 4,
-        checks: 32,
-        seed: 1,
-    };
+    const FOUR: Clustering = Clustering { words: 4, iterations: 20, trees: 4, checks: 32, seed: 1 };
 
     #[test]
     fn clusters_far_apart_are_found_with_their_means() {
@@ -212,11 +190,7 @@ mod tests {
     fn more_rounds_bring_the_words_nearer() {
         let sample = random_descriptors(2000, 3);
         let error = |iterations| {
-            let clustering = Clustering {
-                words: 50,
-                iterations,
-                ..FOUR
-            };
+            let clustering = Clustering { words: 50, iterations, ..FOUR };
             let vocabulary = Vocabulary::learn(&sample, &clustering, |_| ());
             let all = vocabulary.words();
             let distance = |descriptor| {
@@ -248,11 +222,7 @@ mod tests {
         let on = |threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
             pool.expect("a thread pool").install(|| {
-                let clustering = Clustering {
-                    words: 60,
-                    checks: 16,
-                    ..FOUR
-                };
+                let clustering = Clustering { words: 60, checks: 16, ..FOUR };
                 let vocabulary = Vocabulary::learn(&sample, &clustering, |_| ());
                 (vocabulary.quantize(&sample), vocabulary.words)
             })

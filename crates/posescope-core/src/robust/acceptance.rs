@@ -39,9 +39,7 @@ impl AcceptanceRule {
     /// Whether the rule accepts the pose that the verdict is about.
     pub fn accepts(self, verdict: &Acceptance) -> bool {
         match self {
-            Self::Consensus => verdict
-                .needed
-                .is_some_and(|needed| verdict.inliers >= needed),
+            Self::Consensus => verdict.needed.is_some_and(|needed| verdict.inliers >= needed),
             Self::Paper => verdict.inliers >= NEEDED,
         }
     }
@@ -89,11 +87,7 @@ pub fn inliers_beyond_chance(
     area_px: f64,
 ) -> Acceptance {
     let chance = (PI * threshold_px * threshold_px / area_px).min(1.0);
-    let independent = Independent {
-        count: correspondences,
-        tested: correspondences,
-        chance,
-    };
+    let independent = Independent { count: correspondences, tested: correspondences, chance };
     independent.judge(inliers)
 }
 
@@ -173,10 +167,7 @@ pub fn effective_area_px(pixels: &[Point2<f64>], image_area_px: f64) -> f64 {
         .iter()
         .enumerate()
         .map(|(i, a)| {
-            pixels[..i]
-                .iter()
-                .filter(|&b| (a - b).norm_squared() < squared_radius)
-                .count()
+            pixels[..i].iter().filter(|&b| (a - b).norm_squared() < squared_radius).count()
         })
         .sum();
     let pairs = pixels.len() * pixels.len().saturating_sub(1) / 2;
@@ -204,9 +195,7 @@ fn ln_tail(k: usize, n: usize, p: f64) -> f64 {
 
 /// `ln C(n, k)`; minus infinity where `k > n`.
 fn ln_binomial(n: usize, k: usize) -> f64 {
-    (0..k)
-        .map(|i| (n.saturating_sub(i) as f64 / (i + 1) as f64).ln())
-        .sum()
+    (0..k).map(|i| (n.saturating_sub(i) as f64 / (i + 1) as f64).ln()).sum()
 }
 
 #[cfg(test)]
@@ -229,11 +218,8 @@ mod tests {
 
     #[test]
     fn more_correspondences_need_more_inliers() {
-        let needed = [8, 30, 128, 1000].map(|n| {
-            inliers_beyond_chance(0, n, 3.0, KITTI_AREA)
-                .needed
-                .expect("enough of them")
-        });
+        let needed = [8, 30, 128, 1000]
+            .map(|n| inliers_beyond_chance(0, n, 3.0, KITTI_AREA).needed.expect("enough of them"));
         assert_eq!(needed, [5, 6, 7, 10]);
     }
 

@@ -62,10 +62,7 @@ struct Block {
 
 impl Block {
     fn new(correspondences: &[Correspondence], intrinsics: &Intrinsics) -> Self {
-        let mut block = Self {
-            point: [[f64::NAN; LANES]; 3],
-            ray: [[f64::NAN; LANES]; 2],
-        };
+        let mut block = Self { point: [[f64::NAN; LANES]; 3], ray: [[f64::NAN; LANES]; 2] };
         for (lane, correspondence) in correspondences.iter().enumerate() {
             for (axis, coordinates) in block.point.iter_mut().enumerate() {
                 coordinates[lane] = correspondence.point[axis];
@@ -109,19 +106,13 @@ impl Likelihood {
     /// The score of a pose `camera_from_points`.
     pub(super) fn score(&mut self, pose: &Pose) -> LikelihoodScore {
         self.collect_near(pose);
-        let inliers = self
-            .near
-            .iter()
-            .filter(|&&squared| squared <= self.squared_threshold)
-            .count();
+        let inliers =
+            self.near.iter().filter(|&&squared| squared <= self.squared_threshold).count();
         for squared in &mut self.near {
             // From here on the density of a true match.
             *squared = (-0.5 * *squared / self.variance).exp() / (TAU * self.variance);
         }
-        let (far, total) = (
-            self.correspondences - self.near.len(),
-            self.correspondences as f64,
-        );
+        let (far, total) = (self.correspondences - self.near.len(), self.correspondences as f64);
         // EM from γ = ½: the share of true matches is the mean of what each is expected to be.
         let mut mixing = 0.5;
         for _ in 0..self.em_iterations {
@@ -131,20 +122,15 @@ impl Likelihood {
             mixing = expected / total;
         }
         let false_match = (1.0 - mixing) * self.background;
-        let densities = self.near.chunks(AT_A_TIME).map(|some| {
-            some.iter()
-                .map(|density| mixing * density + false_match)
-                .product::<f64>()
-        });
+        let densities = self
+            .near
+            .chunks(AT_A_TIME)
+            .map(|some| some.iter().map(|density| mixing * density + false_match).product::<f64>());
         let mut log_likelihood: f64 = densities.map(f64::ln).sum();
         if far > 0 {
             log_likelihood += far as f64 * false_match.ln();
         }
-        LikelihoodScore {
-            log_likelihood,
-            mixing,
-            inliers,
-        }
+        LikelihoodScore { log_likelihood, mixing, inliers }
     }
 
     /// Collects the squared residuals within reach, in front of the camera.
@@ -161,11 +147,7 @@ impl Likelihood {
         let t = pose.translation.vector;
         let [fx, fy] = self.focal;
         let mut count = 0;
-        for Block {
-            point: [x, y, z],
-            ray: [u, v],
-        } in &self.blocks
-        {
+        for Block { point: [x, y, z], ray: [u, v] } in &self.blocks {
             let mut depth = [0.0; LANES];
             let mut squared_error = [0.0; LANES];
             let mut excess = [0.0; LANES];
@@ -173,10 +155,7 @@ impl Likelihood {
                 let seen_x = r.m11 * x[i] + r.m12 * y[i] + r.m13 * z[i] + t.x;
                 let seen_y = r.m21 * x[i] + r.m22 * y[i] + r.m23 * z[i] + t.y;
                 depth[i] = r.m31 * x[i] + r.m32 * y[i] + r.m33 * z[i] + t.z;
-                let (dx, dy) = (
-                    fx * (seen_x - u[i] * depth[i]),
-                    fy * (seen_y - v[i] * depth[i]),
-                );
+                let (dx, dy) = (fx * (seen_x - u[i] * depth[i]), fy * (seen_y - v[i] * depth[i]));
                 // The residual times the depth: division is for the few within reach.
                 squared_error[i] = dx * dx + dy * dy;
                 excess[i] = squared_error[i] - self.squared_reach * depth[i] * depth[i];
@@ -218,14 +197,8 @@ mod tests {
     use super::*;
     use nalgebra::{Point3, Vector2};
 
-    const CAMERA: Intrinsics = Intrinsics {
-        fx: 500.0,
-        fy: 450.0,
-        cx: 320.0,
-        cy: 240.0,
-        width: 640,
-        height: 480,
-    };
+    const CAMERA: Intrinsics =
+        Intrinsics { fx: 500.0, fy: 450.0, cx: 320.0, cy: 240.0, width: 640, height: 480 };
 
     /// Points 10 m away, seen with the given errors along x \[px\]; not a multiple of the lanes.
     fn correspondences(errors: &[f64]) -> Vec<Correspondence> {
@@ -235,10 +208,7 @@ mod tests {
             .map(|(error, i)| {
                 let point = Point3::new(0.3 * f64::from(i) - 1.0, 0.1 * f64::from(i), 10.0);
                 let pixel = CAMERA.project(&point).expect("in front");
-                Correspondence {
-                    pixel: pixel + Vector2::new(*error, 0.0),
-                    point,
-                }
+                Correspondence { pixel: pixel + Vector2::new(*error, 0.0), point }
             })
             .collect()
     }
@@ -247,10 +217,7 @@ mod tests {
 
     #[test]
     fn the_score_is_that_of_the_mixture_with_all_residuals_written_out() {
-        let params = MlesacParams {
-            em_iterations: 200,
-            ..MlesacParams::default()
-        };
+        let params = MlesacParams { em_iterations: 200, ..MlesacParams::default() };
         let mut likelihood = Likelihood::new(&correspondences(&ERRORS), &CAMERA, &params);
         let score = likelihood.score(&Pose::identity());
         let at = |mixing: f64| -> f64 {
@@ -277,20 +244,13 @@ mod tests {
         // Equal residuals: the likelihood of one, as often as there are.
         let expected = few.log_likelihood / 8.0 * 200.0;
         let off = (many.log_likelihood - expected).abs();
-        assert!(
-            off < 1e-6 * expected.abs(),
-            "{} {expected}",
-            many.log_likelihood
-        );
+        assert!(off < 1e-6 * expected.abs(), "{} {expected}", many.log_likelihood);
     }
 
     #[test]
     fn three_rounds_of_em_are_enough() {
         let mixing = |em_iterations| {
-            let params = MlesacParams {
-                em_iterations,
-                ..MlesacParams::default()
-            };
+            let params = MlesacParams { em_iterations, ..MlesacParams::default() };
             let mut likelihood = Likelihood::new(&correspondences(&ERRORS), &CAMERA, &params);
             likelihood.score(&Pose::identity()).mixing
         };
@@ -299,10 +259,7 @@ mod tests {
 
     #[test]
     fn nothing_behind_the_camera_counts_and_perfect_residuals_stay_finite() {
-        let params = MlesacParams {
-            em_iterations: 100,
-            ..MlesacParams::default()
-        };
+        let params = MlesacParams { em_iterations: 100, ..MlesacParams::default() };
         let perfect = correspondences(&[0.0; 9]);
         let mut likelihood = Likelihood::new(&perfect, &CAMERA, &params);
         let score = likelihood.score(&Pose::identity());
@@ -310,13 +267,8 @@ mod tests {
         assert!(score.log_likelihood.is_finite());
 
         // Mirrored through the camera centre, the points project where they were, from behind.
-        let behind: Vec<_> = perfect
-            .iter()
-            .map(|c| Correspondence {
-                point: -c.point,
-                ..*c
-            })
-            .collect();
+        let behind: Vec<_> =
+            perfect.iter().map(|c| Correspondence { point: -c.point, ..*c }).collect();
         let score = Likelihood::new(&behind, &CAMERA, &params).score(&Pose::identity());
         assert_eq!((score.inliers, score.mixing), (0, 0.0));
         assert!(score.log_likelihood.is_finite());

@@ -28,10 +28,7 @@ pub(super) fn locally_optimized(
     params: &MlesacParams,
     likelihood: &mut Likelihood,
 ) -> LocalOptimum {
-    let mut optimum = LocalOptimum {
-        hypothesis,
-        refinement: None,
-    };
+    let mut optimum = LocalOptimum { hypothesis, refinement: None };
     for _ in 0..MAX_ROUNDS {
         let Hypothesis { pose, score: old } = optimum.hypothesis;
         let residuals_px = residuals(correspondences, intrinsics, &pose);
@@ -41,10 +38,7 @@ pub(super) fn locally_optimized(
         let refinement = refine(&agreeing, intrinsics, &pose, params.loss());
         let new = likelihood.score(&refinement.pose);
         if new.log_likelihood > old.log_likelihood {
-            optimum.hypothesis = Hypothesis {
-                pose: refinement.pose,
-                score: new,
-            };
+            optimum.hypothesis = Hypothesis { pose: refinement.pose, score: new };
             optimum.refinement = Some(refinement);
         } else {
             break;
@@ -62,9 +56,7 @@ pub(crate) fn residuals(
     correspondences
         .iter()
         .map(|Correspondence { pixel, point }| {
-            intrinsics
-                .project(&(pose * point))
-                .map_or(f64::INFINITY, |seen| (seen - pixel).norm())
+            intrinsics.project(&(pose * point)).map_or(f64::INFINITY, |seen| (seen - pixel).norm())
         })
         .collect()
 }

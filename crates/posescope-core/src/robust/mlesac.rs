@@ -44,10 +44,7 @@ pub fn mlesac<C>(
 ) -> Result<Consensus, MlesacError<C>> {
     let found = correspondences.len();
     if found < NEEDED {
-        return Err(MlesacError::TooFewCorrespondences {
-            found,
-            needed: NEEDED,
-        });
+        return Err(MlesacError::TooFewCorrespondences { found, needed: NEEDED });
     }
     let bearings: Vec<_> = correspondences
         .iter()
@@ -62,27 +59,17 @@ pub fn mlesac<C>(
         let Some(sample) = index::sample_array::<_, SAMPLE>(&mut rng, found) else {
             break;
         };
-        let solutions = p3p(
-            &sample.map(|i| bearings[i]),
-            &sample.map(|i| correspondences[i].point),
+        let solutions =
+            p3p(&sample.map(|i| bearings[i]), &sample.map(|i| correspondences[i].point));
+        let hypothesis = likeliest(
+            solutions.into_iter().map(|pose| Hypothesis { pose, score: likelihood.score(&pose) }),
         );
-        let hypothesis = likeliest(solutions.into_iter().map(|pose| Hypothesis {
-            pose,
-            score: likelihood.score(&pose),
-        }));
 
-        let old = best.map_or(f64::NEG_INFINITY, |best| {
-            best.hypothesis.score.log_likelihood
-        });
+        let old = best.map_or(f64::NEG_INFINITY, |best| best.hypothesis.score.log_likelihood);
         let improved = hypothesis.filter(|new| new.score.log_likelihood > old);
         if let Some(hypothesis) = improved {
-            let optimum = locally_optimized(
-                hypothesis,
-                correspondences,
-                intrinsics,
-                params,
-                &mut likelihood,
-            );
+            let optimum =
+                locally_optimized(hypothesis, correspondences, intrinsics, params, &mut likelihood);
             let wanted = trials_for(optimum.hypothesis.score.inliers, found, params.confidence);
             trials_needed = wanted.max(params.min_trials).min(params.max_trials);
             best = Some(optimum);
@@ -98,14 +85,9 @@ pub fn mlesac<C>(
         .map_err(MlesacError::Cancelled)?;
         trials += 1;
     }
-    let no_model = |best_inliers| MlesacError::NoModel {
-        trials,
-        best_inliers,
-    };
-    let LocalOptimum {
-        hypothesis: Hypothesis { pose, score },
-        refinement,
-    } = best.ok_or_else(|| no_model(0))?;
+    let no_model = |best_inliers| MlesacError::NoModel { trials, best_inliers };
+    let LocalOptimum { hypothesis: Hypothesis { pose, score }, refinement } =
+        best.ok_or_else(|| no_model(0))?;
     let residuals_px = residuals(correspondences, intrinsics, &pose);
     let inliers: Vec<_> = inliers(&residuals_px, params.inlier_threshold_px).collect();
     if inliers.len() < NEEDED {
@@ -136,9 +118,8 @@ fn likeliest(solutions: impl Iterator<Item = Hypothesis>) -> Option<Hypothesis> 
 ///
 /// `ln(1 − confidence) / ln(1 − P)`, `P` for drawing without putting back.
 fn trials_for(inliers: usize, total: usize, confidence: f64) -> usize {
-    let all_true: f64 = (0..SAMPLE)
-        .map(|k| inliers.saturating_sub(k) as f64 / (total - k) as f64)
-        .product();
+    let all_true: f64 =
+        (0..SAMPLE).map(|k| inliers.saturating_sub(k) as f64 / (total - k) as f64).product();
     // An `as` cast saturates: no inliers ask for usize::MAX trials.
     ((1.0 - confidence).ln() / (-all_true).ln_1p()).ceil() as usize
 }
@@ -235,51 +216,26 @@ mod tests {
             let [a, b, c] = trial.sample;
             assert!(a != b && b != c && c != a);
             assert_eq!(trial.index, i);
-            let new = trial
-                .best
-                .map_or(f64::NEG_INFINITY, |best| best.score.log_likelihood);
-            assert!(if trial.is_best {
-                new > best
-            } else {
-                new >= best
-            });
+            let new = trial.best.map_or(f64::NEG_INFINITY, |best| best.score.log_likelihood);
+            assert!(if trial.is_best { new > best } else { new >= best });
             best = new;
         }
     }
 
     #[test]
     fn too_few_correspondences_or_no_model_is_an_error() {
-        let too_few = MlesacError::TooFewCorrespondences {
-            found: 3,
-            needed: 4,
-        };
+        let too_few = MlesacError::TooFewCorrespondences { found: 3, needed: 4 };
         assert_eq!(run(&scene(3, 0), 1).0, Err(too_few));
         let outcome = run(&scene(5, 5), 1).0;
-        assert!(matches!(
-            outcome,
-            Err(MlesacError::NoModel {
-                best_inliers: 0..=3,
-                ..
-            })
-        ));
+        assert!(matches!(outcome, Err(MlesacError::NoModel { best_inliers: 0..=3, .. })));
     }
 
     #[test]
     fn the_observer_can_stop_at_any_trial() {
         for stop in [0, 1, 50] {
-            let outcome = mlesac(
-                &scene(50, 25),
-                &KITTI,
-                &MlesacParams::default(),
-                1,
-                |trial| {
-                    if trial.index < stop {
-                        Ok(())
-                    } else {
-                        Err(trial.index)
-                    }
-                },
-            );
+            let outcome = mlesac(&scene(50, 25), &KITTI, &MlesacParams::default(), 1, |trial| {
+                if trial.index < stop { Ok(()) } else { Err(trial.index) }
+            });
             assert_eq!(outcome, Err(MlesacError::Cancelled(stop)));
         }
     }
@@ -298,23 +254,14 @@ mod tests {
         let bunched = (0..30)
             .map(|i| {
                 let offset = Vector3::new(f64::from(i).sin(), f64::from(i).cos(), 0.5) * 1e-3;
-                Correspondence {
-                    point: at(0).point + offset,
-                    ..at(0)
-                }
+                Correspondence { point: at(0).point + offset, ..at(0) }
             })
             .collect();
         let point = Point3::new(f64::NAN, 0.0, 1.0);
         let not_finite = vec![Correspondence { point, ..at(0) }; 30];
         for scene in [equal, on_a_line, bunched, not_finite] {
             if let Ok(found) = run(&scene, 1).0 {
-                assert!(
-                    found
-                        .pose
-                        .to_homogeneous()
-                        .iter()
-                        .all(|entry| entry.is_finite())
-                );
+                assert!(found.pose.to_homogeneous().iter().all(|entry| entry.is_finite()));
                 assert!(found.inliers.len() >= NEEDED);
             }
         }
@@ -324,11 +271,7 @@ mod tests {
     fn a_solution_without_a_likelihood_does_not_hide_the_others_of_its_sample() {
         let solution = |log_likelihood| Hypothesis {
             pose: truth(),
-            score: LikelihoodScore {
-                log_likelihood,
-                mixing: 0.5,
-                inliers: 10,
-            },
+            score: LikelihoodScore { log_likelihood, mixing: 0.5, inliers: 10 },
         };
         let chosen = |likelihoods: &[f64]| {
             likeliest(likelihoods.iter().copied().map(solution)).map(|h| h.score.log_likelihood)

@@ -50,11 +50,7 @@ impl Places {
     /// A pixel belongs to the first place before it that is within `reach_px`, and else is a place of its
     /// own. Time is quadratic in their number: a millisecond for a thousand.
     pub fn of(pixels: impl IntoIterator<Item = Point2<f64>>, reach_px: f64) -> Self {
-        let mut places = Self {
-            of: Vec::new(),
-            pixels: Vec::new(),
-            sizes: Vec::new(),
-        };
+        let mut places = Self { of: Vec::new(), pixels: Vec::new(), sizes: Vec::new() };
         for pixel in pixels {
             let is_here = |known: &Point2<f64>| (known - pixel).norm() <= reach_px;
             let place = places.pixels.iter().position(is_here).unwrap_or_else(|| {

@@ -23,11 +23,7 @@ pub fn degraded(scene: &Arc<dyn Scene>, degradation: Degradation, seed: u64) -> 
     if degradation.is_none() {
         Arc::clone(taken)
     } else {
-        Arc::new(DegradedScene {
-            scene: Arc::clone(taken),
-            degradation,
-            seed,
-        })
+        Arc::new(DegradedScene { scene: Arc::clone(taken), degradation, seed })
     }
 }
 
@@ -51,12 +47,7 @@ impl Scene for DegradedScene {
     }
 
     fn fingerprint(&self) -> u64 {
-        let more = format!(
-            "{:x}/{}/{}",
-            self.scene.fingerprint(),
-            self.degradation,
-            self.seed
-        );
+        let more = format!("{:x}/{}/{}", self.scene.fingerprint(), self.degradation, self.seed);
         fingerprint(self.scene.as_ref(), more.as_bytes())
     }
 }

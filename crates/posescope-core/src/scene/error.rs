@@ -109,34 +109,21 @@ pub enum SceneError {
 impl SceneError {
     /// The error of a file that cannot be opened, read or written, for `map_err`.
     pub fn io(path: &Path) -> impl Fn(io::Error) -> Self + Copy + '_ {
-        move |source| Self::Io {
-            path: path.to_owned(),
-            source,
-        }
+        move |source| Self::Io { path: path.to_owned(), source }
     }
 
     /// The error of an image that cannot be decoded or encoded, for `map_err`.
     pub fn image(path: &Path) -> impl Fn(image::ImageError) -> Self + Copy + '_ {
-        move |source| Self::Image {
-            path: path.to_owned(),
-            source,
-        }
+        move |source| Self::Image { path: path.to_owned(), source }
     }
 
     /// The error of a file with other content than `expected` says.
     pub fn expected(path: impl Into<PathBuf>, expected: impl Into<String>) -> Self {
-        Self::Content {
-            path: path.into(),
-            expected: expected.into(),
-        }
+        Self::Content { path: path.into(), expected: expected.into() }
     }
 
     /// The error of a line, counted from 1, that says something else than `expected`.
     pub fn line(path: impl Into<PathBuf>, line: usize, expected: impl Into<String>) -> Self {
-        Self::Line {
-            path: path.into(),
-            line,
-            expected: expected.into(),
-        }
+        Self::Line { path: path.into(), line, expected: expected.into() }
     }
 }

@@ -48,9 +48,10 @@ struct Frame {
 
 impl Frame {
     fn bytes(&self) -> usize {
-        let cloud = self.reference.get().map_or(0, |reference| {
-            size_of_val(reference.cloud.points.as_slice())
-        });
+        let cloud = self
+            .reference
+            .get()
+            .map_or(0, |reference| size_of_val(reference.cloud.points.as_slice()));
         self.query.photo.bytes() + self.query.memo.bytes() + cloud
     }
 
@@ -109,11 +110,7 @@ impl FrameStore {
             scenes.push((Arc::clone(scene), id));
             id
         });
-        CachedScene {
-            scene: scene.as_ref(),
-            id,
-            store: Arc::clone(self),
-        }
+        CachedScene { scene: scene.as_ref(), id, store: Arc::clone(self) }
     }
 }
 
@@ -128,19 +125,11 @@ pub struct CachedScene<'a> {
 impl<'a> CachedScene<'a> {
     /// The scenes of references and of queries, which may be the same, with a store of their own.
     pub fn pair(references: &'a dyn Scene, queries: &'a dyn Scene) -> (Self, Self) {
-        let references = Self {
-            scene: references,
-            id: SceneId::new(),
-            store: Arc::default(),
-        };
+        let references = Self { scene: references, id: SceneId::new(), store: Arc::default() };
         let is_same = std::ptr::eq(references.scene, queries);
         let queries = Self {
             scene: queries,
-            id: if is_same {
-                references.id
-            } else {
-                SceneId::new()
-            },
+            id: if is_same { references.id } else { SceneId::new() },
             store: Arc::clone(&references.store),
         };
         (references, queries)
@@ -152,24 +141,16 @@ impl<'a> CachedScene<'a> {
     }
 
     fn frame(&self, frame: usize) -> Result<Arc<Frame>, SceneError> {
-        let key = FrameKey {
-            scene: self.id,
-            frame,
-        };
+        let key = FrameKey { scene: self.id, frame };
         let frames = &self.store.frames;
         if let Some(known) = frames.get(&key) {
             // It has grown since, by what was worked out about it.
             frames.trim();
             return Ok(known);
         }
-        let query = Query {
-            memo: Memo::of(VALUES),
-            ..Arc::unwrap_or_clone(self.scene.query(frame)?)
-        };
-        let made = Frame {
-            query: Arc::new(query),
-            reference: OnceLock::new(),
-        };
+        let query =
+            Query { memo: Memo::of(VALUES), ..Arc::unwrap_or_clone(self.scene.query(frame)?) };
+        let made = Frame { query: Arc::new(query), reference: OnceLock::new() };
         Ok(frames.insert(key, Arc::new(made)))
     }
 }

@@ -12,11 +12,7 @@ pub(super) fn intersections(
     second: &Matrix3<f64>,
 ) -> ArrayVec<Vector3<f64>, 4> {
     let (degenerate, other) = degenerate_conic(first, second);
-    line_pair(&degenerate)
-        .into_iter()
-        .flatten()
-        .flat_map(|line| meet(&line, other))
-        .collect()
+    line_pair(&degenerate).into_iter().flatten().flat_map(|line| meet(&line, other)).collect()
 }
 
 /// A degenerate conic of the pencil of two conics, and the one of the two that is less like it.
@@ -96,10 +92,7 @@ fn line_pair(conic: &Matrix3<f64>) -> Option<[Vector3<f64>; 2]> {
     };
     let product = conic + v.cross_matrix();
     let (row, column) = product.iamax_full();
-    Some([
-        product.row(row).transpose(),
-        product.column(column).into_owned(),
-    ])
+    Some([product.row(row).transpose(), product.column(column).into_owned()])
 }
 
 /// The points, scaled to a third coordinate of one, in which a line meets a conic.
@@ -107,25 +100,15 @@ fn meet(line: &Vector3<f64>, conic: &Matrix3<f64>) -> ArrayVec<Vector3<f64>, 2> 
     // Points of the line are base + s · along.
     let (base, along) = if line.x.abs() > line.y.abs() {
         let (slope, offset) = (-line.y / line.x, -line.z / line.x);
-        (
-            Vector3::new(offset, 0.0, 1.0),
-            Vector3::new(slope, 1.0, 0.0),
-        )
+        (Vector3::new(offset, 0.0, 1.0), Vector3::new(slope, 1.0, 0.0))
     } else {
         let (slope, offset) = (-line.x / line.y, -line.z / line.y);
-        (
-            Vector3::new(0.0, offset, 1.0),
-            Vector3::new(1.0, slope, 0.0),
-        )
+        (Vector3::new(0.0, offset, 1.0), Vector3::new(1.0, slope, 0.0))
     };
     let image = conic * along;
-    quadratic_roots(
-        along.dot(&image),
-        base.dot(&image),
-        base.dot(&(conic * base)),
-    )
-    .map(|roots| ArrayVec::from(roots.map(|s| base + along * s)))
-    .unwrap_or_default()
+    quadratic_roots(along.dot(&image), base.dot(&image), base.dot(&(conic * base)))
+        .map(|roots| ArrayVec::from(roots.map(|s| base + along * s)))
+        .unwrap_or_default()
 }
 
 /// The roots of `a x² + 2 b x + c`, a double root that rounding has made complex included.
@@ -165,10 +148,7 @@ mod tests {
         let points = intersections(&circle, &hyperbola);
         for (x, y) in [(1.0, 2.0), (2.0, 1.0), (-1.0, -2.0), (-2.0, -1.0)] {
             let expected = Vector3::new(x, y, 1.0);
-            assert!(
-                points.iter().any(|point| (point - expected).norm() < 1e-12),
-                "{points:?}"
-            );
+            assert!(points.iter().any(|point| (point - expected).norm() < 1e-12), "{points:?}");
         }
     }
 
@@ -178,11 +158,6 @@ mod tests {
         // (x − 5)² + y² = 1.
         let apart = Matrix3::new(1.0, 0.0, -5.0, 0.0, 1.0, 0.0, -5.0, 0.0, 24.0);
         let points = intersections(&circle, &apart);
-        assert!(
-            points
-                .iter()
-                .all(|point| !point.iter().all(|x| x.is_finite())),
-            "{points:?}"
-        );
+        assert!(points.iter().all(|point| !point.iter().all(|x| x.is_finite())), "{points:?}");
     }
 }

@@ -197,10 +197,7 @@ mod tests {
     }
 
     fn pose() -> impl Strategy<Value = Pose> {
-        let (axis, position) = (
-            prop::array::uniform3(-2.0..2.0),
-            prop::array::uniform3(-9.0..9.0),
-        );
+        let (axis, position) = (prop::array::uniform3(-2.0..2.0), prop::array::uniform3(-9.0..9.0));
         (axis, position)
             .prop_map(|(axis, position)| Pose::new(Vector3::from(position), Vector3::from(axis)))
     }
@@ -225,27 +222,15 @@ mod tests {
     fn collinear_or_equal_points_have_no_solution() {
         let truth = Pose::translation(0.1, 0.2, 5.0);
         let [a, b] = [Point3::new(0.0, 0.0, 0.0), Point3::new(1.0, 0.5, 0.2)];
-        for points in [
-            [a, b, a + (b - a) * 2.0],
-            [a, a, b],
-            [a, b, a],
-            [b, a, a],
-            [a, a, a],
-        ] {
-            assert!(
-                p3p(&bearings_of(&truth, &points), &points).is_empty(),
-                "{points:?}"
-            );
+        for points in [[a, b, a + (b - a) * 2.0], [a, a, b], [a, b, a], [b, a, a], [a, a, a]] {
+            assert!(p3p(&bearings_of(&truth, &points), &points).is_empty(), "{points:?}");
         }
     }
 
     #[test]
     fn numbers_that_are_not_finite_have_no_solution() {
-        let points = [
-            Point3::new(0.0, 0.0, 5.0),
-            Point3::new(1.0, 0.0, 6.0),
-            Point3::new(0.0, 1.0, 7.0),
-        ];
+        let points =
+            [Point3::new(0.0, 0.0, 5.0), Point3::new(1.0, 0.0, 6.0), Point3::new(0.0, 1.0, 7.0)];
         let bearings = bearings_of(&Pose::identity(), &points);
         for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
             for corner in 0..3 {
@@ -261,11 +246,8 @@ mod tests {
 
     #[test]
     fn the_distance_jacobian_matches_central_differences() {
-        let points = [
-            Point3::new(0.0, 0.0, 5.0),
-            Point3::new(1.0, 0.0, 6.0),
-            Point3::new(0.0, 1.0, 7.0),
-        ];
+        let points =
+            [Point3::new(0.0, 0.0, 5.0), Point3::new(1.0, 0.0, 6.0), Point3::new(0.0, 1.0, 7.0)];
         let laws = CosineLaws::new(&bearings_of(&Pose::identity(), &points), &points);
         let depths = Vector3::new(4.0, 5.0, 8.0);
         let jacobian = laws.jacobian(&depths);

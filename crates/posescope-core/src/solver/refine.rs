@@ -116,10 +116,7 @@ pub fn pose_covariance(
     let reprojection = Reprojection::new(correspondences, intrinsics);
     let normal = reprojection.normal_equations(pose, Loss::Squared);
     let inverse = normal.hessian.cholesky()?.inverse() * (sigma_px * sigma_px);
-    inverse
-        .iter()
-        .all(|entry| entry.is_finite())
-        .then_some(inverse)
+    inverse.iter().all(|entry| entry.is_finite()).then_some(inverse)
 }
 
 /// The pose after a twist in the camera frame: rotation \[rad\] first, translation \[m\] second.
@@ -181,10 +178,7 @@ mod tests {
                 // The cost is the mean of ρ(r²) with the derivative 2 w Jᵀr.
                 let numeric = (at(step) - at(-step)) / 2e-6 * scene.len() as f64 / 2.0;
                 let error = (numeric - normal.gradient[k]).abs();
-                assert!(
-                    error < 1e-5 * normal.gradient.amax(),
-                    "{loss:?} {k}: {error}"
-                );
+                assert!(error < 1e-5 * normal.gradient.amax(), "{loss:?} {k}: {error}");
             }
         }
     }
@@ -195,10 +189,7 @@ mod tests {
             let refined = refine(&scene(), &KITTI, &start(), loss);
             assert!(refined.cost_after < 1e-12, "{refined:?}");
             let error = refined.pose.inverse() * truth();
-            assert!(
-                error.translation.vector.norm() < 1e-6,
-                "{loss:?}: {refined:?}"
-            );
+            assert!(error.translation.vector.norm() < 1e-6, "{loss:?}: {refined:?}");
             assert!(refined.cost_after < refined.cost_before);
         }
     }
@@ -221,10 +212,7 @@ mod tests {
             pixel: Point2::new(600.0, 180.0),
             point: Point3::new(0.0, 0.0, -50.0),
         };
-        let nan = Correspondence {
-            pixel: Point2::new(f64::NAN, 0.0),
-            ..scene()[0]
-        };
+        let nan = Correspondence { pixel: Point2::new(f64::NAN, 0.0), ..scene()[0] };
         for bad in [behind, nan] {
             let mut scene = scene();
             scene.push(bad);
@@ -247,13 +235,7 @@ mod tests {
             .collect();
         for subset in [&on_a_line[..], &scene()[..1], &scene()[..2]] {
             let refined = refine(subset, &KITTI, &start(), Loss::Huber(1.5));
-            assert!(
-                refined
-                    .pose
-                    .to_homogeneous()
-                    .iter()
-                    .all(|entry| entry.is_finite())
-            );
+            assert!(refined.pose.to_homogeneous().iter().all(|entry| entry.is_finite()));
             assert!(refined.cost_after <= refined.cost_before);
         }
     }

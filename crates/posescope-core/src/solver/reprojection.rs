@@ -84,10 +84,7 @@ impl Motion {
     fn of(pose: &Pose) -> Self {
         let rotation = pose.rotation.to_rotation_matrix();
         let row = |row| std::array::from_fn(|column| rotation[(row, column)]);
-        Self {
-            rotation: [row(0), row(1), row(2)],
-            shift: pose.translation.vector.into(),
-        }
+        Self { rotation: [row(0), row(1), row(2)], shift: pose.translation.vector.into() }
     }
 }
 
@@ -202,10 +199,7 @@ impl Reprojection {
                 );
             }
         }
-        let mut normal = NormalEquations {
-            hessian: Matrix6::zeros(),
-            gradient: Vector6::zeros(),
-        };
+        let mut normal = NormalEquations { hessian: Matrix6::zeros(), gradient: Vector6::zeros() };
         for (axis, moves) in [MOVES_U, MOVES_V].into_iter().enumerate() {
             let mut entry = 0;
             for (at, &i) in moves.iter().enumerate() {
@@ -283,11 +277,7 @@ mod tests {
 
     /// `∂π/∂ξ` by central differences.
     fn jacobian(pose: &Pose, point: &Point3<f64>) -> Matrix2x6<f64> {
-        let pixel = |twist| {
-            KITTI
-                .project(&(moved(pose, &twist) * point))
-                .expect("in front")
-        };
+        let pixel = |twist| KITTI.project(&(moved(pose, &twist) * point)).expect("in front");
         let columns: [Vector2<f64>; 6] = std::array::from_fn(|k| {
             let step = Vector6::ith(k, 1e-6);
             (pixel(step) - pixel(-step)) / 2e-6
@@ -296,19 +286,11 @@ mod tests {
     }
 
     fn some_correspondences() -> impl Strategy<Value = Vec<Correspondence>> {
-        let one = (
-            -6.0..6.0_f64,
-            -2.0..2.0_f64,
-            -10.0..40.0_f64,
-            -30.0..30.0_f64,
-        );
+        let one = (-6.0..6.0_f64, -2.0..2.0_f64, -10.0..40.0_f64, -30.0..30.0_f64);
         let made = one.prop_map(|(x, y, z, off)| {
             let point = Point3::new(x, y, if z.abs() < 3.0 { z + 8.0 } else { z });
             let pixel = KITTI.project(&point).unwrap_or(Point2::new(300.0, 100.0));
-            Correspondence {
-                pixel: pixel + Vector2::new(off, -0.5 * off),
-                point,
-            }
+            Correspondence { pixel: pixel + Vector2::new(off, -0.5 * off), point }
         });
         prop::collection::vec(made, 0..20)
     }

@@ -15,9 +15,7 @@ impl<'a> Fanout<'a> {
 
 impl Sink for Fanout<'_> {
     fn wanted(&self) -> KindSet {
-        self.0
-            .iter()
-            .fold(KindSet::NONE, |all, sink| all.union(sink.wanted()))
+        self.0.iter().fold(KindSet::NONE, |all, sink| all.union(sink.wanted()))
     }
 
     fn accept(&mut self, record: &Record) -> Result<(), Cancelled> {

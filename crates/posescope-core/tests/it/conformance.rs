@@ -33,39 +33,22 @@ use crate::two_walls::{CAMERA, cloud_of_the_walls, photo, problem, solvable};
 /// Problems with nothing to go by.
 fn hopeless() -> Vec<(&'static str, Problem)> {
     let flat = || GrayImage::from_pixel(CAMERA.width, CAMERA.height, Luma([90]));
-    let one_point = Cloud {
-        points: vec![Point3::new(0.0, 0.0, 9.0)],
-    };
-    let behind = Cloud {
-        points: vec![Point3::new(0.0, 0.0, -9.0); 50],
-    };
+    let one_point = Cloud { points: vec![Point3::new(0.0, 0.0, 9.0)] };
+    let behind = Cloud { points: vec![Point3::new(0.0, 0.0, -9.0); 50] };
     vec![
-        (
-            "flat query and reference",
-            problem(flat(), flat(), cloud_of_the_walls()),
-        ),
-        (
-            "no cloud",
-            problem(photo(1.0, 5), photo(0.0, 5), Cloud::default()),
-        ),
-        (
-            "a cloud behind the camera",
-            problem(photo(1.0, 5), photo(0.0, 5), behind),
-        ),
+        ("flat query and reference", problem(flat(), flat(), cloud_of_the_walls())),
+        ("no cloud", problem(photo(1.0, 5), photo(0.0, 5), Cloud::default())),
+        ("a cloud behind the camera", problem(photo(1.0, 5), photo(0.0, 5), behind)),
         ("one point", problem(flat(), photo(0.0, 5), one_point)),
     ]
 }
 
 fn estimators() -> impl Iterator<Item = (&'static str, Box<dyn estimator::Estimator>)> {
-    estimator::all()
-        .iter()
-        .map(|entry| (entry.method.name(), entry.make(&Params::default())))
+    estimator::all().iter().map(|entry| (entry.method.name(), entry.make(&Params::default())))
 }
 
 fn silent(estimator: &dyn estimator::Estimator, problem: &Problem) -> Outcome {
-    estimator
-        .estimate(problem, &mut Trace::off())
-        .expect("nobody cancels")
+    estimator.estimate(problem, &mut Trace::off()).expect("nobody cancels")
 }
 
 #[test]
@@ -73,10 +56,7 @@ fn every_estimator_finds_the_pose_and_says_the_same_whoever_listens() {
     let problem = solvable();
     for (name, estimator) in estimators() {
         let outcome = silent(estimator.as_ref(), &problem);
-        let pose = outcome
-            .pose
-            .as_ref()
-            .unwrap_or_else(|f| panic!("{name}: {f}"));
+        let pose = outcome.pose.as_ref().unwrap_or_else(|f| panic!("{name}: {f}"));
         let error = pose.translation.vector - nalgebra::Vector3::new(100.0, -2.0, 31.0);
         assert!(error.norm() < 0.45, "{name}: {error}");
 
@@ -102,11 +82,7 @@ struct StopAt(u64);
 
 impl Sink for StopAt {
     fn accept(&mut self, record: &Record) -> Result<(), Cancelled> {
-        if record.index == self.0 {
-            Err(Cancelled)
-        } else {
-            Ok(())
-        }
+        if record.index == self.0 { Err(Cancelled) } else { Ok(()) }
     }
 }
 
@@ -115,19 +91,13 @@ fn every_estimator_can_be_stopped_at_any_event() {
     let problem = solvable();
     for (name, estimator) in estimators() {
         let mut history = History::default();
-        estimator
-            .estimate(&problem, &mut Trace::to(&mut history))
-            .expect("nobody cancels");
+        estimator.estimate(&problem, &mut Trace::to(&mut history)).expect("nobody cancels");
         let events = history.records().len() as u64;
         // The first and last events, and a sample of the many in between.
         let stops = (0..events).filter(|i| *i < 8 || events - i < 3 || i % 1999 == 0);
         for stop in stops {
             let outcome = estimator.estimate(&problem, &mut Trace::to(&mut StopAt(stop)));
-            assert_eq!(
-                outcome.err(),
-                Some(Cancelled),
-                "{name} at {stop} of {events}"
-            );
+            assert_eq!(outcome.err(), Some(Cancelled), "{name} at {stop} of {events}");
         }
     }
 }
@@ -154,13 +124,7 @@ struct AttentionSeeker<'a> {
 impl<'a> AttentionSeeker<'a> {
     fn new(flag: &'a AtomicBool, wanted: KindSet, stop_at: Option<usize>) -> Self {
         flag.store(true, Ordering::Release);
-        Self {
-            flag,
-            wanted,
-            moments: Vec::new(),
-            looks: 0,
-            stop_at,
-        }
+        Self { flag, wanted, moments: Vec::new(), looks: 0, stop_at }
     }
 }
 
@@ -191,9 +155,7 @@ fn moments(
 ) -> Vec<Moment> {
     let flag = AtomicBool::new(false);
     let mut sink = AttentionSeeker::new(&flag, wanted, None);
-    estimator
-        .estimate(problem, &mut Trace::watched(&mut sink, &flag))
-        .expect("nobody cancels");
+    estimator.estimate(problem, &mut Trace::watched(&mut sink, &flag)).expect("nobody cancels");
     sink.moments
 }
 
@@ -206,11 +168,7 @@ fn on_many_threads<T: Send>(work: impl FnOnce() -> T + Send) -> T {
 /// 1,681 coarse hypotheses, and more trials than are looked up between.
 fn long() -> (Problem, Params) {
     let mut params = Params::default();
-    for change in [
-        "grid.coarse_step=0.14",
-        "fb.confidence=0.999999",
-        "fb.ratio=1",
-    ] {
+    for change in ["grid.coarse_step=0.14", "fb.confidence=0.999999", "fb.ratio=1"] {
         params.assign(change).expect("a good value");
     }
     (solvable(), params)
@@ -269,11 +227,7 @@ fn every_stage_that_takes_time_looks_up_more_than_its_events_do() {
         assert!(looks(&loud) + 20 > told, "{name}: {told}");
     }
     let fb = estimator::entry(Method::FB).make(&params);
-    let all = moments(
-        fb.as_ref(),
-        &problem,
-        KindSet::of(&[Kind::FeaturesDetected]),
-    );
+    let all = moments(fb.as_ref(), &problem, KindSet::of(&[Kind::FeaturesDetected]));
     let told = |kind: Kind| all.iter().position(|moment| *moment == Moment::Tells(kind));
     let first = told(Kind::FeaturesDetected).expect("always told");
     // The sums, the octaves, the descriptors.
@@ -297,20 +251,13 @@ fn a_run_that_is_stopped_wherever_it_looks_up_ends_there() {
                 let mut sink = AttentionSeeker::new(&flag, wanted, Some(stop));
                 let mut trace = Trace::watched(&mut sink, &flag);
                 let outcome = estimator.estimate(&problem, &mut trace);
-                assert_eq!(
-                    outcome.err(),
-                    Some(Cancelled),
-                    "{name} at {stop} of {looks}"
-                );
+                assert_eq!(outcome.err(), Some(Cancelled), "{name} at {stop} of {looks}");
                 // Nothing follows but the ends of the stages that were open.
                 assert_eq!(sink.looks, stop, "{name}");
                 let last = sink.moments.iter().rposition(|m| *m == Moment::LooksUp);
                 let after = &sink.moments[last.expect("it was stopped") + 1..];
                 let is_end = |moment: &Moment| *moment == Moment::Tells(Kind::StageEnded);
-                assert!(
-                    after.len() <= 4 && after.iter().all(is_end),
-                    "{name}: {after:?}"
-                );
+                assert!(after.len() <= 4 && after.iter().all(is_end), "{name}: {after:?}");
             }
         }
     }
@@ -349,15 +296,11 @@ fn what_is_scored_at_a_time_is_bounded_and_scored_once() {
     let cost = Counting(AtomicUsize::new(0));
     let scorer = Scorer::new(&cloud.points, query, &CAMERA, 1, &cost);
     assert!(on_many_threads(|| scorer.at_a_time()) <= 300);
-    let poses: Vec<_> = (0..70)
-        .map(|i| Pose::translation(0.0, 0.0, 0.02 * f64::from(i)))
-        .collect();
+    let poses: Vec<_> = (0..70).map(|i| Pose::translation(0.0, 0.0, 0.02 * f64::from(i))).collect();
     let at_once = scorer.score(&poses);
     assert_eq!(cost.0.load(Ordering::Relaxed), poses.len());
-    let one_by_one: Vec<_> = poses
-        .iter()
-        .flat_map(|pose| scorer.score(std::slice::from_ref(pose)))
-        .collect();
+    let one_by_one: Vec<_> =
+        poses.iter().flat_map(|pose| scorer.score(std::slice::from_ref(pose))).collect();
     assert_eq!(at_once, one_by_one);
 }
 
@@ -387,9 +330,8 @@ fn what_the_search_scores_is_what_the_view_shows() {
     let registered = cost::ALL.iter().map(|entry| (entry.params)().cost());
     // More bins than a byte tells apart are scored the plain way.
     let own = [16, 256, 300].map(|bins| Box::new(ManyBins(bins)) as Box<dyn Cost>);
-    let poses: Vec<_> = (0..9)
-        .map(|i| Pose::translation(0.1 * f64::from(i), 0.0, 0.3 * f64::from(i)))
-        .collect();
+    let poses: Vec<_> =
+        (0..9).map(|i| Pose::translation(0.1 * f64::from(i), 0.0, 0.3 * f64::from(i))).collect();
     for cost in registered.chain(own) {
         let visible = reference.visible_cloud(&Params::default().render);
         let cloud = visible.colored_by(cost.reference_channel(&reference.photo.gray));
@@ -397,10 +339,7 @@ fn what_the_search_scores_is_what_the_view_shows() {
         for splat_px in [1, 3] {
             let query = Arc::clone(&query);
             let scorer = Scorer::new(&cloud.points, query, &CAMERA, splat_px, cost.as_ref());
-            let shown: Vec<_> = poses
-                .iter()
-                .map(|pose| scorer.compare(pose).score)
-                .collect();
+            let shown: Vec<_> = poses.iter().map(|pose| scorer.compare(pose).score).collect();
             assert!(shown.iter().all(|score| score.cost.is_some()));
             assert_eq!(scorer.score(&poses), shown);
         }
@@ -412,9 +351,7 @@ fn a_grid_beyond_the_limit_is_a_failure_and_no_allocation() {
     let mut problem = solvable();
     problem.uncertainty_radius_m = 500.0;
     let mut params = Params::default();
-    params
-        .assign("grid.coarse_step=0.05")
-        .expect("a good value");
+    params.assign("grid.coarse_step=0.05").expect("a good value");
     for entry in estimator::all() {
         let outcome = silent(entry.make(&params).as_ref(), &problem);
         match entry.parts {
@@ -425,10 +362,7 @@ fn a_grid_beyond_the_limit_is_a_failure_and_no_allocation() {
                 let failure = outcome.pose.expect_err("400 million hypotheses");
                 assert_eq!(Code::of(&failure), Code::D9);
                 let said = failure.to_string();
-                assert!(
-                    said.contains("400040001") && said.contains("grid.coarse_step"),
-                    "{said}"
-                );
+                assert!(said.contains("400040001") && said.contains("grid.coarse_step"), "{said}");
             }
         }
     }
@@ -439,10 +373,8 @@ fn trials_that_are_not_remembered_are_told_again_all_the_same() {
     let (mut problem, mut params) = (remembering(), Params::default());
     // No photo shows the other: no sample is ever good enough, and all trials are drawn.
     let other = problem_of_strangers();
-    problem.query = Arc::new(posescope_core::problem::Query {
-        memo: Memo::of(64),
-        ..(*other.query).clone()
-    });
+    problem.query =
+        Arc::new(posescope_core::problem::Query { memo: Memo::of(64), ..(*other.query).clone() });
     let changes = [
         "fb.max_trials=30000",
         "fb.confidence=0.999999",
@@ -460,10 +392,8 @@ fn trials_that_are_not_remembered_are_told_again_all_the_same() {
         let mut history = History::default();
         let outcome = fb.estimate(&problem, &mut Trace::to(&mut history));
         assert_eq!(outcome.expect("nobody cancels"), quiet);
-        let trials: Vec<_> = history
-            .all::<HypothesisTried>()
-            .map(|(_, tried)| tried.trial)
-            .collect();
+        let trials: Vec<_> =
+            history.all::<HypothesisTried>().map(|(_, tried)| tried.trial).collect();
         trials
     };
     let first = told();
@@ -473,15 +403,10 @@ fn trials_that_are_not_remembered_are_told_again_all_the_same() {
 
 #[test]
 fn stages_nest_and_every_one_that_starts_ends() {
-    for problem in [solvable()]
-        .into_iter()
-        .chain(hopeless().into_iter().map(|h| h.1))
-    {
+    for problem in [solvable()].into_iter().chain(hopeless().into_iter().map(|h| h.1)) {
         for (name, estimator) in estimators() {
             let mut history = History::default();
-            estimator
-                .estimate(&problem, &mut Trace::to(&mut history))
-                .expect("nobody cancels");
+            estimator.estimate(&problem, &mut Trace::to(&mut history)).expect("nobody cancels");
             let mut open: Vec<Stage> = Vec::new();
             let mut seen = 0;
             for record in history.records() {
@@ -512,9 +437,7 @@ fn an_uninterested_sink_hears_stages_only() {
     }
     for (name, estimator) in estimators() {
         let mut sink = WantsNothing(History::default());
-        estimator
-            .estimate(&solvable(), &mut Trace::to(&mut sink))
-            .expect("nobody cancels");
+        estimator.estimate(&solvable(), &mut Trace::to(&mut sink)).expect("nobody cancels");
         let stages = sink.0.all::<StageStarted>().count() + sink.0.all::<StageEnded>().count();
         assert_eq!(stages, sink.0.records().len(), "{name}");
     }
@@ -555,10 +478,7 @@ fn the_minimum_of_a_direct_method_is_the_least_eligible_cost_that_was_told() {
             assert!(cost.best <= refined.refinements[0].start.cost);
             continue;
         }
-        assert_eq!(
-            cost.evaluations,
-            1 + history.all::<PoseScored>().count() as u64
-        );
+        assert_eq!(cost.evaluations, 1 + history.all::<PoseScored>().count() as u64);
         let (_, last) = history.all::<PhaseSearched>().last().expect("was searched");
         let cell = last.surface.minimum().expect("has one");
         assert_eq!(last.surface.eligible_cost(cell), Some(cost.best));
@@ -574,10 +494,7 @@ fn check_states(problem: &Problem) {
         .estimate(problem, &mut Trace::to(&mut history))
         .expect("nobody cancels");
     let counts = outcome.counts.expect("features were used");
-    let states = &history
-        .last::<FeaturesClassified>()
-        .expect("always told")
-        .states;
+    let states = &history.last::<FeaturesClassified>().expect("always told").states;
     let of = |name: &str| states.iter().filter(|state| state.name() == name).count();
     let [ratio_failed, not_unique, no_depth, outlier, inlier] = FeatureState::NAMES.map(of);
 
@@ -631,13 +548,8 @@ proptest! {
 /// Stages of a run with a remembering problem, and whether each reused its result.
 fn stages_of(estimator: &dyn estimator::Estimator, problem: &Problem) -> Vec<(Stage, bool)> {
     let mut history = History::default();
-    estimator
-        .estimate(problem, &mut Trace::to(&mut history))
-        .expect("nobody cancels");
-    history
-        .all::<StageEnded>()
-        .map(|(_, ended)| (ended.stage, ended.reused))
-        .collect()
+    estimator.estimate(problem, &mut Trace::to(&mut history)).expect("nobody cancels");
+    history.all::<StageEnded>().map(|(_, ended)| (ended.stage, ended.reused)).collect()
 }
 
 fn problem_of_strangers() -> Problem {
@@ -681,14 +593,8 @@ fn what_does_not_depend_on_a_changed_parameter_is_reused() {
             .collect()
     };
     let positions = ["color", "position_coarse", "position_fine"];
-    assert_eq!(
-        reused_after(Method::FB, "fb.accept=paper"),
-        ["detect", "match", "ransac"]
-    );
-    assert_eq!(
-        reused_after(Method::FB, "fb.depth_radius=0.5"),
-        ["detect", "match"]
-    );
+    assert_eq!(reused_after(Method::FB, "fb.accept=paper"), ["detect", "match", "ransac"]);
+    assert_eq!(reused_after(Method::FB, "fb.depth_radius=0.5"), ["detect", "match"]);
     assert_eq!(reused_after(Method::FB, "fb.ratio=0.7"), ["detect"]);
     assert!(reused_after(Method::FB, "surf.threshold=900").is_empty());
     assert_eq!(

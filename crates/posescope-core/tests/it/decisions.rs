@@ -34,27 +34,17 @@ fn outcome(method: Method, problem: &Problem, params: &Params) -> Outcome {
 #[test]
 fn a_consensus_outside_the_uncertainty_radius_is_refused_unless_the_bare_rule_is_asked_for() {
     // The query is 1 m from the reference.
-    let near = Problem {
-        uncertainty_radius_m: 0.5,
-        prior_m: None,
-        ..solvable()
-    };
+    let near = Problem { uncertainty_radius_m: 0.5, prior_m: None, ..solvable() };
     let refused = outcome(Method::FB, &near, &Params::default()).pose;
     let failure = refused.expect_err("it is twice as far as it may be");
-    assert!(
-        matches!(failure, Failure::OutsideRadius { .. }),
-        "{failure}"
-    );
+    assert!(matches!(failure, Failure::OutsideRadius { .. }), "{failure}");
     assert_eq!(Code::of(&failure), Code::R9);
     for accepting in ["fb.accept=paper", "fb.radius_slack=2"] {
         let pose = outcome(Method::FB, &near, &with(&[accepting])).pose;
         assert!(pose.is_ok(), "{accepting}");
     }
     // Who searches no disc goes by the prior, where there is one.
-    let far_prior = Problem {
-        prior_m: Some(20.0),
-        ..near
-    };
+    let far_prior = Problem { prior_m: Some(20.0), ..near };
     let pose = outcome(Method::FB, &far_prior, &Params::default()).pose;
     assert!(pose.is_ok(), "{pose:?}");
 }
@@ -63,11 +53,8 @@ fn a_consensus_outside_the_uncertainty_radius_is_refused_unless_the_bare_rule_is
 fn the_guarded_depth_rule_drops_keypoints_at_depth_edges_and_only_those() {
     // Behind the left wall lies a second surface that the nearest-point rule does not notice.
     let mut points = cloud_of_the_walls().points;
-    let behind: Vec<_> = points
-        .iter()
-        .filter(|point| point.z < 13.0)
-        .map(|point| point * 2.0)
-        .collect();
+    let behind: Vec<_> =
+        points.iter().filter(|point| point.z < 13.0).map(|point| point * 2.0).collect();
     points.extend(behind);
     let edged = problem(photo(1.0, 5), photo(0.0, 5), Cloud { points });
     let with_depth = |problem: &Problem, rule: &str| {
@@ -80,10 +67,7 @@ fn the_guarded_depth_rule_drops_keypoints_at_depth_edges_and_only_those() {
     // On single walls the guard drops no more than the edge between them.
     let plain = solvable();
     let kept = with_depth(&plain, "fb.depth=guarded");
-    assert!(
-        10 * kept >= 8 * with_depth(&plain, "fb.depth=nearest"),
-        "{kept}"
-    );
+    assert!(10 * kept >= 8 * with_depth(&plain, "fb.depth=nearest"), "{kept}");
 }
 
 #[test]
@@ -117,14 +101,7 @@ fn a_fused_hybrid_takes_the_first_methods_poses_alone_where_a_reference_has_one(
             Ok::<(), LocalizeError>(())
         };
         localizer
-            .localize(
-                0,
-                1,
-                std::slice::from_ref(&request),
-                methods,
-                &mut NoObserver,
-                keep,
-            )
+            .localize(0, 1, std::slice::from_ref(&request), methods, &mut NoObserver, keep)
             .expect("good data");
         let hybrid = results.pop().expect("the last method is the hybrid");
         let alone = hybrid.per_reference.expect("two references");
@@ -152,9 +129,7 @@ fn the_cost_at_the_truth_is_that_of_the_true_pose_and_absent_without_one() {
     // If the reference pose were the true one, its cost would be the initial cost.
     let reference = problem.reference.world_from_camera;
     for method in [Method::PM, Method::MI] {
-        let cost = result(method, Some(&reference))
-            .cost
-            .expect("a direct method");
+        let cost = result(method, Some(&reference)).cost.expect("a direct method");
         assert!(cost.initial.is_some());
         assert_eq!(cost.truth, cost.initial, "{}", method.name());
         let unknown = result(method, None);

@@ -22,11 +22,8 @@ use crate::two_walls::{cloud_of_the_walls, photo, problem, solvable};
 use crate::walls_scene::Walls;
 
 /// The methods that search from many starts, match again, and judge between both.
-const BESIDE_THE_PAPER: [Method; 3] = [
-    Method::named("mi6"),
-    Method::named("fb2"),
-    Method::named("robust"),
-];
+const BESIDE_THE_PAPER: [Method; 3] =
+    [Method::named("mi6"), Method::named("fb2"), Method::named("robust")];
 
 /// Where the query really is: 1 m ahead of the reference.
 fn truth(problem: &Problem) -> Pose {
@@ -51,10 +48,7 @@ fn verdicts(
     let mut trace = Trace::to(&mut evidence);
     let outcome = localize_traced(problem, method, params, &mut trace).expect("nobody cancels");
     let subject = Subject::new(problem, method, params, &outcome, &evidence);
-    let tolerance = Tolerance {
-        translation_m: 0.5,
-        rotation_deg: 5.0,
-    };
+    let tolerance = Tolerance { translation_m: 0.5, rotation_deg: 5.0 };
     let found = diagnose(&subject.against(truth, tolerance));
     for finding in &found {
         assert_plain(&finding.text);
@@ -69,10 +63,7 @@ fn assert_plain(text: &str) {
     let longest = sentences.iter().map(|one| one.split_whitespace().count());
     assert!(sentences.len() <= 2, "{text}");
     assert!(longest.max().unwrap_or(0) <= 22, "{text}");
-    assert!(
-        text.ends_with('.') && text.starts_with(char::is_uppercase),
-        "{text}"
-    );
+    assert!(text.ends_with('.') && text.starts_with(char::is_uppercase), "{text}");
 }
 
 fn codes(found: &[Diagnosis]) -> Vec<Code> {
@@ -88,10 +79,7 @@ fn a_pose_that_is_right_carries_at_most_low_confidence() {
     let problem = solvable();
     for method in Method::PAPER.into_iter().chain(BESIDE_THE_PAPER) {
         let found = verdicts(&problem, method, &Params::default(), Some(&truth(&problem)));
-        assert!(
-            codes(&found).iter().all(|code| !code.is_failure()),
-            "{method}: {found:?}"
-        );
+        assert!(codes(&found).iter().all(|code| !code.is_failure()), "{method}: {found:?}");
     }
 }
 
@@ -129,16 +117,9 @@ fn another_camera_is_suspected_from_the_matches() {
     query.intrinsics.cx += 20.0;
     query.intrinsics.cy -= 15.0;
     problem.query = Arc::new(query);
-    let found = verdicts(
-        &problem,
-        Method::FB,
-        &Params::default(),
-        Some(&truth(&problem)),
-    );
+    let found = verdicts(&problem, Method::FB, &Params::default(), Some(&truth(&problem)));
     assert_eq!(primary(&found), Some(Code::X1), "{found:?}");
-    let focal_length = found[0].evidence["camera"]["fx"]
-        .as_f64()
-        .expect("a camera");
+    let focal_length = found[0].evidence["camera"]["fx"].as_f64().expect("a camera");
     assert!((focal_length - 180.0).abs() < 6.0, "{focal_length}");
 }
 
@@ -149,10 +130,7 @@ fn a_truth_beyond_the_disc_is_outside_the_grid() {
     let far = problem.reference.world_from_camera * Pose::translation(0.0, 0.0, 9.0);
     let found = verdicts(&problem, Method::PM, &Params::default(), Some(&far));
     assert!(codes(&found).contains(&Code::D4), "{found:?}");
-    let outside = found
-        .iter()
-        .find(|finding| finding.code == Code::D4)
-        .expect("D4");
+    let outside = found.iter().find(|finding| finding.code == Code::D4).expect("D4");
     assert_eq!(outside.evidence["distance_m"], 9.0);
 }
 
@@ -164,21 +142,11 @@ fn what_is_remembered_of_a_search_is_said_of_no_other() {
     Arc::make_mut(&mut remembering.reference).memo = Memo::of(256);
     let at =
         |right, ahead| problem.reference.world_from_camera * Pose::translation(right, 0.0, ahead);
-    let truths = [
-        None,
-        Some(at(0.0, 1.0)),
-        Some(at(2.0, 1.0)),
-        Some(at(0.0, 9.0)),
-    ];
+    let truths = [None, Some(at(0.0, 1.0)), Some(at(2.0, 1.0)), Some(at(0.0, 9.0))];
     let settings = [
         with(&[]),
         with(&["grid.coarse_step=3", "grid.fine_range=0"]),
-        with(&[
-            "mi.bins=8",
-            "render.splat_px=3",
-            "fb.accept=consensus",
-            "fb.radius_slack=0",
-        ]),
+        with(&["mi.bins=8", "render.splat_px=3", "fb.accept=consensus", "fb.radius_slack=0"]),
     ];
     let mut failures = 0;
     // The second time all is at hand.
@@ -213,9 +181,7 @@ fn the_look_of_one_pose_is_not_taken_for_that_of_another() {
         (outcome.pose.expect("a pose"), confidence)
     };
     let settings = ["fb.ratio=0.8", "fb.ratio=0.5"].map(|setting| with(&[setting]));
-    let told = settings
-        .each_ref()
-        .map(|params| believed(&remembering, params));
+    let told = settings.each_ref().map(|params| believed(&remembering, params));
     assert_ne!(told[0].0, told[1].0);
     for (params, told) in settings.iter().zip(told) {
         assert_eq!(told, believed(&problem, params));
@@ -232,11 +198,7 @@ fn a_truth_beyond_the_prior_is_said_of_a_pose_that_was_accepted_elsewhere() {
     let beyond = found(at(3.4));
     let outside = beyond.iter().find(|finding| finding.code == Code::R9);
     let outside = outside.expect("R9");
-    assert!(
-        outside.text.contains("3.40 m from the reference"),
-        "{}",
-        outside.text
-    );
+    assert!(outside.text.contains("3.40 m from the reference"), "{}", outside.text);
     let within = found(at(3.2));
     assert!(primary(&within).is_some(), "wrong all the same");
     assert!(!codes(&within).contains(&Code::R9), "{within:?}");
@@ -253,10 +215,7 @@ fn poses_that_are_read_the_wrong_way_round_are_suspect() {
         let found = verdicts(&problem, method, &Params::default(), Some(&stated));
         assert_eq!(primary(&found), Some(Code::X1), "{method}: {found:?}");
         let reading = found[0].evidence["reading"].as_str();
-        assert!(
-            reading.is_some_and(|words| words.contains("inverted")),
-            "{method}"
-        );
+        assert!(reading.is_some_and(|words| words.contains("inverted")), "{method}");
     }
 }
 
@@ -266,11 +225,9 @@ fn a_query_that_shows_nothing_has_too_few_features_and_costs_that_tell_nothing()
     let problem = problem(grey, photo(0.0, 5), cloud_of_the_walls());
     let truth = truth(&problem);
     for truth in [Some(&truth), None] {
-        for (method, code) in [
-            (Method::FB, Code::R2),
-            (Method::PM, Code::D5),
-            (Method::MI, Code::D5),
-        ] {
+        for (method, code) in
+            [(Method::FB, Code::R2), (Method::PM, Code::D5), (Method::MI, Code::D5)]
+        {
             let found = verdicts(&problem, method, &Params::default(), truth);
             assert_eq!(primary(&found), Some(code), "{method}: {found:?}");
         }
@@ -318,12 +275,7 @@ fn where_the_truth_leads_away_from_itself_the_cost_failed() {
         let found = verdicts(&problem, method, &Params::default(), Some(&outside));
         assert!(codes(&found).contains(&Code::D4), "{method}: {found:?}");
     }
-    let found = verdicts(
-        &problem,
-        BESIDE_THE_PAPER[1],
-        &Params::default(),
-        Some(&wrong),
-    );
+    let found = verdicts(&problem, BESIDE_THE_PAPER[1], &Params::default(), Some(&wrong));
     assert_eq!(primary(&found), Some(Code::X1), "{found:?}");
 }
 
@@ -352,12 +304,7 @@ fn a_judge_that_passes_over_what_is_right_answers_for_it() {
 fn the_true_matches_only_become_fewer_on_their_way() {
     // The ratio leaves hardly any match, so that there is something to explain.
     let problem = solvable();
-    let found = verdicts(
-        &problem,
-        Method::FB,
-        &with(&["fb.ratio=0.1"]),
-        Some(&truth(&problem)),
-    );
+    let found = verdicts(&problem, Method::FB, &with(&["fb.ratio=0.1"]), Some(&truth(&problem)));
     assert_eq!(primary(&found), Some(Code::R3), "{found:?}");
     let funnel = &found[0].evidence["true_matches"];
     let count = |stage: &str| funnel[stage].as_u64().expect("a count");
@@ -373,12 +320,8 @@ fn what_is_said_to_help_helps() {
     let scene = Walls::new();
     let params = with(&["grid.coarse_step=3", "grid.fine_range=0.2"]);
     let tolerance: Tolerance = "0.4m,5deg".parse().expect("a tolerance");
-    let request = Request {
-        radius_m: 3.0,
-        references: vec![0].into(),
-        fusions: Vec::new(),
-        setting: None,
-    };
+    let request =
+        Request { radius_m: 3.0, references: vec![0].into(), fusions: Vec::new(), setting: None };
     let run = |params: &Params, explaining: usize| {
         let localizer = Localizer::new(&scene, &scene, params, 7)
             .with_tolerance(tolerance)
@@ -408,12 +351,7 @@ fn what_is_said_to_help_helps() {
         for assignment in helped.args.iter().skip(1).step_by(2) {
             changed.assign(assignment).expect("a parameter");
         }
-        assert_eq!(
-            run(&changed, 0).error,
-            Some(helped.error),
-            "{:?}",
-            helped.args
-        );
+        assert_eq!(run(&changed, 0).error, Some(helped.error), "{:?}", helped.args);
     }
     // A result that is right needs no explanation.
     assert_eq!(run(&Params::default(), 12).explanation, None);
@@ -464,12 +402,8 @@ impl LocalizeObserver for Listener {
 fn all_answers_come_before_explanations_and_a_stopped_one_says_that_it_is_incomplete() {
     let scene = Walls::new();
     let params = with(&["grid.coarse_step=3", "grid.fine_range=0.2"]);
-    let request = Request {
-        radius_m: 3.0,
-        references: vec![0].into(),
-        fusions: Vec::new(),
-        setting: None,
-    };
+    let request =
+        Request { radius_m: 3.0, references: vec![0].into(), fusions: Vec::new(), setting: None };
     let run = |listener: &mut Listener| {
         let localizer = Localizer::new(&scene, &scene, &params, 7)
             .with_tolerance("0.4m,5deg".parse().expect("a tolerance"))
@@ -505,16 +439,10 @@ fn all_answers_come_before_explanations_and_a_stopped_one_says_that_it_is_incomp
         let explanation = result.explanation.as_ref().expect("it went wrong");
         assert!(explanation.complete && explanation.runs == 3);
     }
-    let mut stopped = Listener {
-        most: Some(1),
-        ..Listener::default()
-    };
+    let mut stopped = Listener { most: Some(1), ..Listener::default() };
     let (results, is_done) = run(&mut stopped);
     assert!(!is_done);
-    let explanations: Vec<_> = results
-        .iter()
-        .map(|(result, _)| &result.explanation)
-        .collect();
+    let explanations: Vec<_> = results.iter().map(|(result, _)| &result.explanation).collect();
     let first = explanations[0].as_ref().expect("it was begun");
     assert!(!first.complete && first.runs == 1, "{first:?}");
     // What was computed is handed out all the same.
@@ -524,12 +452,8 @@ fn all_answers_come_before_explanations_and_a_stopped_one_says_that_it_is_incomp
 #[test]
 fn a_pose_that_is_less_certain_than_asked_for_is_refused() {
     let (scene, params) = (Walls::new(), Params::default());
-    let request = Request {
-        radius_m: 3.0,
-        references: vec![0].into(),
-        fusions: Vec::new(),
-        setting: None,
-    };
+    let request =
+        Request { radius_m: 3.0, references: vec![0].into(), fusions: Vec::new(), setting: None };
     let mut results = Vec::new();
     for needed in [None, Some(1.0)] {
         let localizer = Localizer::new(&scene, &scene, &params, 7).accepting_from(needed);
@@ -543,10 +467,7 @@ fn a_pose_that_is_less_certain_than_asked_for_is_refused() {
             .expect("good data");
     }
     let probability = results[0].confidence.as_ref().map(|one| one.probability);
-    assert!(
-        probability.is_some_and(|p| (0.0..1.0).contains(&p)),
-        "{probability:?}"
-    );
+    assert!(probability.is_some_and(|p| (0.0..1.0).contains(&p)), "{probability:?}");
     let reason = results[1].reason.as_ref().expect("no pose is that certain");
     assert_eq!(reason.code, Code::L1);
     assert_eq!(results[1].pose, None);
@@ -556,12 +477,7 @@ fn a_pose_that_is_less_certain_than_asked_for_is_refused() {
 fn a_method_may_ask_for_more_certainty_than_nobody_does() {
     let (scene, request) = (
         Walls::new(),
-        Request {
-            radius_m: 3.0,
-            references: vec![0].into(),
-            fusions: Vec::new(),
-            setting: None,
-        },
+        Request { radius_m: 3.0, references: vec![0].into(), fusions: Vec::new(), setting: None },
     );
     let fb2 = Method::named("fb2");
     let answered = |least_probability: f64| {
@@ -583,8 +499,5 @@ fn a_method_may_ask_for_more_certainty_than_nobody_does() {
     assert_eq!(never.pose, None);
     let reason = never.reason.expect("no pose is that certain");
     assert_eq!(reason.code, Code::L1);
-    assert_eq!(
-        always.confidence, never.confidence,
-        "how certain it is, it says all the same"
-    );
+    assert_eq!(always.confidence, never.confidence, "how certain it is, it says all the same");
 }

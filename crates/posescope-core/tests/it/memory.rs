@@ -88,12 +88,7 @@ impl Sink for StageCounts {
 impl LocalizeObserver for StageCounts {}
 
 fn request(references: References) -> Request {
-    Request {
-        radius_m: 3.0,
-        references,
-        fusions: Vec::new(),
-        setting: None,
-    }
+    Request { radius_m: 3.0, references, fusions: Vec::new(), setting: None }
 }
 
 fn localize(
@@ -107,17 +102,13 @@ fn localize(
         results.push((result, times));
         Ok::<(), LocalizeError>(())
     };
-    localizer
-        .localize(0, 1, &[request(references)], methods, observer, keep)
-        .expect("good data");
+    localizer.localize(0, 1, &[request(references)], methods, observer, keep).expect("good data");
     results
 }
 
 fn without_features() -> Params {
     let mut params = Params::default();
-    params
-        .assign("surf.threshold=1000000")
-        .expect("a good assignment");
+    params.assign("surf.threshold=1000000").expect("a good assignment");
     params
 }
 
@@ -151,9 +142,7 @@ fn features_are_found_once_for_ranking_and_for_every_reference() {
         seed: 7,
         index: None,
     };
-    let chosen = chooser
-        .choose(1, &|_| false, &mut NoObserver)
-        .expect("readable");
+    let chosen = chooser.choose(1, &|_| false, &mut NoObserver).expect("readable");
     assert_eq!(chosen.frames.len(), 2);
     assert_eq!(scene.clouds(), [0; 5]);
     let mut counts = StageCounts::default();
@@ -308,10 +297,7 @@ impl Scene for UnusualScene {
     }
 
     fn intrinsics(&self, frame: usize) -> Intrinsics {
-        Intrinsics {
-            fx: 200.0 + frame as f64,
-            ..self.0.intrinsics(frame)
-        }
+        Intrinsics { fx: 200.0 + frame as f64, ..self.0.intrinsics(frame) }
     }
 
     fn pose(&self, frame: usize) -> Option<Pose> {
@@ -341,31 +327,13 @@ impl Scene for UnusualScene {
 fn said(scene: &dyn Scene, frame: usize) -> Vec<String> {
     let error = |error: SceneError| error.to_string();
     let query = scene.query(frame).map_err(error).map(|query| {
-        let Query {
-            name,
-            photo,
-            intrinsics,
-            memo: _,
-        } = &*query;
+        let Query { name, photo, intrinsics, memo: _ } = &*query;
         (name.clone(), photo.gray.clone(), *intrinsics)
     });
     let reference = scene.reference(frame).map_err(error).map(|tuple| {
-        let ReferenceTuple {
-            name,
-            photo,
-            intrinsics,
-            world_from_camera,
-            cloud,
-            memo: _,
-        } = &*tuple;
+        let ReferenceTuple { name, photo, intrinsics, world_from_camera, cloud, memo: _ } = &*tuple;
         let pixels = photo.gray.clone();
-        (
-            name.clone(),
-            pixels,
-            *intrinsics,
-            *world_from_camera,
-            cloud.points.clone(),
-        )
+        (name.clone(), pixels, *intrinsics, *world_from_camera, cloud.points.clone())
     });
     vec![
         scene.name().to_owned(),

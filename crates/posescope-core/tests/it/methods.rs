@@ -55,20 +55,11 @@ fn in_other_light(query: &GrayImage) -> GrayImage {
 #[test]
 fn the_truth_costs_less_than_what_is_beside_it_in_any_channel_and_light() {
     let query = in_other_light(&photo(1.0, 5));
-    for problem in [
-        solvable(),
-        problem(query, photo(0.0, 5), cloud_of_the_walls()),
-    ] {
-        for channels in [
-            Channels::Intensity,
-            Channels::Contrast,
-            Channels::Gradient,
-            Channels::Three,
-        ] {
-            let params = JudgeParams {
-                channels,
-                ..JudgeParams::default()
-            };
+    for problem in [solvable(), problem(query, photo(0.0, 5), cloud_of_the_walls())] {
+        for channels in
+            [Channels::Intensity, Channels::Contrast, Channels::Gradient, Channels::Three]
+        {
+            let params = JudgeParams { channels, ..JudgeParams::default() };
             let judge = Judge::new(&problem, &RenderParams::default(), &params, 1);
             let poses = [
                 Pose::translation(0.0, 0.0, 1.0),
@@ -76,15 +67,9 @@ fn the_truth_costs_less_than_what_is_beside_it_in_any_channel_and_light() {
                 Pose::translation(0.0, 0.3, 1.0),
                 Pose::translation(0.0, 0.0, 2.5),
             ];
-            let costs: Vec<f64> = judge
-                .score(&poses)
-                .iter()
-                .map(|score| score.cost.expect("textured"))
-                .collect();
-            assert!(
-                costs[1..].iter().all(|cost| costs[0] < *cost),
-                "{channels:?} {costs:?}"
-            );
+            let costs: Vec<f64> =
+                judge.score(&poses).iter().map(|score| score.cost.expect("textured")).collect();
+            assert!(costs[1..].iter().all(|cost| costs[0] < *cost), "{channels:?} {costs:?}");
             let shuffled = judge.shuffled(&poses[0], 3).expect("textured");
             assert!((shuffled - 1.0).abs() < 0.02, "less chance: {shuffled}");
         }
@@ -120,10 +105,7 @@ fn a_search_whose_minima_all_lead_out_of_the_disc_says_so() {
     problem.uncertainty_radius_m = 0.05;
     let (outcome, _) = told("mi6", &problem, &Params::default());
     let failure = outcome.pose.expect_err("its basin has its foot outside");
-    assert!(
-        matches!(failure, Failure::LedOutside { minima, .. } if minima > 1),
-        "{failure}"
-    );
+    assert!(matches!(failure, Failure::LedOutside { minima, .. } if minima > 1), "{failure}");
     assert_eq!(Code::of(&failure), Code::D8);
 }
 
@@ -155,10 +137,7 @@ fn a_descent_tells_each_step_over_the_surface_and_listening_changes_nothing() {
         let off = PoseError::between(&truth, outcome.pose.as_ref().expect("a pose"));
         assert!(off.translation_m < 0.1, "{method}: {off}");
 
-        let steps: Vec<_> = history
-            .all::<DescentStepped>()
-            .map(|(_, step)| *step)
-            .collect();
+        let steps: Vec<_> = history.all::<DescentStepped>().map(|(_, step)| *step).collect();
         assert_eq!(steps[0].level, params.descent.levels - 1, "{method}");
         assert_eq!(steps[steps.len() - 1].level, 0, "{method}");
         for pair in steps.windows(2) {
@@ -167,18 +146,12 @@ fn a_descent_tells_each_step_over_the_surface_and_listening_changes_nothing() {
             assert!(goes_on || begins, "{method}: {pair:?}");
         }
         // The way over the surface that views and recordings draw.
-        let way = history
-            .all::<ViewRendered>()
-            .filter(|(_, view)| view.moment == Moment::NewBest);
+        let way = history.all::<ViewRendered>().filter(|(_, view)| view.moment == Moment::NewBest);
         assert_eq!(way.count(), steps.len(), "{method}");
         assert_eq!(history.all::<PhaseSearched>().count(), 1, "{method}");
         let cost = outcome.cost.expect("a cost was descended");
         assert_eq!(cost.evaluations, 1 + steps.len() as u64, "{method}");
-        assert_eq!(
-            Some(cost.best),
-            steps[steps.len() - 1].score.cost,
-            "{method}"
-        );
+        assert_eq!(Some(cost.best), steps[steps.len() - 1].score.cost, "{method}");
     }
 }
 
@@ -191,10 +164,8 @@ fn matching_again_where_the_pose_says_adds_inliers() {
         outcome.counts.expect("it matched").inliers
     };
     // A strict first ratio leaves much to be found the second time.
-    let (once, twice) = (
-        inliers(&["fb2.ratio=0.7", "fb2.guided=false"]),
-        inliers(&["fb2.ratio=0.7"]),
-    );
+    let (once, twice) =
+        (inliers(&["fb2.ratio=0.7", "fb2.guided=false"]), inliers(&["fb2.ratio=0.7"]));
     assert!(twice > once, "{once} {twice}");
 }
 
@@ -209,11 +180,7 @@ fn robust_compares_all_families_and_says_what_each_costs() {
     assert_eq!(outcome.cost.expect("it searched").best, costs[0]);
     for name in ["fb", "fb2", "mi6"] {
         let is_there = judged.candidates.iter().any(|c| c.method.name() == name);
-        assert!(
-            is_there && judged.why.contains(name),
-            "{name}: {}",
-            judged.why
-        );
+        assert!(is_there && judged.why.contains(name), "{name}: {}", judged.why);
     }
     // A photo of other walls fits nowhere: with a threshold it is refused, and says how far it was.
     let other = problem_of_strangers();

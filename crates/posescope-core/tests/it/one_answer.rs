@@ -31,10 +31,7 @@ fn against(references: &[usize], fusions: &[&str]) -> Request {
     Request {
         radius_m: 3.0,
         references: references.to_vec().into(),
-        fusions: fusions
-            .iter()
-            .map(|name| name.parse::<Fusion>().expect("a fusion"))
-            .collect(),
+        fusions: fusions.iter().map(|name| name.parse::<Fusion>().expect("a fusion")).collect(),
         setting: None,
     }
 }
@@ -51,9 +48,7 @@ fn answers(
         Ok::<(), LocalizeError>(())
     };
     let requests = std::slice::from_ref(request);
-    localizer
-        .localize(0, 1, requests, methods, observer, keep)
-        .expect("good data");
+    localizer.localize(0, 1, requests, methods, observer, keep).expect("good data");
     results
 }
 
@@ -76,11 +71,7 @@ fn the_library_refuses_what_the_command_line_refuses() {
     let mut params = Params::default();
     params.fb2.least_probability = 1.0;
     let alone = localize(&solvable(), FB2, &params);
-    assert!(
-        matches!(alone.pose, Err(Failure::LowConfidence { .. })),
-        "{:?}",
-        alone.pose
-    );
+    assert!(matches!(alone.pose, Err(Failure::LowConfidence { .. })), "{:?}", alone.pose);
     let mut everything = Everything;
     let watched = localize_traced(&solvable(), FB2, &params, &mut Trace::to(&mut everything));
     assert_eq!(watched.expect("nobody cancels"), alone);
@@ -96,19 +87,10 @@ fn a_fused_result_depends_on_no_other_method() {
         results.retain(|result| result.method == wanted);
         results.pop().expect("it was asked for")
     };
-    for (wanted, other) in [
-        (NID, FB2),
-        (FB2, Method::MI),
-        (FB2, NID),
-        (Method::MI, Method::FB),
-    ] {
+    for (wanted, other) in [(NID, FB2), (FB2, Method::MI), (FB2, NID), (Method::MI, Method::FB)] {
         for methods in [&[wanted][..], &[wanted, other], &[other, wanted]] {
             let found = of(methods, wanted);
-            assert_eq!(
-                found.pose,
-                of(&[wanted], wanted).pose,
-                "{wanted} of {methods:?}"
-            );
+            assert_eq!(found.pose, of(&[wanted], wanted).pose, "{wanted} of {methods:?}");
         }
     }
 }
@@ -116,12 +98,9 @@ fn a_fused_result_depends_on_no_other_method() {
 #[test]
 fn the_states_of_features_add_up_to_the_counts() {
     for method in [Method::FB, FB2] {
-        for assignment in [
-            "fb.ratio=0.6",
-            "fb2.max_trials=1",
-            "fb2.guided=false",
-            "fb2.depth_radius=0.2",
-        ] {
+        for assignment in
+            ["fb.ratio=0.6", "fb2.max_trials=1", "fb2.guided=false", "fb2.depth_radius=0.2"]
+        {
             let mut params = Params::default();
             params.assign(assignment).expect("a parameter");
             let mut evidence = Evidence::default();
@@ -136,18 +115,10 @@ fn the_states_of_features_add_up_to_the_counts() {
             let not_unique = kept(|s| matches!(s, FeatureState::NotUnique { .. }));
             let no_depth = kept(|s| matches!(s, FeatureState::NoDepth { .. }));
             let inliers = kept(|s| matches!(s, FeatureState::Inlier { .. }));
-            assert_eq!(
-                states.len(),
-                counts.query_keypoints,
-                "{method} {assignment}"
-            );
+            assert_eq!(states.len(), counts.query_keypoints, "{method} {assignment}");
             assert_eq!(ratio, counts.ratio_passed, "{method} {assignment}");
             assert_eq!(ratio - not_unique, counts.unique, "{method} {assignment}");
-            assert_eq!(
-                ratio - not_unique - no_depth,
-                counts.with_depth,
-                "{method} {assignment}"
-            );
+            assert_eq!(ratio - not_unique - no_depth, counts.with_depth, "{method} {assignment}");
             assert_eq!(inliers, counts.inliers, "{method} {assignment}");
         }
     }
@@ -171,24 +142,13 @@ fn points_in_view_are_fewer_than_all_where_some_are_not() {
     let behind = reference.cloud.points.clone();
     let behind = behind.iter().map(|point| -*point);
     reference.cloud.points.extend(behind);
-    let problem = Problem {
-        reference: Arc::new(reference),
-        ..problem
-    };
+    let problem = Problem { reference: Arc::new(reference), ..problem };
     for method in [Method::FB, FB2] {
         let mut clouds = Clouds::default();
-        localize_traced(
-            &problem,
-            method,
-            &Params::default(),
-            &mut Trace::to(&mut clouds),
-        )
-        .expect("nobody cancels");
+        localize_traced(&problem, method, &Params::default(), &mut Trace::to(&mut clouds))
+            .expect("nobody cancels");
         for (points, in_view) in &clouds.0 {
-            assert!(
-                in_view * 2 <= *points && *in_view > 0,
-                "{method}: {in_view} of {points}"
-            );
+            assert!(in_view * 2 <= *points && *in_view > 0, "{method}: {in_view} of {points}");
         }
         assert!(!clouds.0.is_empty(), "{method}");
     }
@@ -231,10 +191,7 @@ fn a_later_round_of_the_search_never_ends_higher() {
                 params.grid.fine_step_m = 0.1;
                 let outcome = localize(&problem, method, &params);
                 let best = outcome.cost.expect("it has a cost").best;
-                assert!(
-                    best <= before,
-                    "{method} {radius} m, round {rounds}: {best} > {before}"
-                );
+                assert!(best <= before, "{method} {radius} m, round {rounds}: {best} > {before}");
                 before = best;
             }
         }
@@ -278,11 +235,6 @@ fn two_drives_of_one_name_are_two() {
     assert!(!is_one_drive(&walls, &elsewhere));
     let params = Params::default();
     let localizer = Localizer::new(&walls, &elsewhere, &params, 7);
-    let results = answers(
-        &localizer,
-        &against(&[0], &[]),
-        &[Method::FB],
-        &mut NoObserver,
-    );
+    let results = answers(&localizer, &against(&[0], &[]), &[Method::FB], &mut NoObserver);
     assert_eq!(results[0].query_scene.as_deref(), Some("walls"));
 }

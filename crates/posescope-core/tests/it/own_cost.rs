@@ -68,10 +68,7 @@ fn a_cost_of_ones_own_is_searched_and_told_like_any_other() {
     let ahead = problem.reference_from_query(&pose).translation.vector;
     assert!((ahead - nalgebra::Vector3::z()).norm() < 0.3, "{ahead}");
     let last = history.last::<StageEnded>().expect("it ended");
-    assert_eq!(
-        (last.stage, last.stage.name()),
-        (Stage::Estimator(Method::named("mine")), "mine")
-    );
+    assert_eq!((last.stage, last.stage.name()), (Stage::Estimator(Method::named("mine")), "mine"));
     // It explains nothing, which is no reason not to show its views.
     let view = history.last::<ViewRendered>().expect("shown at the end");
     assert!(view.comparison.score.cost.is_some() && view.comparison.explanation.is_none());

@@ -67,11 +67,7 @@ fn a_ranking_is_told_once_after_the_query_and_a_lost_photo_does_not_matter() {
     let frames = [0, UNREADABLE].map(|frame| RankedReference {
         name: format!("{frame:06}"),
         world_from_camera: None,
-        ranked: Ranked {
-            frame,
-            score: 0.5,
-            geometry: Geometry::Unchecked,
-        },
+        ranked: Ranked { frame, score: 0.5, geometry: Geometry::Unchecked },
     });
     let ranking = Arc::new(ReferenceRanking {
         criterion: Criterion::Words,
@@ -81,11 +77,7 @@ fn a_ranking_is_told_once_after_the_query_and_a_lost_photo_does_not_matter() {
     });
     let request = |radius_m, ranking| Request {
         radius_m,
-        references: References {
-            frames: vec![0],
-            ranking,
-            within_m: None,
-        },
+        references: References { frames: vec![0], ranking, within_m: None },
         fusions: Vec::new(),
         setting: None,
     };

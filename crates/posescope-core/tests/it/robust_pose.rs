@@ -18,14 +18,8 @@ use posescope_core::solver::{Correspondence, p3p};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
-const KITTI: Intrinsics = Intrinsics {
-    fx: 718.856,
-    fy: 718.856,
-    cx: 607.1928,
-    cy: 185.2157,
-    width: 1241,
-    height: 376,
-};
+const KITTI: Intrinsics =
+    Intrinsics { fx: 718.856, fy: 718.856, cx: 607.1928, cy: 185.2157, width: 1241, height: 376 };
 
 /// A standard normal number (Box–Muller).
 fn normal(rng: &mut Pcg64) -> f64 {
@@ -131,9 +125,7 @@ fn anywhere(rng: &mut Pcg64) -> Point2<f64> {
 
 fn run(correspondences: &[Correspondence]) -> Option<Consensus> {
     let params = MlesacParams::default();
-    match mlesac(correspondences, &KITTI, &params, 1, |_| {
-        Ok::<_, Infallible>(())
-    }) {
+    match mlesac(correspondences, &KITTI, &params, 1, |_| Ok::<_, Infallible>(())) {
         Ok(consensus) => Some(consensus),
         Err(MlesacError::NoModel { .. }) => None,
         Err(error) => panic!("{error}"),
@@ -190,11 +182,7 @@ struct Texture(Vec<(Point2<f64>, f64)>);
 
 impl Texture {
     fn new(rng: &mut Pcg64, patches: usize) -> Self {
-        Self(
-            (0..patches)
-                .map(|_| (anywhere(rng), rng.random_range(5.0..50.0)))
-                .collect(),
-        )
+        Self((0..patches).map(|_| (anywhere(rng), rng.random_range(5.0..50.0))).collect())
     }
 
     /// A pixel with its depth \[m\].
@@ -211,14 +199,7 @@ impl Texture {
 #[test]
 fn matches_that_are_all_false_are_not_accepted() {
     for patches in [0, 8, 3] {
-        for (total, runs) in [
-            (8, 200),
-            (15, 200),
-            (30, 100),
-            (60, 50),
-            (128, 30),
-            (300, 5),
-        ] {
+        for (total, runs) in [(8, 200), (15, 200), (30, 100), (60, 50), (128, 30), (300, 5)] {
             let mut rng = Pcg64::seed_from_u64(11);
             let (mut accepted, mut accepted_by_paper, mut most, mut needed) = (0, 0, 0, Vec::new());
             for _ in 0..runs {
@@ -228,10 +209,7 @@ fn matches_that_are_all_false_are_not_accepted() {
                     .map(|_| {
                         let (pixel, _) = query.draw(&mut rng);
                         let (other, depth) = reference.draw(&mut rng);
-                        Correspondence {
-                            pixel,
-                            point: KITTI.unproject(&other, depth),
-                        }
+                        Correspondence { pixel, point: KITTI.unproject(&other, depth) }
                     })
                     .collect();
                 let inliers = run(&correspondences).map_or(0, |found| found.inliers.len());

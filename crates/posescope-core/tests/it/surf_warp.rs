@@ -17,9 +17,7 @@ const MAX_RATIO: f32 = 0.8;
 
 /// A pseudo-random number from 0 to 1 (Knuth's MMIX generator).
 fn random(state: &mut u64) -> f32 {
-    *state = state
-        .wrapping_mul(6_364_136_223_846_793_005)
-        .wrapping_add(1_442_695_040_888_963_407);
+    *state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
     (*state >> 40) as f32 / (1u64 << 24) as f32
 }
 
@@ -109,10 +107,7 @@ struct Quality {
 
 /// Features that turn with the image; upright ones would not survive the warp.
 fn turning() -> SurfParams {
-    SurfParams {
-        upright: false,
-        ..SurfParams::default()
-    }
+    SurfParams { upright: false, ..SurfParams::default() }
 }
 
 fn measure(image: &GrayImage, params: &SurfParams) -> Quality {

@@ -10,14 +10,8 @@ use posescope_core::image::Photo;
 use posescope_core::memo::Memo;
 use posescope_core::problem::{Problem, Query, ReferenceTuple};
 
-pub const CAMERA: Intrinsics = Intrinsics {
-    fx: 180.0,
-    fy: 180.0,
-    cx: 119.5,
-    cy: 49.5,
-    width: 240,
-    height: 100,
-};
+pub const CAMERA: Intrinsics =
+    Intrinsics { fx: 180.0, fy: 180.0, cx: 119.5, cy: 49.5, width: 240, height: 100 };
 
 /// Two textured walls at different depths, seen from `forward_m` in front of the reference.
 pub fn photo(forward_m: f64, seed: u32) -> GrayImage {

@@ -20,9 +20,7 @@ pub const UNREADABLE: usize = 4;
 
 impl Walls {
     pub fn new() -> Self {
-        Self {
-            names: (0..AHEAD_M.len()).map(|i| format!("{i:06}")).collect(),
-        }
+        Self { names: (0..AHEAD_M.len()).map(|i| format!("{i:06}")).collect() }
     }
 }
 
@@ -108,8 +106,6 @@ impl Scene for TwoCameras {
             });
             image::Luma([(values.iter().sum::<u32>() / 4) as u8])
         };
-        Ok(Photo::from_gray(image::GrayImage::from_fn(
-            width, height, mean,
-        )))
+        Ok(Photo::from_gray(image::GrayImage::from_fn(width, height, mean)))
     }
 }

@@ -17,11 +17,7 @@ pub(crate) struct Sector {
 impl Sector {
     /// The part of a tree in a beam.
     pub(crate) fn new(tree: &Arc<BoxTree>, beam: Beam) -> Self {
-        Self {
-            beam,
-            tree: Arc::clone(tree),
-            octants: Default::default(),
-        }
+        Self { beam, tree: Arc::clone(tree), octants: Default::default() }
     }
 
     /// What a ray of the beam can meet.

@@ -29,11 +29,7 @@ pub(crate) struct DiskCache {
 impl DiskCache {
     /// A cache in a folder of its own, which is made when it is needed, of at most `limit` bytes.
     pub(crate) fn new(folder: PathBuf, limit: u64) -> Self {
-        Self {
-            folder,
-            limit,
-            failed: AtomicBool::new(false),
-        }
+        Self { folder, limit, failed: AtomicBool::new(false) }
     }
 
     /// The cache `name` where the environment or else the system says; `None` where it is turned
@@ -168,8 +164,7 @@ mod tests {
             cache.write(key, &[0; 10]);
             let time = SystemTime::UNIX_EPOCH + Duration::from_secs(age as u64);
             let file = fs::File::options().write(true).open(cache.path(key));
-            file.and_then(|file| file.set_modified(time))
-                .expect("writable");
+            file.and_then(|file| file.set_modified(time)).expect("writable");
         }
         fs::write(&foreign, [0; 1000]).expect("writable");
         cache.write("d", &[0; 10]);

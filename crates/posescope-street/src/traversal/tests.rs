@@ -12,18 +12,12 @@ fn hashes(condition: Condition) -> [u64; 2] {
     let drive = Traversal::new(7, condition, Size::Half);
     let mut points = Vec::new();
     for point in drive.cloud(40) {
-        let ScanPoint {
-            position: p,
-            reflectance,
-        } = point;
+        let ScanPoint { position: p, reflectance } = point;
         for number in [p.x, p.y, p.z, reflectance] {
             points.extend(number.to_le_bytes());
         }
     }
-    [
-        xxhash_rust::xxh3::xxh3_64(drive.image(40).as_raw()),
-        xxhash_rust::xxh3::xxh3_64(&points),
-    ]
+    [xxhash_rust::xxh3::xxh3_64(drive.image(40).as_raw()), xxhash_rust::xxh3::xxh3_64(&points)]
 }
 
 /// They change with every change of the looks or the geometry, and with nothing else: not with the
@@ -83,10 +77,7 @@ fn traversals_share_houses_and_differ_in_cars_and_in_the_line_driven() {
 fn the_same_seed_makes_the_same_town_and_another_seed_another() {
     let image = traversal(Size::Half).image(10);
     assert_eq!(image, traversal(Size::Half).image(10));
-    assert_ne!(
-        image,
-        Traversal::new(8, Condition::Overcast, Size::Half).image(10)
-    );
+    assert_ne!(image, Traversal::new(8, Condition::Overcast, Size::Half).image(10));
 }
 
 #[test]

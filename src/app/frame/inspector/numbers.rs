@@ -9,15 +9,8 @@ use crate::localize::QueryResult;
 use crate::measure::{Field, Value};
 
 /// Fields that name the question, which the toolbar shows.
-const NAMES: [&str; 7] = [
-    "query",
-    "scene",
-    "queries",
-    "reference",
-    "method",
-    "fusion",
-    "references",
-];
+const NAMES: [&str; 7] =
+    ["query", "scene", "queries", "reference", "method", "fusion", "references"];
 
 pub(super) fn ui(ui: &mut Ui, state: &AppState) {
     let Some(span) = state.shown_span() else {
@@ -40,16 +33,13 @@ pub(super) fn ui(ui: &mut Ui, state: &AppState) {
     if let Some(times) = &span.times {
         ui.add_space(8.0);
         ui.strong("Time");
-        Grid::new("times")
-            .num_columns(2)
-            .spacing(vec2(10.0, 3.0))
-            .show(ui, |ui| {
-                for (stage, time) in times.iter() {
-                    ui.label(stage.replace('_', " "));
-                    ui.label(format!("{:.2} ms", 1e3 * time.as_secs_f64()));
-                    ui.end_row();
-                }
-            });
+        Grid::new("times").num_columns(2).spacing(vec2(10.0, 3.0)).show(ui, |ui| {
+            for (stage, time) in times.iter() {
+                ui.label(stage.replace('_', " "));
+                ui.label(format!("{:.2} ms", 1e3 * time.as_secs_f64()));
+                ui.end_row();
+            }
+        });
         ui.weak("Pauses count. A reused stage takes next to nothing.");
     }
 }
@@ -59,11 +49,7 @@ fn settings(ui: &mut Ui, state: &AppState) {
     let Some(kept) = &state.kept else { return };
     let (a, b) = (kept.run.settings(), state.run().settings());
     let only = |these: &[String], those: &[String]| -> Vec<String> {
-        these
-            .iter()
-            .filter(|one| !those.contains(one))
-            .cloned()
-            .collect()
+        these.iter().filter(|one| !those.contains(one)).cloned().collect()
     };
     ui.strong("Settings");
     let (only_a, only_b) = (only(&a, &b), only(&b, &a));
@@ -106,10 +92,7 @@ fn fields(
                 }
                 ui.end_row();
             }
-            for field in Field::ALL
-                .iter()
-                .filter(|field| !NAMES.contains(&field.name))
-            {
+            for field in Field::ALL.iter().filter(|field| !NAMES.contains(&field.name)) {
                 let text = |result: &QueryResult| match field.of(result) {
                     Value::None => None,
                     _ => Some(field.text(result)).filter(|text| !text.is_empty()),
@@ -119,8 +102,7 @@ fn fields(
                 if own.is_none() && theirs.is_none() || state.options.only_differences && !differs {
                     continue;
                 }
-                ui.label(field.name.replace('_', " "))
-                    .on_hover_text(field.about);
+                ui.label(field.name.replace('_', " ")).on_hover_text(field.about);
                 let own = RichText::new(own.unwrap_or_else(|| "–".to_owned()));
                 ui.label(if differs { own.strong() } else { own });
                 if is_compared {

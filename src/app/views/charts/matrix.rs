@@ -28,11 +28,7 @@ impl Columns {
             "by condition",
             "A column for each pair of scenes of queries and references",
         ),
-        (
-            Self::Now,
-            "since A",
-            "Verdicts of the results A in rows, those of now in columns",
-        ),
+        (Self::Now, "since A", "Verdicts of the results A in rows, those of now in columns"),
     ];
 }
 
@@ -128,9 +124,7 @@ fn tally<'a>(
         let code = result.diagnosis.first().map(|finding| finding.code);
         let (name, filter) = column(result);
         *sums.entry(name.clone()).or_default() += 1;
-        *counts
-            .entry((code, name, result.method, filter))
-            .or_default() += 1;
+        *counts.entry((code, name, result.method, filter)).or_default() += 1;
     }
     let cells = counts.into_iter();
     let cell = |((code, column, method, scenes), count): (
@@ -142,11 +136,7 @@ fn tally<'a>(
         let text = format!("{count} ({:.0} %)", 100.0 * count as f64 / all as f64);
         let text = RichText::new(text);
         let filter = code.map_or("\"\"", Code::name);
-        let place = if scenes.is_empty() {
-            String::new()
-        } else {
-            format!(", {column}")
-        };
+        let place = if scenes.is_empty() { String::new() } else { format!(", {column}") };
         Cell {
             words: format!("{} {row}{place}: {count} of {all}", method.label()),
             text: if code.is_none() { text.color(ok) } else { text },
@@ -162,11 +152,8 @@ fn tally<'a>(
 }
 
 fn migration(context: &ViewContext<'_>, one: &Migration, [ok, wrong]: [Color32; 2]) -> Cell {
-    let change = VerdictChange {
-        method: one.method,
-        before: one.before.clone(),
-        after: one.after.clone(),
-    };
+    let change =
+        VerdictChange { method: one.method, before: one.before.clone(), after: one.after.clone() };
     let is_chosen = context.options.verdict_change.as_ref() == Some(&change);
     let name = verdict_name(None);
     let text = RichText::new(one.count.to_string());
@@ -211,10 +198,8 @@ fn in_order<'a>(names: impl Iterator<Item = &'a String>) -> Vec<&'a String> {
 }
 
 fn table(ui: &mut Ui, context: &ViewContext<'_>, corner: &str, cells: Vec<Cell>) {
-    let rows: Vec<String> = in_order(cells.iter().map(|cell| &cell.row))
-        .into_iter()
-        .cloned()
-        .collect();
+    let rows: Vec<String> =
+        in_order(cells.iter().map(|cell| &cell.row)).into_iter().cloned().collect();
     let columns = in_order(cells.iter().map(|cell| &cell.column)).into_iter();
     let columns: Vec<String> = columns.cloned().collect();
     let header = |ui: &mut Ui, name: &str| {
@@ -263,10 +248,7 @@ mod tests {
 
     #[test]
     fn verdicts_are_in_the_order_of_the_codes_after_ok() {
-        let codes: Vec<String> = Code::all()
-            .iter()
-            .map(|code| code.name().to_owned())
-            .collect();
+        let codes: Vec<String> = Code::all().iter().map(|code| code.name().to_owned()).collect();
         let ok = "ok".to_owned();
         let ordered = in_order(codes.iter().rev().chain([&ok]));
         assert_eq!(ordered[0], &ok);
@@ -282,10 +264,7 @@ mod tests {
             count,
         };
         let all = [of("ok", "ok", 7), of("ok", "D2", 3), of("D3", "ok", 2)];
-        assert_eq!(
-            changes(&all),
-            "5 of 12 verdicts changed: MI ok → D2 3, MI D3 → ok 2"
-        );
+        assert_eq!(changes(&all), "5 of 12 verdicts changed: MI ok → D2 3, MI D3 → ok 2");
         assert_eq!(changes(&all[..1]), "None of 7 verdicts changed");
     }
 }

@@ -38,15 +38,10 @@ fn limits<'a>(results: impl Iterator<Item = &'a QueryResult>, right: Tolerance) 
 pub(super) fn ui(ui: &mut Ui, context: &ViewContext<'_>, results: &[Chosen<'_>], most_m: f64) {
     let right = context.setup.task.protocol.right;
     let now = limits(results.iter().map(|(_, result)| *result), right);
-    let before = results
-        .iter()
-        .filter_map(|(row, _)| context.result_before(*row));
+    let before = results.iter().filter_map(|(row, _)| context.result_before(*row));
     let before = limits(before, right);
     let share = |(all, known): &(usize, Vec<f64>)| {
-        let within = known
-            .iter()
-            .filter(|limit| **limit <= right.translation_m)
-            .count();
+        let within = known.iter().filter(|limit| **limit <= right.translation_m).count();
         100.0 * within as f64 / (*all).max(1) as f64
     };
     let words: Vec<String> = now
@@ -61,9 +56,7 @@ pub(super) fn ui(ui: &mut Ui, context: &ViewContext<'_>, results: &[Chosen<'_>],
     ui.weak(&words);
     let degrees_of = right.rotation_deg / right.translation_m;
     let plot = Plot::new("recall")
-        .x_axis_label(format!(
-            "tolerance x [m], with {degrees_of:.3} ° for each m"
-        ))
+        .x_axis_label(format!("tolerance x [m], with {degrees_of:.3} ° for each m"))
         .y_axis_label("share of right results [%]")
         .default_x_bounds(0.0, most_m)
         .default_y_bounds(0.0, 100.0)
@@ -112,14 +105,7 @@ mod tests {
         let line = steps(&[0.5, 1.0, 3.0], 4, 2.0);
         assert_eq!(
             line,
-            [
-                [0.0, 0.0],
-                [0.5, 0.0],
-                [0.5, 25.0],
-                [1.0, 25.0],
-                [1.0, 50.0],
-                [2.0, 50.0]
-            ]
+            [[0.0, 0.0], [0.5, 0.0], [0.5, 25.0], [1.0, 25.0], [1.0, 50.0], [2.0, 50.0]]
         );
         assert_eq!(steps(&[], 0, 1.0), [[0.0, 0.0], [1.0, 0.0]]);
     }

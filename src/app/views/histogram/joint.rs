@@ -27,12 +27,10 @@ pub(super) fn ui(
 ) {
     let cost = estimator::find(method).and_then(Entry::cost);
     let sees = cost.map_or("value", |cost| cost.sees);
-    let texture = context
-        .textures
-        .of(ui.ctx(), "joint histogram", shown, |_| {
-            let picture = picture::joint_histogram(histogram).into();
-            crate::app::textures::color_image(&picture)
-        });
+    let texture = context.textures.of(ui.ctx(), "joint histogram", shown, |_| {
+        let picture = picture::joint_histogram(histogram).into();
+        crate::app::textures::color_image(&picture)
+    });
     let readout = Readout::reserve(ui);
     let side = ui.available_width().min(420.0);
     let answer = Plot::new("joint histogram")
@@ -65,9 +63,7 @@ pub(super) fn ui(
         histogram.counts.iter().sum::<u32>(),
         histogram.bins
     );
-    answer
-        .response
-        .widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, &name));
+    answer.response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, &name));
     let pointed_at = answer.response.hover_pos().and_then(|at| {
         let point = answer.transform.value_from_position(at);
         bin_at(histogram, point.x, point.y)
@@ -82,8 +78,7 @@ pub(super) fn ui(
         let rect = Rect::from_two_pos(corner(column, row), corner(column + 1, row + 1));
         for (width, color) in [(3.0, Color32::BLACK), (1.5, Color32::WHITE)] {
             let stroke = Stroke::new(width, color);
-            ui.painter()
-                .rect_stroke(rect, 0.0, stroke, egui::StrokeKind::Outside);
+            ui.painter().rect_stroke(rect, 0.0, stroke, egui::StrokeKind::Outside);
         }
     }
     let words = pointed_at.as_ref().map(|bin| bin.words.as_str());
@@ -93,10 +88,8 @@ pub(super) fn ui(
 
 /// Marks at every quarter of the grey values.
 fn grey_marks(_: GridInput) -> Vec<GridMark> {
-    let quarters = (0..=4).map(|quarter| GridMark {
-        value: 64.0 * f64::from(quarter),
-        step_size: 64.0,
-    });
+    let quarters =
+        (0..=4).map(|quarter| GridMark { value: 64.0 * f64::from(quarter), step_size: 64.0 });
     quarters.collect()
 }
 
@@ -142,9 +135,7 @@ fn numbers(ui: &mut Ui, method: Method, shown: &Comparison, histogram: &JointHis
     let query = bits(histogram.query_entropy);
     let synthetic = bits(histogram.synthetic_entropy);
     let joint = bits(histogram.joint_entropy);
-    ui.label(format!(
-        "H(Q) = {query:.3} bit, H(S) = {synthetic:.3} bit, H(Q,S) = {joint:.3} bit"
-    ));
+    ui.label(format!("H(Q) = {query:.3} bit, H(S) = {synthetic:.3} bit, H(Q,S) = {joint:.3} bit"));
     let shared = query + synthetic - joint;
     ui.label(format!(
         "I(Q,S) = H(Q) + H(S) - H(Q,S) = {query:.3} + {synthetic:.3} - {joint:.3} = {shared:.3} bit"
@@ -155,15 +146,10 @@ fn numbers(ui: &mut Ui, method: Method, shown: &Comparison, histogram: &JointHis
         if let Some(Similarity { name, formula }) = similarity {
             let share = 1.0 - cost;
             let norm = shared / share;
-            ui.label(format!(
-                "{name} = {formula} = {shared:.3} / {norm:.3} = {share:.4}"
-            ));
+            ui.label(format!("{name} = {formula} = {shared:.3} / {norm:.3} = {share:.4}"));
             is = format!(" = 1 - {name}");
         }
-        ui.label(format!(
-            "cost{is} = {cost:.4}, over {} pixels",
-            shown.score.covered
-        ));
+        ui.label(format!("cost{is} = {cost:.4}, over {} pixels", shown.score.covered));
     }
 }
 

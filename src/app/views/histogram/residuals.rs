@@ -34,9 +34,8 @@ pub(super) fn ui(ui: &mut Ui, method: Method, shown: &Comparison, weights: &Phot
         .show(ui, |plot| {
             let inside = bars(&counts, 0);
             let inside = BarChart::new("counted", inside).color(counted);
-            let outside = BarChart::new("ignored", bars(&counts, 1))
-                .color(ignored)
-                .stack_on(&[&inside]);
+            let outside =
+                BarChart::new("ignored", bars(&counts, 1)).color(ignored).stack_on(&[&inside]);
             plot.bar_chart(inside.element_formatter(Box::new(describe)));
             plot.bar_chart(outside.element_formatter(Box::new(describe)));
             for side in [-median, median] {
@@ -45,9 +44,7 @@ pub(super) fn ui(ui: &mut Ui, method: Method, shown: &Comparison, weights: &Phot
             }
         });
     let name = format!("Residuals of {} pixels", shown.pairs.len());
-    answer
-        .response
-        .widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, &name));
+    answer.response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, &name));
     let kept = weights.counted.iter().filter(|counted| **counted).count();
     let left_out = weights.counted.len() - kept;
     ui.horizontal_wrapped(|ui| {
@@ -87,12 +84,7 @@ fn bars(counts: &[[u32; 2]], which: usize) -> Vec<Bar> {
         let middle = (index * WIDTH) as f64 + 0.5 * WIDTH as f64 - 256.0;
         Bar::new(middle, f64::from(count[which])).width(WIDTH as f64)
     };
-    counts
-        .iter()
-        .enumerate()
-        .filter(|(_, count)| **count != [0; 2])
-        .map(bar)
-        .collect()
+    counts.iter().enumerate().filter(|(_, count)| **count != [0; 2]).map(bar).collect()
 }
 
 fn describe(bar: &Bar, chart: &BarChart) -> String {

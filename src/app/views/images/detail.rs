@@ -101,8 +101,7 @@ impl Detail {
         // What lies below is not pointed at.
         ui.interact(area, ui.scope_id().with("details"), Sense::click());
         let (fill, stroke) = (ui.visuals().panel_fill, ui.visuals().window_stroke);
-        ui.painter()
-            .rect(area, 4.0, fill, stroke, egui::StrokeKind::Inside);
+        ui.painter().rect(area, 4.0, fill, stroke, egui::StrokeKind::Inside);
         ui.scope_builder(UiBuilder::new().max_rect(area.shrink(8.0)), |ui| {
             ui.shrink_clip_rect(area);
             ui.spacing_mut().item_spacing = vec2(4.0, 2.0);
@@ -237,9 +236,8 @@ fn lidar_around(tuple: &ReferenceTuple, pixel: &Point2<f64>, radius_px: f64) -> 
         Some((seen, f64::from(point.z)))
     });
     let distance = |seen: &SeenPoint| (seen.0 - pixel).norm_squared();
-    let mut seen: Vec<SeenPoint> = seen
-        .filter(|seen| distance(seen) <= radius_px * radius_px)
-        .collect();
+    let mut seen: Vec<SeenPoint> =
+        seen.filter(|seen| distance(seen) <= radius_px * radius_px).collect();
     seen.sort_by(|a, b| {
         let by_distance = distance(a).total_cmp(&distance(b));
         by_distance.then(a.1.total_cmp(&b.1))
@@ -258,20 +256,10 @@ mod tests {
 
     #[test]
     fn only_points_near_the_pixel_and_in_front_are_seen_the_nearest_first() {
-        let intrinsics = Intrinsics {
-            fx: 100.0,
-            fy: 100.0,
-            cx: 50.0,
-            cy: 40.0,
-            width: 101,
-            height: 81,
-        };
+        let intrinsics =
+            Intrinsics { fx: 100.0, fy: 100.0, cx: 50.0, cy: 40.0, width: 101, height: 81 };
         let at = |x: f64, y: f64, z: f64| intrinsics.unproject(&Point2::new(x, y), z).cast();
-        let mut points = vec![
-            at(20.0, 20.0, 10.0),
-            at(22.0, 20.0, 30.0),
-            at(60.0, 60.0, 5.0),
-        ];
+        let mut points = vec![at(20.0, 20.0, 10.0), at(22.0, 20.0, 30.0), at(60.0, 60.0, 5.0)];
         points.push(-points[0]);
         let tuple = ReferenceTuple {
             name: "reference".to_owned(),

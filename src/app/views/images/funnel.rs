@@ -21,11 +21,7 @@ pub(super) fn ui(ui: &mut Ui, kinds: &[usize], shown: &mut [bool; KINDS]) {
     for &kind in kinds {
         counts[kind] += 1;
     }
-    let chips = if counts[UNDECIDED] == 0 {
-        UNDECIDED
-    } else {
-        KINDS
-    };
+    let chips = if counts[UNDECIDED] == 0 { UNDECIDED } else { KINDS };
     let free = ui.available_width() - GAP * (chips - 1) as f32;
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = GAP;
@@ -51,20 +47,12 @@ fn chip(ui: &mut Ui, kind: usize, count: usize, width: f32, is_shown: bool) -> e
     let painter = ui.painter_at(rect);
     let (fill, outline, text) = if is_shown {
         let color = color(kind);
-        (
-            color.gamma_multiply(0.3),
-            color,
-            visuals.strong_text_color(),
-        )
+        (color.gamma_multiply(0.3), color, visuals.strong_text_color())
     } else {
         let outline = visuals.widgets.noninteractive.bg_stroke.color;
         (visuals.faint_bg_color, outline, visuals.text_color())
     };
-    let outline = if response.hovered() {
-        visuals.strong_text_color()
-    } else {
-        outline
-    };
+    let outline = if response.hovered() { visuals.strong_text_color() } else { outline };
     let stroke = Stroke::new(1.0, outline);
     painter.rect(rect, 3.0, fill, stroke, egui::StrokeKind::Inside);
     let left = rect.left() + 8.0;

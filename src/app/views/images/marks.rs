@@ -13,11 +13,7 @@ use crate::features::Keypoint;
 
 /// The colour of a state, or of none yet.
 pub(super) fn color(kind: usize) -> Color32 {
-    if kind == UNDECIDED {
-        theme::CAMERA
-    } else {
-        theme::state(kind)
-    }
+    if kind == UNDECIDED { theme::CAMERA } else { theme::state(kind) }
 }
 
 /// The mark of a state, or of none yet.

@@ -20,14 +20,8 @@ pub(super) const KINDS: usize = UNDECIDED + 1;
 
 /// The name of a state, or of none yet.
 pub(super) fn name(kind: usize) -> &'static str {
-    const NAMES: [&str; KINDS] = [
-        "ratio failed",
-        "not unique",
-        "no depth",
-        "outlier",
-        "inlier",
-        "undecided",
-    ];
+    const NAMES: [&str; KINDS] =
+        ["ratio failed", "not unique", "no depth", "outlier", "inlier", "undecided"];
     NAMES[kind]
 }
 
@@ -55,9 +49,7 @@ impl<'a> FeatureProgress<'a> {
         let mut methods = context.method().into_iter().chain(asked);
         methods
             .find_map(|method| with_features(method).then(|| context.part_of(method))?)
-            .map_or_else(Self::default, |(span, cursor)| {
-                Self::until(context.run, span, cursor)
-            })
+            .map_or_else(Self::default, |(span, cursor)| Self::until(context.run, span, cursor))
     }
 
     fn until(run: &'a Run, span: &Span, cursor: usize) -> Self {
@@ -113,18 +105,17 @@ impl<'a> FeatureProgress<'a> {
             return states.get(feature).copied();
         }
         let Some(found) = self.decisions?.get(feature)? else {
-            return Some(FeatureState::RatioFailed {
-                ratio: f32::INFINITY,
-            });
+            return Some(FeatureState::RatioFailed { ratio: f32::INFINITY });
         };
         match found.verdict {
             MatchVerdict::Ambiguous => Some(FeatureState::RatioFailed { ratio: found.ratio }),
             MatchVerdict::NotUnique { rival } => Some(FeatureState::NotUnique { rival }),
             MatchVerdict::Candidate => {
                 let lifted = self.lifted(feature)?;
-                lifted.point.is_none().then_some(FeatureState::NoDepth {
-                    distance_px: lifted.lidar_distance_px,
-                })
+                lifted
+                    .point
+                    .is_none()
+                    .then_some(FeatureState::NoDepth { distance_px: lifted.lidar_distance_px })
             }
         }
     }
@@ -163,11 +154,7 @@ impl<'a> FeatureProgress<'a> {
 
 /// A reprojection error in words.
 pub(super) fn error_px(residual_px: f64) -> String {
-    if residual_px.is_infinite() {
-        "no pose".to_owned()
-    } else {
-        format!("{residual_px:.2} px")
-    }
+    if residual_px.is_infinite() { "no pose".to_owned() } else { format!("{residual_px:.2} px") }
 }
 
 #[cfg(test)]
@@ -184,20 +171,11 @@ mod tests {
             response: 1.0,
             laplacian_positive: true,
         });
-        Arc::new(Features {
-            keypoints: keypoints.collect(),
-            descriptors: Vec::new(),
-        })
+        Arc::new(Features { keypoints: keypoints.collect(), descriptors: Vec::new() })
     }
 
     fn decision(query: usize, verdict: MatchVerdict) -> Option<Match> {
-        Some(Match {
-            query,
-            reference: 0,
-            distance: 0.3,
-            ratio: 0.8,
-            verdict,
-        })
+        Some(Match { query, reference: 0, distance: 0.3, ratio: 0.8, verdict })
     }
 
     #[test]
@@ -210,10 +188,7 @@ mod tests {
             decision(3, MatchVerdict::Candidate),
             None,
         ];
-        let mut progress = FeatureProgress {
-            query: Some(&query),
-            ..FeatureProgress::default()
-        };
+        let mut progress = FeatureProgress { query: Some(&query), ..FeatureProgress::default() };
         assert_eq!(progress.kinds(), [UNDECIDED; 5]);
         progress.decisions = Some(&decisions);
         assert_eq!(progress.kinds(), [0, 1, UNDECIDED, UNDECIDED, 0]);

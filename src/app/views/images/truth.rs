@@ -29,9 +29,7 @@ impl ImageLine {
         let (a, b) = (plane.x / query.fx, plane.y / query.fy);
         let normal = Vector3::new(a, b, plane.z - a * query.cx - b * query.cy);
         let length = a.hypot(b);
-        (length > 1e-12).then(|| Self {
-            normal: normal / length,
-        })
+        (length > 1e-12).then(|| Self { normal: normal / length })
     }
 
     /// How far a pixel is from the line \[px\].
@@ -134,14 +132,8 @@ mod tests {
     use nalgebra::{Translation3, UnitQuaternion};
     use proptest::prelude::*;
 
-    const CAMERA: Intrinsics = Intrinsics {
-        fx: 700.0,
-        fy: 710.0,
-        cx: 600.0,
-        cy: 180.0,
-        width: 1241,
-        height: 376,
-    };
+    const CAMERA: Intrinsics =
+        Intrinsics { fx: 700.0, fy: 710.0, cx: 600.0, cy: 180.0, width: 1241, height: 376 };
 
     #[test]
     fn a_sideways_camera_sees_the_row_and_one_that_turns_in_place_no_line() {
@@ -170,13 +162,7 @@ mod tests {
     #[test]
     fn a_match_is_judged_by_its_place_and_without_a_depth_by_its_line() {
         let judged = |place_px, line_px| {
-            let seen = TrueMatch {
-                line: None,
-                line_px,
-                place: None,
-                place_px,
-                within_px: 3.0,
-            };
+            let seen = TrueMatch { line: None, line_px, place: None, place_px, within_px: 3.0 };
             (seen.is_true(), seen.verdict())
         };
         let place = judged(Some(2.9), Some(0.1));

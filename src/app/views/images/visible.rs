@@ -61,11 +61,7 @@ impl VisibleFeatures {
                     all.push(VisibleFeature {
                         feature,
                         kind: layer,
-                        color: if is_false(feature) {
-                            theme::ESTIMATE
-                        } else {
-                            color(layer)
-                        },
+                        color: if is_false(feature) { theme::ESTIMATE } else { color(layer) },
                         ends,
                     });
                 }
@@ -79,25 +75,20 @@ impl VisibleFeatures {
     pub(super) fn nearest(&self, pointer: Pos2) -> Option<usize> {
         let to_keypoint = |shown: &VisibleFeature| {
             let ends = shown.ends.into_iter().flatten();
-            ends.map(|end| end.distance(pointer))
-                .fold(f32::INFINITY, f32::min)
+            ends.map(|end| end.distance(pointer)).fold(f32::INFINITY, f32::min)
         };
         let to_line = |shown: &VisibleFeature| {
             let line = shown.line();
-            line.map_or(f32::INFINITY, |[from, to]| {
-                distance_to_segment(pointer, from, to)
-            })
+            line.map_or(f32::INFINITY, |[from, to]| distance_to_segment(pointer, from, to))
         };
-        self.nearest_by(to_keypoint)
-            .or_else(|| self.nearest_by(to_line))
+        self.nearest_by(to_keypoint).or_else(|| self.nearest_by(to_line))
     }
 
     fn nearest_by(&self, distance: impl Fn(&VisibleFeature) -> f32) -> Option<usize> {
         // Of equally near ones the foremost, which is the visible one.
         let all = self.all.iter().rev();
-        let nearest = all
-            .map(|shown| (distance(shown), shown.feature))
-            .min_by(|a, b| a.0.total_cmp(&b.0))?;
+        let nearest =
+            all.map(|shown| (distance(shown), shown.feature)).min_by(|a, b| a.0.total_cmp(&b.0))?;
         (nearest.0 <= REACH).then_some(nearest.1)
     }
 
@@ -178,12 +169,7 @@ mod tests {
     use egui::pos2;
 
     fn shown(feature: usize, query: Option<Pos2>, reference: Option<Pos2>) -> VisibleFeature {
-        VisibleFeature {
-            feature,
-            kind: INLIER,
-            color: color(INLIER),
-            ends: [query, reference],
-        }
+        VisibleFeature { feature, kind: INLIER, color: color(INLIER), ends: [query, reference] }
     }
 
     #[test]

@@ -67,11 +67,7 @@ impl Trials {
         }
         if let Some(last) = &all.last {
             let x = last.index as f64;
-            let curves = [
-                &mut all.likelihood.best,
-                &mut all.inliers.best,
-                &mut all.needed_steps,
-            ];
+            let curves = [&mut all.likelihood.best, &mut all.inliers.best, &mut all.needed_steps];
             for curve in curves {
                 if let Some(&[_, value]) = curve.last() {
                     curve.push([x, value]);
@@ -109,9 +105,7 @@ impl Trials {
         points: &[[f64; 2]],
         distance: impl Fn([f64; 2]) -> f32,
     ) -> Option<usize> {
-        let nearest = points
-            .iter()
-            .min_by(|a, b| distance(**a).total_cmp(&distance(**b)))?;
+        let nearest = points.iter().min_by(|a, b| distance(**a).total_cmp(&distance(**b)))?;
         self.records.get(nearest[0] as usize).copied()
     }
 }
@@ -132,10 +126,7 @@ fn thinned(points: &[[f64; 2]]) -> Vec<[f64; 2]> {
     let length = points.len().div_ceil(STRETCHES);
     let ends = points.chunks(length).flat_map(|stretch| {
         let by_value = |a: &&[f64; 2], b: &&[f64; 2]| a[1].total_cmp(&b[1]);
-        let ends = [
-            stretch.iter().min_by(by_value),
-            stretch.iter().max_by(by_value),
-        ];
+        let ends = [stretch.iter().min_by(by_value), stretch.iter().max_by(by_value)];
         let mut ends: Vec<[f64; 2]> = ends.into_iter().flatten().copied().collect();
         ends.sort_by(|a, b| a[0].total_cmp(&b[0]));
         ends.dedup();

@@ -54,21 +54,12 @@ fn sample(ui: &mut Ui, context: &ViewContext<'_>, span: &Span, end: usize, trial
     let Some(lifted) = context.run.latest_in::<DepthsLifted>(span, end - 1) else {
         return;
     };
-    let correspondences: Vec<&LiftedMatch> = lifted
-        .matches
-        .iter()
-        .filter(|lifted| lifted.point.is_some())
-        .collect();
+    let correspondences: Vec<&LiftedMatch> =
+        lifted.matches.iter().filter(|lifted| lifted.point.is_some()).collect();
     let features = SampleKeypoints::of(context, span, end);
     Grid::new("sample").striped(true).show(ui, |ui| {
-        let columns = [
-            "sample",
-            "query [px]",
-            "reference [px]",
-            "depth [m]",
-            "here [px]",
-            "best [px]",
-        ];
+        let columns =
+            ["sample", "query [px]", "reference [px]", "depth [m]", "here [px]", "best [px]"];
         for column in columns {
             ui.label(RichText::new(column).weak().small());
         }
@@ -78,11 +69,7 @@ fn sample(ui: &mut Ui, context: &ViewContext<'_>, span: &Span, end: usize, trial
                 continue;
             };
             let help = "Select this feature";
-            if ui
-                .link(format!("match {index}"))
-                .on_hover_text(help)
-                .clicked()
-            {
+            if ui.link(format!("match {index}")).on_hover_text(help).clicked() {
                 context.send(Command::SelectFeature(Some(lifted.query)));
             }
             row(ui, context, &features, lifted, trial);
@@ -109,10 +96,7 @@ impl<'a> SampleKeypoints<'a> {
             });
             detected.next()
         };
-        Self {
-            query: of(Side::Query),
-            reference: of(Side::Reference),
-        }
+        Self { query: of(Side::Query), reference: of(Side::Reference) }
     }
 
     fn pixel(detected: Option<&FeaturesDetected>, index: usize) -> Option<Point2<f64>> {
@@ -133,10 +117,7 @@ fn row(
         pixel.map_or("–".to_owned(), |p| format!("({:.0}, {:.0})", p.x, p.y))
     };
     ui.label(pixel(seen));
-    ui.label(pixel(SampleKeypoints::pixel(
-        features.reference,
-        lifted.reference,
-    )));
+    ui.label(pixel(SampleKeypoints::pixel(features.reference, lifted.reference)));
     let Some(point) = lifted.point else { return };
     ui.label(format!("{:.1}", point.z));
     for hypothesis in [&trial.hypothesis, &trial.best] {
@@ -179,18 +160,9 @@ fn refinement(ui: &mut Ui, refined: &PoseRefined, best: Option<&Trial>) {
 }
 
 fn acceptance(ui: &mut Ui, context: &ViewContext<'_>, span: &Span, judged: &ConsensusJudged) {
-    let verdict = if judged.accepted {
-        "Accepted"
-    } else {
-        "Refused"
-    };
+    let verdict = if judged.accepted { "Accepted" } else { "Refused" };
     ui.label(RichText::new(verdict).strong());
-    let ConsensusJudged {
-        acceptance,
-        counted,
-        distance_m,
-        ..
-    } = judged;
+    let ConsensusJudged { acceptance, counted, distance_m, .. } = judged;
     let params = &context.run.params.fb;
     let compared = |is_met| if is_met { "≥" } else { "<" };
     let inliers = acceptance.inliers;

@@ -95,10 +95,8 @@ impl SceneCamera {
 
     /// The corners of its image, from the upper left one clockwise.
     pub(super) fn corners(&self) -> [Point3<f64>; 4] {
-        let (right, below) = (
-            f64::from(self.intrinsics.width) - 0.5,
-            f64::from(self.intrinsics.height) - 0.5,
-        );
+        let (right, below) =
+            (f64::from(self.intrinsics.width) - 0.5, f64::from(self.intrinsics.height) - 0.5);
         [(-0.5, -0.5), (right, -0.5), (right, below), (-0.5, below)].map(|(x, y)| {
             let seen = self.intrinsics.unproject(&Point2::new(x, y), self.depth_m);
             self.scene_from_camera * seen
@@ -169,27 +167,18 @@ pub(super) fn cameras(
             thing,
         }
     };
-    let mut all = vec![camera(
-        CameraKind::Reference,
-        problem.reference.world_from_camera,
-    )];
+    let mut all = vec![camera(CameraKind::Reference, problem.reference.world_from_camera)];
     all.extend(truth.map(|pose| camera(CameraKind::Truth, *pose)));
     for &method in &context.setup.task.protocol.methods {
         if let Some(pose) = estimate(context, method) {
             all.push(camera(CameraKind::Estimate(method), pose));
         }
     }
-    all.extend(
-        best_so_far(context, features, search).map(|(method, reference_from_query)| {
-            let pose = problem.world_from_query(&reference_from_query);
-            camera(CameraKind::BestSoFar(method), pose)
-        }),
-    );
-    all.extend(
-        context
-            .hovered()
-            .map(|pose| camera(CameraKind::Pointer, pose)),
-    );
+    all.extend(best_so_far(context, features, search).map(|(method, reference_from_query)| {
+        let pose = problem.world_from_query(&reference_from_query);
+        camera(CameraKind::BestSoFar(method), pose)
+    }));
+    all.extend(context.hovered().map(|pose| camera(CameraKind::Pointer, pose)));
     all.extend(context.camera().map(|pose| camera(CameraKind::Hand, pose)));
     all
 }
@@ -197,9 +186,7 @@ pub(super) fn cameras(
 /// The estimate of a method; of the one at the cursor only at its end.
 fn estimate(context: &ViewContext<'_>, method: Method) -> Option<Pose> {
     let (span, cursor) = context.part_of(method)?;
-    (cursor + 1 >= span.records.end)
-        .then(|| context.estimate(method))
-        .flatten()
+    (cursor + 1 >= span.records.end).then(|| context.estimate(method)).flatten()
 }
 
 /// The best pose so far of the estimator at the cursor, in the reference camera's frame, until its end.

@@ -25,10 +25,9 @@ impl PreparedCloud {
         params: &RenderParams,
     ) -> Self {
         let spots = colored(reference, params).into_iter();
-        let points = Points::new(spots.map(|(point, color)| Spot {
-            at: geometry.spot(&point.cast()),
-            color,
-        }));
+        let points = Points::new(
+            spots.map(|(point, color)| Spot { at: geometry.spot(&point.cast()), color }),
+        );
         Self {
             reference: Arc::clone(reference),
             geometry: *geometry,
@@ -53,12 +52,7 @@ impl PreparedCloud {
 /// All points of the scan: those that the photo shows in its colours, the others grey.
 fn colored(reference: &ReferenceTuple, params: &RenderParams) -> Vec<(Point3<f32>, Color32)> {
     const UNSEEN: Color32 = Color32::from_gray(105);
-    let ReferenceTuple {
-        cloud,
-        photo,
-        intrinsics,
-        ..
-    } = reference;
+    let ReferenceTuple { cloud, photo, intrinsics, .. } = reference;
     let visible = render::color_cloud(cloud, &photo.gray, intrinsics, params);
     // The visible points are in the order of the scan.
     let mut visible = visible.points.iter().peekable();
@@ -78,9 +72,7 @@ fn photo_color(reference: &ReferenceTuple, point: &Point3<f32>) -> Option<Color3
     let photo = reference.photo.color.as_ref()?;
     let pixel = reference.intrinsics.project(&point.cast())?;
     let nearest = |value: f64| value.round().max(0.0) as u32;
-    let [r, g, b] = photo
-        .get_pixel_checked(nearest(pixel.x), nearest(pixel.y))?
-        .0;
+    let [r, g, b] = photo.get_pixel_checked(nearest(pixel.x), nearest(pixel.y))?.0;
     Some(Color32::from_rgb(r, g, b))
 }
 
@@ -94,14 +86,7 @@ mod tests {
 
     #[test]
     fn a_point_has_the_colour_of_the_photo_there_and_is_grey_where_the_photo_does_not_show_it() {
-        let camera = Intrinsics {
-            fx: 2.0,
-            fy: 2.0,
-            cx: 3.5,
-            cy: 3.5,
-            width: 8,
-            height: 8,
-        };
+        let camera = Intrinsics { fx: 2.0, fy: 2.0, cx: 3.5, cy: 3.5, width: 8, height: 8 };
         let photo = image::RgbImage::from_fn(8, 8, |x, _| {
             image::Rgb(if x < 4 { [200, 10, 10] } else { [10, 10, 200] })
         });

@@ -36,10 +36,7 @@ impl Painter {
         let pipelines = shared
             .entry::<Arc<Result<Pipelines, String>>>()
             .or_insert_with(|| Arc::new(Pipelines::new(&state.device, state.target_format)));
-        Self {
-            pipelines: Arc::clone(pipelines),
-            picture: Arc::default(),
-        }
+        Self { pipelines: Arc::clone(pipelines), picture: Arc::default() }
     }
 
     /// Why nothing can be drawn, if so.
@@ -130,12 +127,7 @@ fn guarded<T>(device: &wgpu::Device, run: impl FnOnce() -> T) -> Result<T, Strin
 
 /// An error of wgpu in one line: what caused it, without the headings.
 fn one_line(text: &str) -> String {
-    let causes = text
-        .split_once("Caused by:")
-        .map_or(text, |(_, causes)| causes);
-    let lines = causes
-        .lines()
-        .map(str::trim)
-        .filter(|line| !line.is_empty());
+    let causes = text.split_once("Caused by:").map_or(text, |(_, causes)| causes);
+    let lines = causes.lines().map(str::trim).filter(|line| !line.is_empty());
     lines.collect::<Vec<_>>().join(": ")
 }

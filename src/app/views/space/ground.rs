@@ -32,18 +32,13 @@ pub(super) fn cells(search: &Search<'_>) -> Vec<Cell> {
     let is_coarse = |searched: &&Searched| searched.phase() == Phase::PositionCoarse;
     // A new round covers the one before.
     let first = positions.iter().rposition(is_coarse).unwrap_or(0);
-    positions[first..]
-        .iter()
-        .flat_map(|searched| cells_of(&searched.surface))
-        .collect()
+    positions[first..].iter().flat_map(|searched| cells_of(&searched.surface)).collect()
 }
 
 fn cells_of(surface: &ScoredLattice) -> impl Iterator<Item = Cell> {
     let lattice = &surface.lattice;
     let is_fine = lattice.phase == Phase::PositionFine;
-    let scored = lattice
-        .hypotheses()
-        .filter(|(cell, _)| surface.scores[*cell].is_some());
+    let scored = lattice.hypotheses().filter(|(cell, _)| surface.scores[*cell].is_some());
     scored.map(move |(cell, offset)| Cell {
         offset,
         step_m: lattice.step,
@@ -73,10 +68,7 @@ pub(super) fn faces(geometry: &SceneGeometry, cells: &[Cell], scale: &Scale) -> 
             spot(&geometry.on_ground(x, z, cell.above_m))
         });
         let order = [0, 1, 2, 0, 2, 3];
-        faces.extend(order.map(|corner| Spot {
-            at: corners[corner],
-            color,
-        }));
+        faces.extend(order.map(|corner| Spot { at: corners[corner], color }));
     }
     faces
 }
@@ -140,11 +132,7 @@ pub(super) fn path(geometry: &SceneGeometry, offsets: &[Offset], color: Color32)
         |offset: &Offset| spot(&geometry.on_ground(offset.right_m, offset.forward_m, PATH_ABOVE_M));
     offsets
         .windows(2)
-        .map(|pair| Line {
-            ends: [place(&pair[0]), place(&pair[1])],
-            color,
-            width: 2.0,
-        })
+        .map(|pair| Line { ends: [place(&pair[0]), place(&pair[1])], color, width: 2.0 })
         .collect()
 }
 
@@ -164,15 +152,7 @@ mod tests {
     }
 
     fn cell(right_m: f64, step_m: f64, cost: Option<f64>) -> Cell {
-        Cell {
-            offset: Offset {
-                right_m,
-                ..Offset::default()
-            },
-            step_m,
-            cost,
-            above_m: 0.0,
-        }
+        Cell { offset: Offset { right_m, ..Offset::default() }, step_m, cost, above_m: 0.0 }
     }
 
     #[test]
@@ -195,10 +175,7 @@ mod tests {
     fn the_grid_tells_its_metres() {
         let (lines, marks) = grid(&geometry(), Color32::GRAY, Color32::WHITE);
         let texts: Vec<_> = marks.iter().map(|mark| mark.text.as_str()).collect();
-        assert!(
-            texts.contains(&"1 m") && texts.contains(&"5 m ahead"),
-            "{texts:?}"
-        );
+        assert!(texts.contains(&"1 m") && texts.contains(&"5 m ahead"), "{texts:?}");
         let farthest = lines.iter().flat_map(|line| line.ends).map(|[x, ..]| x);
         assert!((farthest.fold(0.0, f32::max) - 5.0).abs() < 1e-6);
     }

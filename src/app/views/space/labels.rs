@@ -26,9 +26,8 @@ pub(super) fn cameras(
     };
     let painter = ui.painter_at(pane);
     let shown = cameras.iter();
-    let mut shown: Vec<(Pos2, &SceneCamera)> = shown
-        .filter_map(|camera| Some((seen(camera)?, camera)))
-        .collect();
+    let mut shown: Vec<(Pos2, &SceneCamera)> =
+        shown.filter_map(|camera| Some((seen(camera)?, camera))).collect();
     // The truth last, so that nothing hides it.
     shown.sort_by_key(|(_, camera)| camera.kind == CameraKind::Truth);
     for (at, camera) in &shown {
@@ -115,32 +114,16 @@ pub(super) fn legend(ui: &mut Ui, pane: Rect, cost: Option<(&str, [String; 2])>,
         ui.add(egui::Label::new(text).selectable(false));
     };
     if rays.inliers + rays.outliers > 0 {
-        line(
-            &mut ui,
-            format!("- - {} outliers", rays.outliers),
-            outlier_color(),
-        );
-        line(
-            &mut ui,
-            format!("–– {} inliers", rays.inliers),
-            inlier_color(),
-        );
+        line(&mut ui, format!("- - {} outliers", rays.outliers), outlier_color());
+        line(&mut ui, format!("–– {} inliers", rays.inliers), inlier_color());
     }
     if rays.undecided > 0 {
-        line(
-            &mut ui,
-            format!("–– {} lifted matches", rays.undecided),
-            theme::CAMERA,
-        );
+        line(&mut ui, format!("–– {} lifted matches", rays.undecided), theme::CAMERA);
     }
     if let Some((method, ends)) = cost {
         cost_bar(&mut ui, BAR, "cost", &ends);
         let text = ui.visuals().text_color();
-        line(
-            &mut ui,
-            format!("cost of {method} (grey: below the coverage floor)"),
-            text,
-        );
+        line(&mut ui, format!("cost of {method} (grey: below the coverage floor)"), text);
     }
     if ui.min_rect().height() > 1.0 {
         let fill = ui.visuals().extreme_bg_color.gamma_multiply(0.75);

@@ -34,21 +34,12 @@ pub(super) struct Orbit {
 impl Orbit {
     /// From behind and above: all within a radius around a place on the ground.
     pub(super) fn overview(ground: Point3<f64>, radius_m: f64) -> Self {
-        Self {
-            target: ground,
-            heading: 0.35,
-            descent: 0.6,
-            distance: 2.4 * radius_m,
-        }
+        Self { target: ground, heading: 0.35, descent: 0.6, distance: 2.4 * radius_m }
     }
 
     /// The same from straight above, ahead of the first reference upwards.
     pub(super) fn from_above(ground: Point3<f64>, radius_m: f64) -> Self {
-        Self {
-            heading: 0.0,
-            descent: FRAC_PI_2,
-            ..Self::overview(ground, radius_m)
-        }
+        Self { heading: 0.0, descent: FRAC_PI_2, ..Self::overview(ground, radius_m) }
     }
 
     /// The eye of a camera, as far as an orbit can be: without its roll.
@@ -116,12 +107,7 @@ mod tests {
     const SIZE: Vec2 = Vec2::new(640.0, 480.0);
 
     fn orbit() -> impl Strategy<Value = Orbit> {
-        let numbers = (
-            prop::array::uniform3(-30.0..30.0),
-            -3.0..3.0,
-            -1.5..1.5,
-            1.0..80.0,
-        );
+        let numbers = (prop::array::uniform3(-30.0..30.0), -3.0..3.0, -1.5..1.5, 1.0..80.0);
         numbers.prop_map(|(target, heading, descent, distance)| Orbit {
             target: target.into(),
             heading,
@@ -182,11 +168,7 @@ mod tests {
     #[test]
     fn from_above_ahead_is_up_and_right_is_right() {
         let view_camera = Orbit::from_above(Point3::new(0.0, 1.6, 0.0), 10.0).view_camera(SIZE);
-        let at = |x, z| {
-            view_camera
-                .project(&Point3::new(x, 1.6, z))
-                .expect("in front")
-        };
+        let at = |x, z| view_camera.project(&Point3::new(x, 1.6, z)).expect("in front");
         assert!(at(0.0, 5.0).y < at(0.0, 0.0).y);
         assert!(at(5.0, 0.0).x > at(0.0, 0.0).x);
     }

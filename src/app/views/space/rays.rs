@@ -42,9 +42,7 @@ impl<'a> LiftedFeatures<'a> {
     /// What the estimator at a cursor reported up to there.
     fn until(run: &'a Run, cursor: usize) -> Self {
         let mut features = Self::default();
-        let start = run
-            .span_at(cursor)
-            .map_or(cursor, |span| span.records.start);
+        let start = run.span_at(cursor).map_or(cursor, |span| span.records.start);
         let records = run.records().get(start..=cursor).unwrap_or_default();
         for record in records {
             match &record.event {
@@ -105,11 +103,7 @@ pub(super) fn rays(
         };
         let along = |share: f64| geometry.spot(&(centre + share * (point - centre)));
         let mut piece = |from: f64, to: f64| {
-            rays.lines.push(Line {
-                ends: [along(from), along(to)],
-                color,
-                width,
-            });
+            rays.lines.push(Line { ends: [along(from), along(to)], color, width });
         };
         if is_outlier {
             const DASHES: u32 = 12;

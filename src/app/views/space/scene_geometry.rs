@@ -74,11 +74,9 @@ impl SceneGeometry {
         let (middle, radius_m) = match farthest(&usual) * MARGIN {
             near if near <= self.radius_m => (usual, self.radius_m),
             _ => {
-                let corners = places
-                    .iter()
-                    .fold((places[0], places[0]), |(low, high), place| {
-                        (low.inf(place), high.sup(place))
-                    });
+                let corners = places.iter().fold((places[0], places[0]), |(low, high), place| {
+                    (low.inf(place), high.sup(place))
+                });
                 let middle = nalgebra::center(&corners.0, &corners.1);
                 (middle, self.radius_m.max(MARGIN * farthest(&middle)))
             }
@@ -108,10 +106,7 @@ impl SceneGeometry {
         let wanted = self.radius_m / 6.0;
         let tens = 10_f64.powf(wanted.max(1e-3).log10().floor());
         let steps = [1.0, 2.0, 5.0, 10.0].map(|step| step * tens);
-        steps
-            .into_iter()
-            .find(|step| *step >= wanted)
-            .unwrap_or(10.0 * tens)
+        steps.into_iter().find(|step| *step >= wanted).unwrap_or(10.0 * tens)
     }
 }
 

@@ -135,14 +135,8 @@ mod tests {
     use nalgebra::Vector4;
     use proptest::prelude::*;
 
-    const KITTI: Intrinsics = Intrinsics {
-        fx: 718.856,
-        fy: 690.0,
-        cx: 607.1928,
-        cy: 185.2157,
-        width: 1241,
-        height: 376,
-    };
+    const KITTI: Intrinsics =
+        Intrinsics { fx: 718.856, fy: 690.0, cx: 607.1928, cy: 185.2157, width: 1241, height: 376 };
 
     fn pose(shift: [f64; 3], turn: [f64; 3]) -> Pose {
         Pose::new(shift.into(), turn.into())
@@ -153,10 +147,7 @@ mod tests {
         let matrix = nalgebra::Matrix4::from(view_camera.clip_from_scene());
         let clip = matrix * Vector4::from(point.to_homogeneous().cast::<f32>());
         let [x, y] = [clip.x / clip.w, clip.y / clip.w];
-        let at = pos2(
-            0.5 * (x + 1.0) * view_camera.size.x,
-            0.5 * (1.0 - y) * view_camera.size.y,
-        );
+        let at = pos2(0.5 * (x + 1.0) * view_camera.size.x, 0.5 * (1.0 - y) * view_camera.size.y);
         (at, clip.z / clip.w)
     }
 

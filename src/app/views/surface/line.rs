@@ -141,9 +141,7 @@ impl Profile {
         let stretches = self.costs.split(|(_, cost)| cost.is_none());
         let known = stretches.map(|stretch| {
             let points = stretch.iter();
-            points
-                .filter_map(|(way, cost)| Some([*way, (*cost)?]))
-                .collect()
+            points.filter_map(|(way, cost)| Some([*way, (*cost)?])).collect()
         });
         known.filter(|stretch: &Vec<_>| !stretch.is_empty())
     }
@@ -157,11 +155,7 @@ fn draw(
 ) -> Option<Pose> {
     let unit = profile.unit;
     let label = |position: &HoverPosition<'_>| match position {
-        HoverPosition::NearDataPoint {
-            plot_name,
-            position,
-            ..
-        } => {
+        HoverPosition::NearDataPoint { plot_name, position, .. } => {
             let cost = number(position.y);
             Some(format!("{plot_name} {cost} at {:.2} {unit}", position.x))
         }
@@ -206,9 +200,7 @@ fn draw(
         return None;
     }
     let PlotPoint { x: way, .. } = answer.transform.value_from_position(at);
-    let pose = profile
-        .line
-        .pose(way / profile.length.max(f64::MIN_POSITIVE));
+    let pose = profile.line.pose(way / profile.length.max(f64::MIN_POSITIVE));
     if answer.response.clicked() {
         context.send(Command::TakeCamera(Some(pose)));
     }
@@ -225,10 +217,7 @@ mod tests {
     fn profile(costs: &[f64]) -> Profile {
         let last = (costs.len() - 1) as f64;
         let scores = costs.iter().enumerate().map(|(at, &cost)| {
-            let score = Score {
-                cost: Some(cost),
-                covered: 100,
-            };
+            let score = Score { cost: Some(cost), covered: 100 };
             (at as f64 / last, Some(score))
         });
         let along = CostAlong {
@@ -248,15 +237,9 @@ mod tests {
         assert!(wall.contains("it is 0.4000 higher"), "{wall}");
         assert!(wall.contains("did not cross"), "{wall}");
         let slope = profile(&[0.5, 0.4, 0.3]).words();
-        assert!(
-            slope.contains("falls from the result to the truth"),
-            "{slope}"
-        );
+        assert!(slope.contains("falls from the result to the truth"), "{slope}");
         let preferred = profile(&[0.3, 0.4, 0.5]).words();
-        assert!(
-            preferred.contains("the cost prefers the result"),
-            "{preferred}"
-        );
+        assert!(preferred.contains("the cost prefers the result"), "{preferred}");
         // An incomplete curve says nothing of what is between.
         let mut early = profile(&[0.5, 0.4, 0.3]);
         early.is_complete = false;

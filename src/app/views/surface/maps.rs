@@ -52,9 +52,7 @@ impl MapContent<'_> {
             Some(dense) => vec![dense.cheapest().as_ref()],
             None => {
                 let positions = self.search.positions();
-                positions
-                    .map(|searched| searched.surface.as_ref())
-                    .collect()
+                positions.map(|searched| searched.surface.as_ref()).collect()
             }
         }
     }
@@ -78,18 +76,13 @@ impl MapContent<'_> {
 
 impl CostMap {
     fn name(&self) -> &'static str {
-        if self.shows_coverage {
-            "Coverage map"
-        } else {
-            "Cost map"
-        }
+        if self.shows_coverage { "Coverage map" } else { "Cost map" }
     }
 
     /// Switches between costs and coverages.
     pub(super) fn switch(&mut self, ui: &mut Ui) {
         let help = "Colour by coverage instead of cost";
-        ui.toggle_value(&mut self.shows_coverage, "Coverage")
-            .on_hover_text(help);
+        ui.toggle_value(&mut self.shows_coverage, "Coverage").on_hover_text(help);
     }
 
     /// Draws the map. Returns the pose under the pointer with its cost in words.
@@ -147,8 +140,7 @@ impl CostMap {
             let help =
                 "These cells cover less than this share of the reference view and are not eligible";
             let floor = 100.0 * context.run.params.grid.coverage_floor;
-            ui.weak(format!("coverage below {floor:.0} %"))
-                .on_hover_text(help);
+            ui.weak(format!("coverage below {floor:.0} %")).on_hover_text(help);
         });
     }
 
@@ -195,9 +187,8 @@ impl CostMap {
 /// One pixel per cell, the row farthest ahead first; cells that are not tried are transparent.
 fn picture(layer: &ScoredLattice, color: impl Fn(&Score) -> Color32) -> ColorImage {
     let Lattice { columns, rows, .. } = layer.lattice;
-    let cells = (0..rows)
-        .rev()
-        .flat_map(|row| (0..columns).map(move |column| row * columns + column));
+    let cells =
+        (0..rows).rev().flat_map(|row| (0..columns).map(move |column| row * columns + column));
     let pixels = cells.map(|cell| {
         let score = layer.scores[cell].as_ref();
         score.map_or(Color32::TRANSPARENT, &color)
@@ -263,19 +254,13 @@ fn plot(
 }
 
 fn small(ui: &Ui, text: &str) -> egui::RichText {
-    egui::RichText::new(text)
-        .font(theme::small())
-        .color(ui.visuals().weak_text_color())
+    egui::RichText::new(text).font(theme::small()).color(ui.visuals().weak_text_color())
 }
 
 /// How many positions of a lattice are scored, in words.
 pub(super) fn progress(searched: &Searched) -> String {
     let all = searched.surface.lattice.hypotheses().count();
-    format!(
-        "{}, {} of {all} tried",
-        searched.phase().name(),
-        searched.tried
-    )
+    format!("{}, {} of {all} tried", searched.phase().name(), searched.tried)
 }
 
 /// All lattices with a margin.
@@ -300,11 +285,7 @@ fn cell_at(shown: &MapContent<'_>, transform: &PlotTransform, at: Pos2) -> Optio
         // Where a fine lattice is not tried yet, the coarse one below it is visible.
         let is_seen = index == 0 || layer.scores[cell].is_some();
         let offset = shown.offset(layer, cell).filter(|_| is_seen)?;
-        Some(Cell {
-            offset,
-            step: layer.lattice.step,
-            score: layer.scores[cell],
-        })
+        Some(Cell { offset, step: layer.lattice.step, score: layer.scores[cell] })
     })
 }
 
@@ -317,10 +298,8 @@ fn readout(shown: &MapContent<'_>, cell: &Cell) -> String {
     let Some(score) = cell.score else {
         return format!("not tried yet at {at}");
     };
-    let cost = score.cost.map_or_else(
-        || "no cost".to_owned(),
-        |cost| format!("cost {}", number(cost)),
-    );
+    let cost =
+        score.cost.map_or_else(|| "no cost".to_owned(), |cost| format!("cost {}", number(cost)));
     let coverage = shown.search.coverage(score.covered);
     let is_below = score.covered < shown.search.least_covered;
     let note = if is_below { ", below the floor" } else { "" };
@@ -329,18 +308,13 @@ fn readout(shown: &MapContent<'_>, cell: &Cell) -> String {
 
 /// Outlines and marks on top of a map.
 fn overlay(ui: &Ui, shown: &MapContent<'_>, transform: &PlotTransform, pointed_at: Option<Cell>) {
-    let painter = ui
-        .painter()
-        .with_clip_rect(transform.frame().intersect(ui.clip_rect()));
+    let painter = ui.painter().with_clip_rect(transform.frame().intersect(ui.clip_rect()));
     let screen = |offset: &Offset| {
         transform.position_from_point(&PlotPoint::new(offset.right_m, offset.forward_m))
     };
     let outline = |offset: &Offset, columns: f64, rows: f64, color: Color32, width: f32| {
         let [width_px, height_px] = [transform.dpos_dvalue_x(), transform.dpos_dvalue_y()];
-        let size = egui::vec2(
-            (columns * width_px).abs() as f32,
-            (rows * height_px).abs() as f32,
-        );
+        let size = egui::vec2((columns * width_px).abs() as f32, (rows * height_px).abs() as f32);
         let rect = Rect::from_center_size(screen(offset), size);
         let stroke = Stroke::new(width, color);
         painter.rect_stroke(rect, 0.0, stroke, egui::StrokeKind::Outside);

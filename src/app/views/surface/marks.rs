@@ -47,12 +47,7 @@ impl MapMark {
         let mut add = |kind, pose: Pose, name: &str, note: String| {
             let offset = search.offset(&pose);
             let words = format!("{name} {}{note}", place(&offset));
-            marks.push(Self {
-                kind,
-                offset,
-                pose,
-                words,
-            });
+            marks.push(Self { kind, offset, pose, words });
         };
         let noted = |cost: Option<f64>| cost.map_or(String::new(), |c| format!(", {}", number(c)));
         // The cost of the cell that a pose lies in, where none is known at the pose itself.
@@ -101,10 +96,7 @@ impl MapMark {
 
     /// Paints the mark with its heading.
     pub(super) fn paint(&self, painter: &Painter, at: Pos2, radius: f32) {
-        if !matches!(
-            self.kind,
-            MarkKind::Thing(Thing::Reference) | MarkKind::Minimum(_)
-        ) {
+        if !matches!(self.kind, MarkKind::Thing(Thing::Reference) | MarkKind::Minimum(_)) {
             let (sin, cos) = (self.offset.yaw_rad as f32).sin_cos();
             let tip = at + 2.4 * radius * vec2(-sin, -cos);
             painter.line_segment([at, tip], Stroke::new(3.5, Color32::BLACK));
@@ -210,14 +202,11 @@ pub(super) fn legend(ui: &mut Ui, context: &ViewContext<'_>, marks: &[MapMark]) 
     for mark in marks {
         let words = egui::RichText::new(&mark.words).small();
         // Without a frame a button would have no room beside its words.
-        let button = egui::Button::new(words)
-            .fill(Color32::TRANSPARENT)
-            .stroke(Stroke::NONE)
-            .wrap();
+        let button =
+            egui::Button::new(words).fill(Color32::TRANSPARENT).stroke(Stroke::NONE).wrap();
         let response = ui.add(button);
         let left = response.rect.left_center();
-        mark.kind
-            .paint(ui.painter(), left + vec2(1.5 * RADIUS, 0.0), RADIUS);
+        mark.kind.paint(ui.painter(), left + vec2(1.5 * RADIUS, 0.0), RADIUS);
         if response.hovered() {
             pointed_at = Some(mark.pose);
         }
@@ -234,25 +223,15 @@ mod tests {
 
     #[test]
     fn a_heading_says_to_which_side() {
-        let turned = |degrees: f64| {
-            heading(&Offset {
-                yaw_rad: degrees.to_radians(),
-                ..Offset::default()
-            })
-        };
+        let turned =
+            |degrees: f64| heading(&Offset { yaw_rad: degrees.to_radians(), ..Offset::default() });
         let words = [3.5, -0.25, 0.0].map(turned);
         assert_eq!(words, ["3.5° left", "0.25° right", "straight ahead"]);
     }
 
     #[test]
     fn a_place_has_as_many_decimals_as_it_needs_and_no_negative_zero() {
-        let at = |right_m, forward_m| {
-            place(&Offset {
-                right_m,
-                forward_m,
-                yaw_rad: 0.0,
-            })
-        };
+        let at = |right_m, forward_m| place(&Offset { right_m, forward_m, yaw_rad: 0.0 });
         assert_eq!(at(1.0, 2.0), "(1.0, 2.0) m");
         assert_eq!(at(-1e-12, -0.2), "(0.0, -0.2) m");
         assert_eq!(at(0.25, 3.0), "(0.25, 3.00) m");

@@ -25,10 +25,7 @@ pub(in crate::app::views) struct Scale {
 }
 
 impl Scale {
-    const EMPTY: Self = Self {
-        costs: None,
-        coverage: 1.0,
-    };
+    const EMPTY: Self = Self { costs: None, coverage: 1.0 };
 
     /// The scale of every position that the method scored, after the cursor too: a step must not
     /// change what a colour means.
@@ -96,11 +93,7 @@ impl Scale {
 
 /// 1 for the lowest cost, 0 for the highest; what differs by rounding alone has one colour.
 fn merit(least: f64, greatest: f64, cost: f64) -> f64 {
-    if greatest - least > LEAST_DIFFERENCE {
-        (greatest - cost) / (greatest - least)
-    } else {
-        1.0
-    }
+    if greatest - least > LEAST_DIFFERENCE { (greatest - cost) / (greatest - least) } else { 1.0 }
 }
 
 /// A cost with four decimals where it is small, fewer where it is large.
@@ -118,25 +111,16 @@ mod tests {
 
     #[test]
     fn the_least_cost_is_the_brightest_and_a_flat_surface_all_bright() {
-        assert_eq!(
-            [2.0, 4.0, 6.0].map(|cost| merit(2.0, 6.0, cost)),
-            [1.0, 0.5, 0.0]
-        );
+        assert_eq!([2.0, 4.0, 6.0].map(|cost| merit(2.0, 6.0, cost)), [1.0, 0.5, 0.0]);
         assert_eq!(merit(3.0, 3.0, 3.0), 1.0);
         assert_eq!(merit(1.0, 1.0 + 4e-16, 1.0 + 4e-16), 1.0);
-        let scale = Scale {
-            costs: Some((2.0, 6.0)),
-            coverage: 1.0,
-        };
+        let scale = Scale { costs: Some((2.0, 6.0)), coverage: 1.0 };
         assert_eq!(scale.cost(2.0), theme::viridis(1.0));
         assert_eq!(scale.cost(f64::NAN), BELOW_FLOOR);
     }
 
     #[test]
     fn numbers_have_about_as_many_digits() {
-        assert_eq!(
-            [0.81234, 12.3456, 2301.25].map(number),
-            ["0.8123", "12.35", "2301.2"]
-        );
+        assert_eq!([0.81234, 12.3456, 2301.25].map(number), ["0.8123", "12.35", "2301.2"]);
     }
 }

@@ -108,25 +108,18 @@ impl<'a> Search<'a> {
             let coarse = Lattice::new(Phase::PositionCoarse, centre, radius_m, params);
             filling = coarse.ok().map(Filling::new);
         }
-        search
-            .lattices
-            .extend(filling.map(|filling| filling.done(least_covered)));
+        search.lattices.extend(filling.map(|filling| filling.done(least_covered)));
         Some(search)
     }
 
     /// The lattices of positions, in the order in which they are drawn.
     pub(in crate::app::views) fn positions(&self) -> impl DoubleEndedIterator<Item = &Searched> {
-        self.lattices
-            .iter()
-            .filter(|searched| !searched.phase().is_yaw())
+        self.lattices.iter().filter(|searched| !searched.phase().is_yaw())
     }
 
     /// The last lattice of a phase.
     pub(super) fn last(&self, phase: Phase) -> Option<&Searched> {
-        self.lattices
-            .iter()
-            .rev()
-            .find(|searched| searched.phase() == phase)
+        self.lattices.iter().rev().find(|searched| searched.phase() == phase)
     }
 
     /// Covered pixels as a share of those at the reference pose.
@@ -136,8 +129,7 @@ impl<'a> Search<'a> {
 
     /// The camera at an offset (`world_from_camera`).
     pub(super) fn pose(&self, offset: &Offset) -> Pose {
-        self.problem
-            .world_from_query(&offset.reference_from_camera())
+        self.problem.world_from_query(&offset.reference_from_camera())
     }
 
     /// The cost of the finest cell that an offset lies in; of a cell that was tried.
@@ -183,11 +175,7 @@ pub(super) struct Minimum {
 /// cursor may run the method inside itself.
 fn part<'a>(context: &ViewContext<'a>, method: Method) -> Option<(&'a Span, usize)> {
     let is_inside = context.is_inside_hybrid(method) && context.latest::<PoseScored>().is_some();
-    if is_inside {
-        Some((context.span()?, context.cursor))
-    } else {
-        context.part_of(method)
-    }
+    if is_inside { Some((context.span()?, context.cursor)) } else { context.part_of(method) }
 }
 
 /// A lattice whose scores come in one by one.

@@ -21,11 +21,8 @@ enum SliceAxis {
 
 impl SliceAxis {
     /// The axes with their names and units.
-    const ALL: [(Self, &'static str, &'static str); 3] = [
-        (Self::Right, "right", "m"),
-        (Self::Forward, "forward", "m"),
-        (Self::Yaw, "yaw", "°"),
-    ];
+    const ALL: [(Self, &'static str, &'static str); 3] =
+        [(Self::Right, "right", "m"), (Self::Forward, "forward", "m"), (Self::Yaw, "yaw", "°")];
 
     /// The coordinate along the axis, in its unit.
     fn of(self, offset: &Offset) -> f64 {
@@ -110,9 +107,7 @@ fn marks(ui: &Ui, context: &ViewContext<'_>, search: &Search<'_>) -> Vec<LineMar
         ("┊ camera in hand", theme::CAMERA, dotted, camera),
     ];
     let marks = marks.into_iter();
-    marks
-        .filter_map(|(name, color, style, offset)| Some((name, color, style, offset?)))
-        .collect()
+    marks.filter_map(|(name, color, style, offset)| Some((name, color, style, offset?))).collect()
 }
 
 fn slice(
@@ -152,9 +147,7 @@ fn slice(
             }
         });
     let name = format!("Cost along {name}");
-    answer
-        .response
-        .widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, &name));
+    answer.response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, &name));
 }
 
 #[cfg(test)]

@@ -19,15 +19,9 @@ pub(super) fn ui(ui: &mut Ui, method: Method, bounds: &CostBounds, present: Opti
         NamedCost::new("shuffled", "■", MarkShape::Square, bounds.shuffled, |ui| {
             ui.visuals().text_color()
         }),
-        NamedCost::new("best", "▲", MarkShape::Triangle, bounds.best, |_| {
-            theme::ESTIMATE
-        }),
-        NamedCost::new("truth", "◆", MarkShape::Diamond, bounds.truth, |_| {
-            theme::TRUTH
-        }),
-        NamedCost::new("present", "○", MarkShape::Ring, present, |_| {
-            theme::CAMERA
-        }),
+        NamedCost::new("best", "▲", MarkShape::Triangle, bounds.best, |_| theme::ESTIMATE),
+        NamedCost::new("truth", "◆", MarkShape::Diamond, bounds.truth, |_| theme::TRUTH),
+        NamedCost::new("present", "○", MarkShape::Ring, present, |_| theme::CAMERA),
     ];
     let name = method.name().to_uppercase();
     if let Some(range) = &range {
@@ -74,13 +68,7 @@ impl NamedCost {
         value: Option<f64>,
         color: fn(&Ui) -> Color32,
     ) -> Self {
-        Self {
-            name,
-            glyph,
-            mark,
-            value,
-            color,
-        }
+        Self { name, glyph, mark, value, color }
     }
 }
 
@@ -155,11 +143,7 @@ mod tests {
 
     #[test]
     fn the_bar_reaches_from_shuffled_pixels_to_the_least_known_cost() {
-        let mut bounds = CostBounds {
-            shuffled: Some(0.9),
-            best: Some(0.7),
-            truth: None,
-        };
+        let mut bounds = CostBounds { shuffled: Some(0.9), best: Some(0.7), truth: None };
         let range = BarRange::of(&bounds).expect("both are known");
         assert!((range.share(0.8) - 0.5).abs() < 1e-12);
         bounds.truth = Some(0.5);
@@ -170,11 +154,7 @@ mod tests {
 
     #[test]
     fn there_is_no_bar_where_nothing_lies_between_its_ends() {
-        let flat = CostBounds {
-            shuffled: Some(0.5),
-            best: Some(0.5),
-            truth: None,
-        };
+        let flat = CostBounds { shuffled: Some(0.5), best: Some(0.5), truth: None };
         assert_eq!(BarRange::of(&flat), None);
         assert_eq!(BarRange::of(&CostBounds::default()), None);
     }

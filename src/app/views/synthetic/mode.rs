@@ -33,14 +33,8 @@ pub(super) enum Mode {
 const LEGEND: f32 = 260.0;
 
 impl Mode {
-    pub(super) const ALL: [Self; 6] = [
-        Self::Query,
-        Self::View,
-        Self::Blend,
-        Self::Residual,
-        Self::Weights,
-        Self::Coverage,
-    ];
+    pub(super) const ALL: [Self; 6] =
+        [Self::Query, Self::View, Self::Blend, Self::Residual, Self::Weights, Self::Coverage];
 
     pub(super) fn name(self, method: Method) -> &'static str {
         match self {
@@ -90,9 +84,7 @@ impl Mode {
                     picture::over(&query.photo.gray, &made.view).into()
                 })
             }
-            Self::Blend => of("synthetic/view", &|made| {
-                picture::synthetic(&made.view).into()
-            }),
+            Self::Blend => of("synthetic/view", &|made| picture::synthetic(&made.view).into()),
             Self::Residual => of("synthetic/residual", &|made| {
                 let range = pictures::residual_range(&made.pairs);
                 pictures::residual_within(&made.view, &made.pairs, range).into()

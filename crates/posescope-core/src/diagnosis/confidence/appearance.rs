@@ -24,15 +24,9 @@ pub(super) struct Look {
 
 impl Look {
     /// For a method that takes a tenth of a second.
-    pub(super) const QUICK: Self = Self {
-        shrink: 4,
-        around: 48,
-    };
+    pub(super) const QUICK: Self = Self { shrink: 4, around: 48 };
     /// For one that takes its time: it doubts two right poses where a quick look doubts three.
-    pub(super) const THOROUGH: Self = Self {
-        shrink: 2,
-        around: 64,
-    };
+    pub(super) const THOROUGH: Self = Self { shrink: 2, around: 64 };
 }
 
 /// How far the poses around the reference go \[m\].
@@ -124,10 +118,8 @@ impl Appearance {
             return None;
         };
         let least_covered = (LEAST_COVERED * f64::from(start.covered)) as u32;
-        let mut around: Vec<f64> = around
-            .iter()
-            .filter_map(|score| score.eligible_cost(least_covered))
-            .collect();
+        let mut around: Vec<f64> =
+            around.iter().filter_map(|score| score.eligible_cost(least_covered)).collect();
         let least = around.iter().copied().reduce(f64::min)?;
         let (centre, deviation) = centre_and_deviation(&mut around)?;
         let cost = pose.cost?;
@@ -193,10 +185,7 @@ mod tests {
     use super::*;
 
     fn score(cost: f64, covered: u32) -> Score {
-        Score {
-            cost: Some(cost),
-            covered,
-        }
+        Score { cost: Some(cost), covered }
     }
 
     #[test]
@@ -220,32 +209,14 @@ mod tests {
 
     #[test]
     fn what_covers_too_little_has_no_say_and_without_costs_nothing_speaks_for_a_pose() {
-        let mut scores = vec![
-            score(0.8, 100),
-            score(0.97, 100),
-            score(0.9, 100),
-            score(0.9, 100),
-        ];
-        scores.extend([
-            score(0.1, 24),
-            score(0.95, 25),
-            score(0.97, 100),
-            score(0.99, 100),
-        ]);
+        let mut scores = vec![score(0.8, 100), score(0.97, 100), score(0.9, 100), score(0.9, 100)];
+        scores.extend([score(0.1, 24), score(0.95, 25), score(0.97, 100), score(0.99, 100)]);
         let seen = Appearance::among(&scores, 4).expect("costs");
         // The cheap one covers less than a quarter of what the reference pose covers.
         assert!(seen.margin > 0.0);
-        let nothing = Score {
-            cost: None,
-            covered: 0,
-        };
+        let nothing = Score { cost: None, covered: 0 };
         assert!(Appearance::among(&[nothing; 6], 4).is_none());
-        assert!(
-            Appearance::default()
-                .signals()
-                .iter()
-                .all(|s| s.is_finite())
-        );
+        assert!(Appearance::default().signals().iter().all(|s| s.is_finite()));
     }
 
     #[test]

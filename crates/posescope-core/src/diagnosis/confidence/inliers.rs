@@ -82,13 +82,10 @@ impl Inliers {
     /// How far the pose is from the reference is none of them: on the street right poses are near, by how its
     /// pairs are drawn, and on real drives they are not.
     pub(super) fn signals(&self, evidence: &Evidence) -> Signals {
-        let log10_nfa = evidence
-            .judged
-            .as_ref()
-            .map_or(0.0, |judged| judged.acceptance.log10_nfa);
-        let deviation_m = self.covariance.map_or(1e3, |c| {
-            (c[(3, 3)] + c[(4, 4)] + c[(5, 5)]).sqrt().clamp(1e-4, 1e3)
-        });
+        let log10_nfa = evidence.judged.as_ref().map_or(0.0, |judged| judged.acceptance.log10_nfa);
+        let deviation_m = self
+            .covariance
+            .map_or(1e3, |c| (c[(3, 3)] + c[(4, 4)] + c[(5, 5)]).sqrt().clamp(1e-4, 1e3));
         let mut values = vec![
             (self.count as f64).ln_1p(),
             self.count as f64 / self.correspondences.max(1) as f64,
@@ -98,22 +95,14 @@ impl Inliers {
             self.median_residual_px,
         ];
         values.extend(self.appearance.signals());
-        Signals {
-            names: NAMES,
-            values,
-        }
+        Signals { names: NAMES, values }
     }
 }
 
 fn root_mean_square_distance(inliers: &[Correspondence]) -> f64 {
     let count = inliers.len().max(1) as f64;
-    let sum = inliers
-        .iter()
-        .fold(nalgebra::Vector2::zeros(), |sum, c| sum + c.pixel.coords);
+    let sum = inliers.iter().fold(nalgebra::Vector2::zeros(), |sum, c| sum + c.pixel.coords);
     let centre = sum / count;
-    let squared: f64 = inliers
-        .iter()
-        .map(|c| (c.pixel.coords - centre).norm_squared())
-        .sum();
+    let squared: f64 = inliers.iter().map(|c| (c.pixel.coords - centre).norm_squared()).sum();
     (squared / count).sqrt()
 }

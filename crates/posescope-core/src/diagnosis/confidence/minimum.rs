@@ -60,15 +60,8 @@ impl Minimum {
     /// How far the pose is from the reference is none of them: on the street right ones are near, by how its
     /// pairs are drawn, and on real drives they are not.
     pub(super) fn signals(&self) -> Signals {
-        const NAMES: &[&str] = &[
-            "depth",
-            "refined_by",
-            "margin",
-            "above_start",
-            "gain",
-            "coverage",
-            "yaw_depth",
-        ];
+        const NAMES: &[&str] =
+            &["depth", "refined_by", "margin", "above_start", "gain", "coverage", "yaw_depth"];
         let margin = self.runner_up_margin.unwrap_or(self.coarse_depth);
         Signals {
             names: NAMES,
@@ -97,10 +90,6 @@ impl Minimum {
             let curvature = (before + after - 2.0 * cost(cell)?) / surface.lattice.step.powi(2);
             (curvature > 0.0).then(|| (2.0 * self.deviation / curvature).sqrt())
         };
-        Some([
-            along(position, 1)?,
-            along(position, position.lattice.columns)?,
-            along(yaw, 1)?,
-        ])
+        Some([along(position, 1)?, along(position, position.lattice.columns)?, along(yaw, 1)?])
     }
 }

@@ -67,10 +67,7 @@ impl Settled {
             gathered: same.count() as f64 / refined.len() as f64,
             features: evidence.candidates.as_ref().map(|candidates| {
                 let of_features = candidates.iter().filter(|one| one.from_features);
-                FeaturesSay::of(
-                    &answer,
-                    of_features.map(|one| (one.refined.pose, one.accepted)),
-                )
+                FeaturesSay::of(&answer, of_features.map(|one| (one.refined.pose, one.accepted)))
             }),
         })
     }
@@ -97,19 +94,13 @@ impl Settled {
         if let Some(features) = &self.features {
             values.extend([features.support, features.against]);
         }
-        Signals {
-            names: &NAMES[..values.len()],
-            values,
-        }
+        Signals { names: &NAMES[..values.len()], values }
     }
 }
 
 impl FeaturesSay {
     fn of(answer: &Pose, poses: impl Iterator<Item = (Pose, bool)>) -> Self {
-        let mut says = Self {
-            support: 0.0,
-            against: 0.0,
-        };
+        let mut says = Self { support: 0.0, against: 0.0 };
         for (pose, accepted) in poses {
             if is_same(answer, &pose) {
                 says.support = f64::max(says.support, if accepted { 1.0 } else { 0.5 });
@@ -134,9 +125,8 @@ mod tests {
     fn features_support_what_they_lead_to_and_speak_against_what_is_elsewhere() {
         let answer = Pose::identity();
         let says = |poses: &[(f64, bool)]| {
-            let poses = poses
-                .iter()
-                .map(|&(x, accepted)| (Pose::translation(x, 0.0, 0.0), accepted));
+            let poses =
+                poses.iter().map(|&(x, accepted)| (Pose::translation(x, 0.0, 0.0), accepted));
             let says = FeaturesSay::of(&answer, poses);
             (says.support, says.against)
         };

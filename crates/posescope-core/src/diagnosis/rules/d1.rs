@@ -172,10 +172,7 @@ mod tests {
     #[test]
     fn a_minimum_is_hardly_covered_beside_a_truth_that_tells_something() {
         assert!(is_hardly_covered(249, 500));
-        assert!(
-            !is_hardly_covered(250, 500),
-            "half of what the truth covers"
-        );
+        assert!(!is_hardly_covered(250, 500), "half of what the truth covers");
         assert!(!is_hardly_covered(10, 499), "too little at the truth");
         assert!(is_hardly_covered(4_999, 10_000));
     }

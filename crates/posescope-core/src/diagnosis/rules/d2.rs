@@ -164,11 +164,7 @@ impl fmt::Display for PreferredBySix {
 }
 
 pub(super) fn remedies(ask: &Ask<'_>) -> Vec<Remedy> {
-    let mut tried = vec![
-        vec![ask.floor(4.0, 0.2)],
-        vec![ask.wider_splat()],
-        vec![ask.radius(0.5)],
-    ];
+    let mut tried = vec![vec![ask.floor(4.0, 0.2)], vec![ask.wider_splat()], vec![ask.radius(0.5)]];
     tried.extend(ask.more_search().map(|more| vec![more]));
     tried
 }

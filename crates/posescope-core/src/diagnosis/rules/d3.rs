@@ -90,15 +90,9 @@ fn by_given(search: &Search<'_, '_>) -> Option<Diagnosis> {
     let cost_at_result = search.result_cost?;
     let cost_near_truth = match search.rivals() {
         Some(rivals) => rivals.is_missed.then_some(rivals.near.cost)?,
-        None => search
-            .cost_at_truth()
-            .filter(|cost| *cost < cost_at_result)?,
+        None => search.cost_at_truth().filter(|cost| *cost < cost_at_result)?,
     };
-    Some(RULE.found(&Told {
-        judge: search.judge?.name(),
-        cost_near_truth,
-        cost_at_result,
-    }))
+    Some(RULE.found(&Told { judge: search.judge?.name(), cost_near_truth, cost_at_result }))
 }
 
 #[derive(Serialize)]
@@ -175,10 +169,8 @@ fn lost_in(search: &Search<'_, '_>, near: &Place) -> Loss {
     };
     let target = near.offset;
     let away = |offset: &Offset| {
-        let (right, forward) = (
-            offset.right_m - target.right_m,
-            offset.forward_m - target.forward_m,
-        );
+        let (right, forward) =
+            (offset.right_m - target.right_m, offset.forward_m - target.forward_m);
         right.hypot(forward)
     };
     let fine_reach = search.grid.fine_range_m.hypot(search.grid.fine_range_m);
@@ -190,18 +182,12 @@ fn lost_in(search: &Search<'_, '_>, near: &Place) -> Loss {
         Some((_, chosen)) if away(&chosen) > tolerance_m => Some(Phase::PositionFine),
         _ => search.surface(Phase::YawCoarse).map(|_| Phase::YawCoarse),
     };
-    Loss {
-        phase,
-        ..Loss::default()
-    }
+    Loss { phase, ..Loss::default() }
 }
 
 /// The rank of the coarse cell nearest to the target, and what it costs more than the one chosen.
 fn lost_among_coarse(coarse: &ScoredLattice, away: &dyn Fn(&Offset) -> f64) -> Loss {
-    let lost = Loss {
-        phase: Some(coarse.lattice.phase),
-        ..Loss::default()
-    };
+    let lost = Loss { phase: Some(coarse.lattice.phase), ..Loss::default() };
     let nearest = coarse
         .lattice
         .hypotheses()
@@ -215,11 +201,7 @@ fn lost_among_coarse(coarse: &ScoredLattice, away: &dyn Fn(&Offset) -> f64) -> L
         .filter_map(|cell| coarse.eligible_cost(cell))
         .filter(|other| *other < cost)
         .count();
-    Loss {
-        rank: Some(lower + 1),
-        margin: Some(cost - least),
-        ..lost
-    }
+    Loss { rank: Some(lower + 1), margin: Some(cost - least), ..lost }
 }
 
 fn remedies(ask: &Ask<'_>) -> Vec<Remedy> {

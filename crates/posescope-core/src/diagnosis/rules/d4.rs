@@ -104,12 +104,10 @@ impl fmt::Display for Uncovered {
 }
 
 fn by_starts(starts: &Starts, radius_m: f64) -> Option<Diagnosis> {
-    starts.near.is_none().then(|| {
-        RULE.found(&Unreached {
-            distance_m: starts.distance_m,
-            radius_m,
-        })
-    })
+    starts
+        .near
+        .is_none()
+        .then(|| RULE.found(&Unreached { distance_m: starts.distance_m, radius_m }))
 }
 
 #[derive(Serialize)]
@@ -140,9 +138,7 @@ fn remedies(ask: &Ask<'_>) -> Vec<Remedy> {
     match ask.family {
         Family::Starts => {
             let mut tried = Vec::from(wider);
-            tried.push(vec![
-                ask.set("mi6.yaw_step", 2.0 * ask.params.mi6.yaw_step_deg),
-            ]);
+            tried.push(vec![ask.set("mi6.yaw_step", 2.0 * ask.params.mi6.yaw_step_deg)]);
             tried.push(vec![ask.floor(0.2, 0.0)]);
             tried
         }

@@ -34,11 +34,7 @@ pub(super) fn is_textureless(case: &Case<'_, '_>) -> bool {
 }
 
 fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
-    is_textureless(case).then(|| {
-        RULE.found(&Textureless {
-            deviation: case.contrast(),
-        })
-    })
+    is_textureless(case).then(|| RULE.found(&Textureless { deviation: case.contrast() }))
 }
 
 #[derive(Serialize)]

@@ -43,14 +43,8 @@ fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
         return None;
     }
     let best = search.best_in_six_freedoms(&rivals.near)?;
-    (best < rivals.winner.cost).then(|| {
-        found(
-            search,
-            frozen,
-            &rivals.near,
-            Some((best, rivals.winner.cost)),
-        )
-    })
+    (best < rivals.winner.cost)
+        .then(|| found(search, frozen, &rivals.near, Some((best, rivals.winner.cost))))
 }
 
 fn found(

@@ -42,10 +42,7 @@ fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
 fn on_rim(case: &Case<'_, '_>) -> Option<Diagnosis> {
     case.subject.outcome.cost?;
     let offset = case.subject.evidence.minimum?.offset;
-    let (grid, radius_m) = (
-        &case.subject.params.grid,
-        case.subject.problem.uncertainty_radius_m,
-    );
+    let (grid, radius_m) = (&case.subject.params.grid, case.subject.problem.uncertainty_radius_m);
     grid.is_on_rim(&offset, radius_m).then(|| {
         let distance_m = offset.right_m.hypot(offset.forward_m);
         RULE.found(&Rim {

@@ -47,18 +47,13 @@ fn dragging(case: &FusionCase<'_>, error: PoseError) -> Option<Diagnosis> {
     let is_right = |pose: &Pose| (case.tolerance).contains(&PoseError::between(case.truth, pose));
     let without = |left_out: usize| {
         let others = kept.iter().enumerate().filter(|(at, _)| *at != left_out);
-        let others: Vec<(f64, &Pose)> = others
-            .map(|(_, (member, pose))| (member.share.weight, *pose))
-            .collect();
+        let others: Vec<(f64, &Pose)> =
+            others.map(|(_, (member, pose))| (member.share.weight, *pose)).collect();
         average_pose(&others)
     };
     let culprits = kept.iter().enumerate().filter_map(|(at, (member, own))| {
         let rest = without(at).filter(is_right)?;
-        Some((
-            member,
-            PoseError::between(case.truth, own),
-            PoseError::between(case.truth, &rest),
-        ))
+        Some((member, PoseError::between(case.truth, own), PoseError::between(case.truth, &rest)))
     });
     let (member, own_error, error_without) =
         culprits.max_by(|a, b| a.1.translation_m.total_cmp(&b.1.translation_m))?;
@@ -125,11 +120,7 @@ impl fmt::Display for Resting {
             self.weight,
         )?;
         match &self.own_error {
-            Some(own) => write!(
-                f,
-                "Alone it puts the query {} off.",
-                metres(own.translation_m)
-            ),
+            Some(own) => write!(f, "Alone it puts the query {} off.", metres(own.translation_m)),
             None => f.write_str("Alone it has no pose."),
         }
     }

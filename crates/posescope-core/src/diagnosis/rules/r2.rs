@@ -51,8 +51,5 @@ impl fmt::Display for Keypoints {
 }
 
 fn remedies(ask: &Ask<'_>) -> Vec<Remedy> {
-    vec![
-        vec![ask.more_keypoints(0.2)],
-        vec![ask.more_keypoints(0.05)],
-    ]
+    vec![vec![ask.more_keypoints(0.2)], vec![ask.more_keypoints(0.05)]]
 }

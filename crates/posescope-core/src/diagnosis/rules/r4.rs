@@ -36,14 +36,8 @@ fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
     let misled =
         wrong >= FEW_MATCHES && wrong > right && !case.would_accept(matches, &matches.true_ones());
     let is_telling = matches.many_without_depth();
-    ((starved || misled) && is_telling && !case.consensus_is_right()).then(|| {
-        RULE.found(&Depths {
-            right,
-            wrong,
-            missing,
-            true_matches: matches.funnel,
-        })
-    })
+    ((starved || misled) && is_telling && !case.consensus_is_right())
+        .then(|| RULE.found(&Depths { right, wrong, missing, true_matches: matches.funnel }))
 }
 
 #[derive(Serialize)]
@@ -65,10 +59,9 @@ impl fmt::Display for Depths {
 }
 
 pub(super) fn remedies(ask: &Ask<'_>) -> Vec<Remedy> {
-    let mut tried = vec![vec![ask.set(
-        ask.key("fb.depth_radius", "fb2.depth_radius"),
-        2.0 * ask.depth_radius_px(),
-    )]];
+    let mut tried = vec![vec![
+        ask.set(ask.key("fb.depth_radius", "fb2.depth_radius"), 2.0 * ask.depth_radius_px()),
+    ]];
     tried.push(match ask.family {
         Family::Guided => vec![ask.set("fb2.depth_spread", 3.0 * ask.params.fb2.depth_spread)],
         _ => vec![ask.word("fb.depth", "guarded")],

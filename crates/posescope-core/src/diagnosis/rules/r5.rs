@@ -38,11 +38,7 @@ fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
     if deviation_m.is_some_and(|deviation| deviation < FIXED_M) {
         return None;
     }
-    Some(RULE.found(&Loose {
-        deviation_m,
-        inliers,
-        true_matches: matches.funnel,
-    }))
+    Some(RULE.found(&Loose { deviation_m, inliers, true_matches: matches.funnel }))
 }
 
 #[derive(Serialize)]

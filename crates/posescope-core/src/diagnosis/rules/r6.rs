@@ -34,11 +34,8 @@ fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
     }
     let subject = case.subject;
     let query_from_reference = subject.reference_from_truth()?.inverse();
-    let supporters: Vec<Correspondence> = matches
-        .true_ones()
-        .into_iter()
-        .map(|at| matches.correspondences[at])
-        .collect();
+    let supporters: Vec<Correspondence> =
+        matches.true_ones().into_iter().map(|at| matches.correspondences[at]).collect();
     let camera = &subject.problem.query.intrinsics;
     let params = case.matching().mlesac;
     let refined = refine(&supporters, camera, &query_from_reference, params.loss()).pose;
@@ -48,9 +45,7 @@ fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
         let seen = camera.project(&(refined * point));
         seen.is_some_and(|seen| (seen - pixel).norm() <= params.inlier_threshold_px)
     };
-    let explained: Vec<usize> = (0..matches.correspondences.len())
-        .filter(is_explained)
-        .collect();
+    let explained: Vec<usize> = (0..matches.correspondences.len()).filter(is_explained).collect();
     let (supports_truth, inliers) = (explained.len(), matches.inliers());
     let is_missed = subject.tolerance.contains(&error)
         && supports_truth > inliers
@@ -77,10 +72,7 @@ struct Missed {
 impl fmt::Display for Missed {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (inliers, near) = (self.inliers, self.supports_truth);
-        write!(
-            f,
-            "MLESAC missed the right pose: it ended with {inliers} inliers"
-        )?;
+        write!(f, "MLESAC missed the right pose: it ended with {inliers} inliers")?;
         if let Some(trials) = self.trials {
             write!(f, " after {trials} trials")?;
         }

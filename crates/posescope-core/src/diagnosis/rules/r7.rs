@@ -28,12 +28,10 @@ fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
     case.matches()?;
     let failure = case.subject.outcome.pose.as_ref().err()?;
     let error = case.consensus_error()?;
-    case.subject.tolerance.contains(&error).then(|| {
-        RULE.found(&Refused {
-            error,
-            because: failure.to_string(),
-        })
-    })
+    case.subject
+        .tolerance
+        .contains(&error)
+        .then(|| RULE.found(&Refused { error, because: failure.to_string() }))
 }
 
 #[derive(Serialize)]

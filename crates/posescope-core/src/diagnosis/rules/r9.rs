@@ -29,10 +29,8 @@ pub(super) const RULE: Rule = Rule {
 /// A pose was refused for its distance from the reference, or the right one would have been.
 fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
     case.matches()?;
-    if let Some(Failure::OutsideRadius {
-        distance_m,
-        radius_m,
-    }) = case.subject.outcome.pose.as_ref().err()
+    if let Some(Failure::OutsideRadius { distance_m, radius_m }) =
+        case.subject.outcome.pose.as_ref().err()
     {
         return Some(RULE.found(&Outside {
             distance_m: *distance_m,
@@ -43,13 +41,7 @@ fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
     let distance_m = (case.subject.reference_from_truth()?.translation.vector).norm();
     let radius_m = case.subject.problem.believed_within_m();
     let is_outside = distance_m > radius_m * (1.0 + case.matching().radius_slack);
-    is_outside.then(|| {
-        RULE.found(&Outside {
-            distance_m,
-            radius_m,
-            error: None,
-        })
-    })
+    is_outside.then(|| RULE.found(&Outside { distance_m, radius_m, error: None }))
 }
 
 /// The pose that was found, or without an error the truth.

@@ -78,12 +78,7 @@ impl fmt::Display for Ranked {
             )?,
         }
         match self.first_distance_m {
-            Some(m) => write!(
-                f,
-                " Ranked 1st is {}, {} from the query.",
-                self.first,
-                metres(m)
-            ),
+            Some(m) => write!(f, " Ranked 1st is {}, {} from the query.", self.first, metres(m)),
             None => write!(f, " Ranked 1st is {}.", self.first),
         }
     }

@@ -51,9 +51,7 @@ fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
         Family::Grid | Family::Given => {
             let search = case.search?;
             search.result_cost?;
-            poses(case)
-                .or_else(|| camera_by_cost(search))
-                .or_else(|| truth_by_cost(case, search))
+            poses(case).or_else(|| camera_by_cost(search)).or_else(|| truth_by_cost(case, search))
         }
         Family::Starts => poses(case),
     }
@@ -77,11 +75,7 @@ fn units(case: &Case<'_, '_>) -> Option<Diagnosis> {
     } else {
         return None;
     };
-    Some(RULE.found(&Units {
-        median_depth_m,
-        unit,
-        depth_in_unit_m: median_depth_m * times,
-    }))
+    Some(RULE.found(&Units { median_depth_m, unit, depth_in_unit_m: median_depth_m * times }))
 }
 
 #[derive(Serialize)]
@@ -120,16 +114,12 @@ fn poses(case: &Case<'_, '_>) -> Option<Diagnosis> {
     let found = subject.problem.reference_from_query(pose);
     let stated = subject.reference_from_truth()?;
     let inverted = reference * truth.inverse();
-    let in_metres = Pose::from_parts(
-        Translation3::from(stated.translation.vector / 1000.0),
-        stated.rotation,
-    );
+    let in_metres =
+        Pose::from_parts(Translation3::from(stated.translation.vector / 1000.0), stated.rotation);
     let radius_m = subject.problem.uncertainty_radius_m;
     let is_far = stated.translation.vector.norm() > 5.0 * radius_m;
-    let readings = [
-        ("camera_from_world (inverted)", inverted, true),
-        ("millimetres", in_metres, is_far),
-    ];
+    let readings =
+        [("camera_from_world (inverted)", inverted, true), ("millimetres", in_metres, is_far)];
     let agreeing = readings.into_iter().find(|(_, reading, is_possible)| {
         let error = PoseError::between(reading, &found);
         *is_possible && error.translation_m < AGREEING_M && error.rotation_deg < AGREEING_DEG
@@ -168,12 +158,7 @@ const FEW_MATCHES: usize = 8;
 fn cloud(matches: &TrueMatches) -> Option<Diagnosis> {
     let (right_depth, wrong_depth) = (matches.funnel.lifted, matches.wrong_depth);
     let is_foreign = wrong_depth >= 3 * FEW_MATCHES && wrong_depth > 4 * right_depth;
-    is_foreign.then(|| {
-        RULE.found(&Cloud {
-            wrong_depth,
-            right_depth,
-        })
-    })
+    is_foreign.then(|| RULE.found(&Cloud { wrong_depth, right_depth }))
 }
 
 #[derive(Serialize)]
@@ -323,22 +308,14 @@ fn truth_by_matches(case: &Case<'_, '_>, matches: &TrueMatches) -> Option<Diagno
     let error = case.subject.error().or_else(|| case.consensus_error())?;
     let judged = case.subject.evidence.judged.as_ref()?;
     let (inliers, total) = (matches.inliers(), matches.correspondences.len());
-    let is_fixed = || {
-        case.deviation_m(matches)
-            .is_some_and(|m| m < super::r5::FIXED_M)
-    };
+    let is_fixed = || case.deviation_m(matches).is_some_and(|m| m < super::r5::FIXED_M);
     let is_certain =
         judged.acceptance.log10_nfa <= NEARLY_CERTAIN && 3 * inliers >= total && is_fixed();
     let supports_truth = matches.funnel.lifted;
     // What the truth explains beyond chance is there: then both are, and the truth is not suspect.
     let is_supported = || case.would_accept(matches, &matches.true_ones());
     (is_certain && 5 * supports_truth < inliers && !is_supported()).then(|| {
-        RULE.found(&TruthByMatches {
-            inliers,
-            correspondences: total,
-            supports_truth,
-            error,
-        })
+        RULE.found(&TruthByMatches { inliers, correspondences: total, supports_truth, error })
     })
 }
 
@@ -385,9 +362,7 @@ fn camera_by_cost(search: &Search<'_, '_>) -> Option<Diagnosis> {
     let costs = |places: &[[f64; 3]]| -> Vec<Option<f64>> {
         let cameras: Vec<Intrinsics> = places.iter().map(camera).collect();
         let scores = search.scorer.score_seen_by(&cameras, &search.truth);
-        let costs = scores
-            .iter()
-            .map(|score| comparable_cost(score, &stated_score));
+        let costs = scores.iter().map(|score| comparable_cost(score, &stated_score));
         costs.collect()
     };
     let focal_lengths = TIMES.map(|times| [times.ln(), 0.0, 0.0]);
@@ -397,9 +372,7 @@ fn camera_by_cost(search: &Search<'_, '_>) -> Option<Diagnosis> {
         .filter_map(|(at, cost)| Some(Descended { at, cost: cost? }))
         .reduce(|best, next| if next.cost < best.cost { next } else { best })?;
     let chance = search.shuffled_cost?;
-    let rival = near
-        .map_or(f64::INFINITY, |near| near.cost)
-        .min(result_cost);
+    let rival = near.map_or(f64::INFINITY, |near| near.cost).min(result_cost);
     // Far behind is no reason to stop: only with its own centre does another camera catch up.
     if best.cost >= cost_at_truth {
         return None;
@@ -420,12 +393,7 @@ fn camera_by_cost(search: &Search<'_, '_>) -> Option<Diagnosis> {
     if otherwise.deviations() < BEYOND_CHANCE || otherwise.gain() < stated_gain + TELLING_GAIN {
         return None;
     }
-    Some(RULE.found(&CameraByCost {
-        cost_at_truth,
-        cost_otherwise: best.cost,
-        camera,
-        stated,
-    }))
+    Some(RULE.found(&CameraByCost { cost_at_truth, cost_otherwise: best.cost, camera, stated }))
 }
 
 /// What another camera costs; `None` for one that sees so little of the cloud that its cost is low by
@@ -497,10 +465,7 @@ mod tests {
 
     #[test]
     fn a_camera_that_sees_less_than_half_of_the_cloud_is_not_compared() {
-        let score = |covered| Score {
-            cost: Some(0.1),
-            covered,
-        };
+        let score = |covered| Score { cost: Some(0.1), covered };
         let stated = score(1000);
         assert_eq!(comparable_cost(&score(499), &stated), None);
         assert_eq!(comparable_cost(&score(500), &stated), Some(0.1));

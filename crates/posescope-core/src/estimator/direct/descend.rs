@@ -38,11 +38,8 @@ impl Direct {
         let scorer = self.scorer(problem, &cloud);
         trace.checkpoint()?;
         let initial = scorer.score(&[Pose::identity()])[0];
-        let mut standing = Standing {
-            reference_from_camera: Pose::identity(),
-            score: initial,
-            evaluations: 1,
-        };
+        let mut standing =
+            Standing { reference_from_camera: Pose::identity(), score: initial, evaluations: 1 };
         let rendered = |standing: &Standing, moment| ViewRendered {
             moment,
             evaluation: standing.evaluations.saturating_sub(1),
@@ -59,10 +56,7 @@ impl Direct {
                 trace.checkpoint()?;
                 let start = standing.reference_from_camera.inverse();
                 let mut step = 0;
-                let told = |Step {
-                                camera_from_reference,
-                                cost: smooth_cost,
-                            }| {
+                let told = |Step { camera_from_reference, cost: smooth_cost }| {
                     let pose = camera_from_reference.inverse();
                     standing = Standing {
                         reference_from_camera: pose,
@@ -93,11 +87,7 @@ impl Direct {
             Ok::<_, Halt>(())
         })?;
         trace.stage(Stage::Assess, |trace| {
-            let Standing {
-                reference_from_camera: pose,
-                score,
-                evaluations,
-            } = standing;
+            let Standing { reference_from_camera: pose, score, evaluations } = standing;
             let least = least_covered(self.grid.coverage_floor, initial.covered);
             let Some(best) = score.eligible_cost(least) else {
                 let hypotheses = evaluations as usize;
@@ -108,10 +98,7 @@ impl Direct {
             let (distance_m, radius_m) =
                 (pose.translation.vector.norm(), problem.uncertainty_radius_m);
             if distance_m > radius_m {
-                return Err(Halt::from(Failure::OutsideRadius {
-                    distance_m,
-                    radius_m,
-                }));
+                return Err(Halt::from(Failure::OutsideRadius { distance_m, radius_m }));
             }
             let area = problem.query.intrinsics.area();
             let seed = problem.random_seed("shuffled pixels");
@@ -148,10 +135,7 @@ impl Direct {
         let lattice = Lattice::new(phase, start, problem.uncertainty_radius_m, &self.grid);
         let lattice = lattice.map_err(Failure::from)?;
         trace.stage(Stage::Search(phase), |trace| {
-            let memory = Memory {
-                direct: self,
-                problem,
-            };
+            let memory = Memory { direct: self, problem };
             let (cells, offsets): (Vec<usize>, Vec<Offset>) = lattice.hypotheses().unzip();
             let found = memory.scores(&lattice, || {
                 let mut found = Vec::new();
@@ -169,11 +153,7 @@ impl Direct {
             }
             let least_covered = least_covered(self.grid.coverage_floor, initial.covered);
             trace.emit(|| PhaseSearched {
-                surface: Arc::new(ScoredLattice {
-                    lattice,
-                    scores,
-                    least_covered,
-                }),
+                surface: Arc::new(ScoredLattice { lattice, scores, least_covered }),
                 // It leads nowhere: the descent begins at the reference.
                 best: None,
             })?;
@@ -207,12 +187,8 @@ impl Copies {
         most_points: usize,
     ) -> View<'_> {
         let stride = cloud.points.len().div_ceil(most_points).max(1);
-        let points: Vec<Point3<f32>> = cloud
-            .points
-            .iter()
-            .step_by(stride)
-            .map(|point| point.position)
-            .collect();
+        let points: Vec<Point3<f32>> =
+            cloud.points.iter().step_by(stride).map(|point| point.position).collect();
         View::new(
             (&self.query, &problem.query.intrinsics),
             (&self.reference, &problem.reference.intrinsics),

@@ -18,12 +18,7 @@ impl Windows {
     pub(super) fn new(keypoints: &[Keypoint], camera: &Intrinsics, side: f64) -> Self {
         let along = |length: u32| (f64::from(length) / side) as usize + 1;
         let (columns, rows) = (along(camera.width), along(camera.height));
-        let mut windows = Self {
-            side,
-            columns,
-            rows,
-            members: vec![Vec::new(); columns * rows],
-        };
+        let mut windows = Self { side, columns, rows, members: vec![Vec::new(); columns * rows] };
         for (number, keypoint) in keypoints.iter().enumerate() {
             let (column, row) = windows.square(&keypoint.pixel());
             windows.members[row * columns + column].push(number);

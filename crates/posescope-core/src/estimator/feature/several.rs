@@ -84,14 +84,9 @@ impl FeatureBased {
                     trials: 0,
                 })
             }
-            MlesacError::NoModel {
-                trials,
-                best_inliers,
-            } => Halt::Failed(Failure::NoConsensus {
-                correspondences,
-                best_inliers,
-                trials,
-            }),
+            MlesacError::NoModel { trials, best_inliers } => {
+                Halt::Failed(Failure::NoConsensus { correspondences, best_inliers, trials })
+            }
             MlesacError::Cancelled(Cancelled) => Halt::Cancelled,
         }
     }
@@ -109,11 +104,7 @@ impl FeatureBased {
         let threshold_px = self.params.mlesac.inlier_threshold_px;
         // The paper's rule counts whatever there is.
         let is_once = self.params.once && self.params.accept == AcceptanceRule::Consensus;
-        let reach_px = if is_once {
-            threshold_px
-        } else {
-            least_reach_px
-        };
+        let reach_px = if is_once { threshold_px } else { least_reach_px };
         let places = Places::of(correspondences.iter().map(|c| c.pixel), reach_px);
         let area_px = intrinsics.area();
         // False matches gather where the texture is, so chance has less room than the whole image.
@@ -121,11 +112,7 @@ impl FeatureBased {
         BeyondChance {
             acceptance,
             tested: places.count(),
-            counted: if reach_px >= 0.0 {
-                Counted::Places
-            } else {
-                Counted::Correspondences
-            },
+            counted: if reach_px >= 0.0 { Counted::Places } else { Counted::Correspondences },
         }
     }
 
@@ -162,14 +149,8 @@ mod tests {
 
     #[test]
     fn inliers_at_one_place_are_accepted_as_one() {
-        let intrinsics = Intrinsics {
-            fx: 700.0,
-            fy: 700.0,
-            cx: 600.0,
-            cy: 180.0,
-            width: 1200,
-            height: 360,
-        };
+        let intrinsics =
+            Intrinsics { fx: 700.0, fy: 700.0, cx: 600.0, cy: 180.0, width: 1200, height: 360 };
         let at = |x: f64, y: f64| Correspondence {
             pixel: Point2::new(x, y),
             point: Point3::new(0.0, 0.0, 10.0),

@@ -16,14 +16,7 @@ pub(in crate::estimator) struct FeatureStates {
 impl FeatureStates {
     /// At first no feature has a match at all.
     pub(in crate::estimator) fn new(keypoints: usize) -> Self {
-        Self {
-            states: vec![
-                FeatureState::RatioFailed {
-                    ratio: f32::INFINITY
-                };
-                keypoints
-            ],
-        }
+        Self { states: vec![FeatureState::RatioFailed { ratio: f32::INFINITY }; keypoints] }
     }
 
     /// Returns the unique matches as (query, reference) indices.
@@ -34,16 +27,12 @@ impl FeatureStates {
         let mut matches = Vec::new();
         for decision in decisions.iter().flatten() {
             self.states[decision.query] = match decision.verdict {
-                MatchVerdict::Ambiguous => FeatureState::RatioFailed {
-                    ratio: decision.ratio,
-                },
+                MatchVerdict::Ambiguous => FeatureState::RatioFailed { ratio: decision.ratio },
                 MatchVerdict::NotUnique { rival } => FeatureState::NotUnique { rival },
                 MatchVerdict::Candidate => {
                     matches.push((decision.query, decision.reference));
                     // Until a pose explains it, nothing does.
-                    FeatureState::Outlier {
-                        residual_px: f64::INFINITY,
-                    }
+                    FeatureState::Outlier { residual_px: f64::INFINITY }
                 }
             };
         }
@@ -59,9 +48,8 @@ impl FeatureStates {
 
     pub(in crate::estimator) fn after_depth_lift(&mut self, lifted: &[LiftedMatch]) {
         for lifted in lifted.iter().filter(|lifted| lifted.point.is_none()) {
-            self.states[lifted.query] = FeatureState::NoDepth {
-                distance_px: lifted.lidar_distance_px,
-            };
+            self.states[lifted.query] =
+                FeatureState::NoDepth { distance_px: lifted.lidar_distance_px };
         }
     }
 
@@ -74,9 +62,8 @@ impl FeatureStates {
             self.states[query] = FeatureState::Outlier { residual_px };
         }
         for &inlier in &consensus.inliers {
-            self.states[members[inlier]] = FeatureState::Inlier {
-                residual_px: consensus.residuals_px[inlier],
-            };
+            self.states[members[inlier]] =
+                FeatureState::Inlier { residual_px: consensus.residuals_px[inlier] };
         }
     }
 

@@ -39,10 +39,7 @@ impl JointEstimator for JointDirect {
     ) -> Result<JointOutcome, Cancelled> {
         let found = self.search(references, trace);
         Ok(match separate_failure(found)? {
-            Ok((pose, supports)) => JointOutcome {
-                pose: Ok(pose),
-                supports,
-            },
+            Ok((pose, supports)) => JointOutcome { pose: Ok(pose), supports },
             Err(failure) => JointOutcome::failed(failure, references.len()),
         })
     }
@@ -69,9 +66,7 @@ struct Member<'a> {
 impl JointDirect {
     /// The estimator of a registered cost.
     pub fn new(entry: &cost::Entry, params: &Params) -> Self {
-        Self {
-            direct: Direct::new(entry, params),
-        }
+        Self { direct: Direct::new(entry, params) }
     }
 
     fn search(
@@ -193,10 +188,8 @@ impl Joint<'_> {
                 break;
             }
             *count += some.len();
-            let poses: Vec<Pose> = some
-                .iter()
-                .map(|(_, offset)| offset.reference_from_camera())
-                .collect();
+            let poses: Vec<Pose> =
+                some.iter().map(|(_, offset)| offset.reference_from_camera()).collect();
             let mut own = Vec::new();
             for member in &self.members {
                 trace.checkpoint()?;
@@ -208,11 +201,7 @@ impl Joint<'_> {
             }
         }
         drop(hypotheses);
-        Ok(ScoredLattice {
-            lattice,
-            scores,
-            least_covered: 0,
-        })
+        Ok(ScoredLattice { lattice, scores, least_covered: 0 })
     }
 
     /// The cheapest pose within the disc that steps which shrink lead to from any of these,
@@ -257,9 +246,6 @@ impl Joint<'_> {
         let covered: u32 = counted.iter().map(|(_, covered)| covered).sum();
         let mean = |(cost, own): &(f64, u32)| cost * (f64::from(*own) / f64::from(covered));
         let is_heard = !counted.is_empty() && 2 * counted.len() >= self.members.len();
-        Score {
-            cost: is_heard.then(|| counted.iter().map(mean).sum()),
-            covered,
-        }
+        Score { cost: is_heard.then(|| counted.iter().map(mean).sum()), covered }
     }
 }

@@ -31,10 +31,7 @@ impl JointEstimator for JointFeatures {
     ) -> Result<JointOutcome, Cancelled> {
         let agreed = trace.stage(Stage::Consensus, |trace| self.agree(references, trace));
         Ok(match separate_failure(agreed)? {
-            Ok((pose, supports)) => JointOutcome {
-                pose: Ok(pose),
-                supports,
-            },
+            Ok((pose, supports)) => JointOutcome { pose: Ok(pose), supports },
             Err(failure) => JointOutcome::failed(failure, references.len()),
         })
     }
@@ -50,9 +47,7 @@ struct Pool {
 impl JointFeatures {
     /// The estimator with these parameters.
     pub fn new(params: &Params) -> Self {
-        Self {
-            features: FeatureBased::new(params),
-        }
+        Self { features: FeatureBased::new(params) }
     }
 
     fn agree(
@@ -61,10 +56,7 @@ impl JointFeatures {
         trace: &mut Trace<'_>,
     ) -> Result<(Pose, Vec<Option<Support>>), Halt> {
         let lead = references[lead(references)].problem;
-        let mut pool = Pool {
-            correspondences: Vec::new(),
-            of: Vec::new(),
-        };
+        let mut pool = Pool { correspondences: Vec::new(), of: Vec::new() };
         let (mut unique, mut keypoints) = (0, 0);
         for (index, reference) in references.iter().enumerate() {
             trace.checkpoint()?;
@@ -72,11 +64,7 @@ impl JointFeatures {
             let Ok(gathered) = self.features.gather(reference.problem) else {
                 continue;
             };
-            let Gathered {
-                correspondences,
-                unique: own,
-                query_keypoints,
-            } = gathered;
+            let Gathered { correspondences, unique: own, query_keypoints } = gathered;
             unique += own;
             keypoints = query_keypoints;
             let lead_from_reference = between(lead, reference.problem);
@@ -141,10 +129,7 @@ impl Pool {
         for &inlier in &consensus.inliers {
             counts[self.of[inlier]].0 += 1;
         }
-        let support = |(inliers, correspondences)| Support::Inliers {
-            inliers,
-            correspondences,
-        };
+        let support = |(inliers, correspondences)| Support::Inliers { inliers, correspondences };
         counts.into_iter().map(support).map(Some).collect()
     }
 }

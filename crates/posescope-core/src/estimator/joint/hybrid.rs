@@ -19,11 +19,7 @@ impl JointHybrid {
         first: Box<dyn JointEstimator>,
         second: Box<dyn JointEstimator>,
     ) -> Self {
-        Self {
-            parts,
-            first,
-            second,
-        }
+        Self { parts, first, second }
     }
 }
 
@@ -42,10 +38,7 @@ impl JointEstimator for JointHybrid {
             })?;
             return Ok(outcome);
         };
-        trace.emit(|| BranchTaken {
-            method: second,
-            why: failure.to_string(),
-        })?;
+        trace.emit(|| BranchTaken { method: second, why: failure.to_string() })?;
         self.second.estimate(references, trace)
     }
 }

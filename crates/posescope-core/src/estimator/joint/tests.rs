@@ -12,14 +12,8 @@ use crate::method::Method;
 use crate::problem::{Query, ReferenceTuple};
 use nalgebra::{Point2, Point3, Vector3};
 
-const CAMERA: Intrinsics = Intrinsics {
-    fx: 180.0,
-    fy: 180.0,
-    cx: 119.5,
-    cy: 49.5,
-    width: 240,
-    height: 100,
-};
+const CAMERA: Intrinsics =
+    Intrinsics { fx: 180.0, fy: 180.0, cx: 119.5, cy: 49.5, width: 240, height: 100 };
 
 /// Brightness of a tile of a wall.
 fn tile(right: f64, down: f64, texture: u32) -> f64 {
@@ -134,10 +128,8 @@ fn of_one_reference_a_joint_pose_is_its_own() {
 
 #[test]
 fn references_that_agree_share_the_pose_and_one_of_another_place_is_left_out() {
-    let mut references: Vec<_> = places()
-        .into_iter()
-        .map(|pose| reference(pose, TEXTURE, 0.0..WIDTH))
-        .collect();
+    let mut references: Vec<_> =
+        places().into_iter().map(|pose| reference(pose, TEXTURE, 0.0..WIDTH)).collect();
     references.push(reference(Pose::translation(0.2, 0.0, 0.6), 77, 0.0..WIDTH));
     let problems = problems(references);
     for method in ["fb", "mi", "hy"] {
@@ -150,12 +142,7 @@ fn references_that_agree_share_the_pose_and_one_of_another_place_is_left_out() {
         for share in &shares[..3] {
             assert_eq!(share.outcome, ShareOutcome::Kept, "{method} {share:?}");
         }
-        assert_ne!(
-            shares[3].outcome,
-            ShareOutcome::Kept,
-            "{method} {:?}",
-            shares[3]
-        );
+        assert_ne!(shares[3].outcome, ShareOutcome::Kept, "{method} {:?}", shares[3]);
     }
 }
 
@@ -184,10 +171,7 @@ fn a_heading_beyond_the_grid_of_one_reference_is_started_from_where_another_foun
     let problems = problems_at(&place, vec![headed(0.0, 0.0), headed(0.3, 0.5)]);
     let (pose, _) = jointly(Method::MI, &problems, &[90, 20]);
     let error = PoseError::between(&place, &pose.expect("both see it"));
-    assert!(
-        error.translation_m < 0.2 && error.rotation_deg < 1.0,
-        "{error}"
-    );
+    assert!(error.translation_m < 0.2 && error.rotation_deg < 1.0, "{error}");
 }
 
 #[test]
@@ -200,40 +184,26 @@ fn what_each_reference_sees_too_little_of_is_enough_together() {
     let params = Params::default();
     let alone = problems
         .iter()
-        .filter(|problem| {
-            crate::localize::localize(problem, Method::FB, &params)
-                .pose
-                .is_ok()
-        })
+        .filter(|problem| crate::localize::localize(problem, Method::FB, &params).pose.is_ok())
         .count();
     let (pose, shares) = jointly(Method::FB, &problems, &[9; 8]);
     let pose = pose.expect("together they are enough");
     assert!(off_m(&pose) < 0.2, "{}", off_m(&pose));
     let supporting = shares.iter().filter(|share| share.weight > 0.0).count();
-    assert!(
-        supporting > alone,
-        "{supporting} of 8, {alone} of them alone"
-    );
+    assert!(supporting > alone, "{supporting} of 8, {alone} of them alone");
 }
 
 #[test]
 fn the_same_reference_many_times_is_no_more_evidence_than_once() {
     let other = reference(places()[0], 77, 0.0..WIDTH);
     let copy = |name: &str| {
-        Arc::new(ReferenceTuple {
-            name: name.to_owned(),
-            ..ReferenceTuple::clone(&other)
-        })
+        Arc::new(ReferenceTuple { name: name.to_owned(), ..ReferenceTuple::clone(&other) })
     };
     let problems = problems(["a", "b", "c", "d", "e"].map(copy).into());
     let (pose, shares) = jointly(Method::FB, &problems, &[9; 5]);
     assert_eq!(pose.map_err(|failure| Code::of(&failure)), Err(Code::R3));
     assert!(shares.iter().all(|share| share.weight == 0.0));
-    assert!(
-        shares
-            .iter()
-            .all(|share| share.outcome == ShareOutcome::Failed)
-    );
+    assert!(shares.iter().all(|share| share.outcome == ShareOutcome::Failed));
 }
 
 #[test]
@@ -253,11 +223,7 @@ fn a_joint_pose_does_not_depend_on_the_number_of_threads() {
 #[test]
 fn a_method_that_takes_one_reference_at_a_time_says_so() {
     let problems = problems(vec![reference(places()[0], TEXTURE, 0.0..WIDTH)]);
-    let references = [JointReference {
-        problem: &problems[0],
-        matches: 9,
-        alone: None,
-    }];
+    let references = [JointReference { problem: &problems[0], matches: 9, alone: None }];
     let params = Params::default();
     let jointly: Vec<_> = methods()
         .filter(|method| entry(*method).make_joint(&params).is_some())

@@ -34,9 +34,7 @@ impl SixFreedoms {
             checkpoint()?;
             Ok(judge.costs(poses, least_covered))
         })?;
-        let inside = refined
-            .first()
-            .filter(|one| one.pose.translation.vector.norm() <= reach);
+        let inside = refined.first().filter(|one| one.pose.translation.vector.norm() <= reach);
         Ok(inside.copied())
     }
 

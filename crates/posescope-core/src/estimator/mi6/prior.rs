@@ -61,10 +61,7 @@ mod tests {
         let params = SixParams::default();
         let turned = |axis: Vector3<f64>, deg: f64| {
             let rotation = UnitQuaternion::from_scaled_axis(axis * deg.to_radians());
-            unlikeliness(
-                &params,
-                &Pose::from_parts(Vector3::zeros().into(), rotation),
-            )
+            unlikeliness(&params, &Pose::from_parts(Vector3::zeros().into(), rotation))
         };
         let is_one = |value: f64| (value - 1.0).abs() < 1e-9;
         assert!(is_one(turned(Vector3::y(), params.usual_yaw_deg)));
@@ -78,10 +75,7 @@ mod tests {
     #[test]
     fn of_refined_poses_the_likelier_comes_first_where_the_other_is_hardly_cheaper() {
         let six = SixFreedoms::new(&Params::default());
-        let spread = Spread {
-            median: 1.0,
-            deviation: 0.01,
-        };
+        let spread = Spread { median: 1.0, deviation: 0.01 };
         let lifted = Pose::translation(5.0, -six.params.usual_height_m, 0.0);
         let refined = |pose: Pose, cost: f64| Refined {
             start: Start { pose, cost },
@@ -90,10 +84,7 @@ mod tests {
             evaluations: 1,
         };
         let first = |cost_of_lifted: f64| {
-            let both = vec![
-                refined(lifted, cost_of_lifted),
-                refined(Pose::identity(), 0.9),
-            ];
+            let both = vec![refined(lifted, cost_of_lifted), refined(Pose::identity(), 0.9)];
             apart(both, 2, |pose, cost| six.price(&spread, pose, cost))[0].pose
         };
         assert_eq!(first(0.895), Pose::identity());
@@ -102,13 +93,7 @@ mod tests {
 
     #[test]
     fn nothing_is_unlikely_where_the_most_is_nothing() {
-        let params = SixParams {
-            unlikely: 0.0,
-            ..SixParams::default()
-        };
-        assert_eq!(
-            unlikeliness(&params, &Pose::translation(0.0, 5.0, 0.0)),
-            0.0
-        );
+        let params = SixParams { unlikely: 0.0, ..SixParams::default() };
+        assert_eq!(unlikeliness(&params, &Pose::translation(0.0, 5.0, 0.0)), 0.0);
     }
 }

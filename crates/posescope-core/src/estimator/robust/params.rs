@@ -19,10 +19,6 @@ parameters! {
 
 impl Default for RobustParams {
     fn default() -> Self {
-        Self {
-            deviations: 0.0,
-            credit: 3.0,
-            least_probability: 0.0,
-        }
+        Self { deviations: 0.0, credit: 3.0, least_probability: 0.0 }
     }
 }

@@ -44,19 +44,12 @@ pub(super) fn directions(image: &FloatImage, at: Point2<f32>, sigma: f32) -> Vec
     let most = smooth.iter().copied().fold(0.0, f32::max);
     let mut angles = Vec::new();
     for bin in 0..BINS {
-        let (before, here, behind) = (
-            smooth[(bin + BINS - 1) % BINS],
-            smooth[bin],
-            smooth[(bin + 1) % BINS],
-        );
+        let (before, here, behind) =
+            (smooth[(bin + BINS - 1) % BINS], smooth[bin], smooth[(bin + 1) % BINS]);
         if here > before && here >= behind && here >= 0.8 * most {
             let by = 0.5 * (before - behind) / (before - 2.0 * here + behind);
             let angle = (bin as f32 + by) / BINS as f32 * TAU;
-            angles.push(if angle > 0.5 * TAU {
-                angle - TAU
-            } else {
-                angle
-            });
+            angles.push(if angle > 0.5 * TAU { angle - TAU } else { angle });
         }
     }
     if angles.is_empty() {

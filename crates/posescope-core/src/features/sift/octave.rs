@@ -20,25 +20,21 @@ pub(super) fn blurred(image: &FloatImage, sigma: f32) -> FloatImage {
     let reach = (4.0 * sigma).ceil().max(1.0) as usize;
     let weight = |away: usize| (-((away * away) as f32) / (2.0 * sigma * sigma)).exp();
     let sum: f32 = weight(0) + 2.0 * (1..=reach).map(weight).sum::<f32>();
-    let kernel: Vec<f32> = (0..=2 * reach)
-        .map(|place| weight(place.abs_diff(reach)) / sum)
-        .collect();
+    let kernel: Vec<f32> =
+        (0..=2 * reach).map(|place| weight(place.abs_diff(reach)) / sum).collect();
     let (width, height) = (image.width() as usize, image.height() as usize);
     let values = image.as_raw();
     let mut along = vec![0.0; width * height];
-    along
-        .par_chunks_mut(width)
-        .zip(values.par_chunks(width))
-        .for_each(|(to, from)| {
-            let mut row = vec![from[0]; reach];
-            row.extend_from_slice(from);
-            row.extend(std::iter::repeat_n(from[width - 1], reach));
-            for (place, weight) in kernel.iter().enumerate() {
-                for (to, from) in to.iter_mut().zip(&row[place..]) {
-                    *to += weight * from;
-                }
+    along.par_chunks_mut(width).zip(values.par_chunks(width)).for_each(|(to, from)| {
+        let mut row = vec![from[0]; reach];
+        row.extend_from_slice(from);
+        row.extend(std::iter::repeat_n(from[width - 1], reach));
+        for (place, weight) in kernel.iter().enumerate() {
+            for (to, from) in to.iter_mut().zip(&row[place..]) {
+                *to += weight * from;
             }
-        });
+        }
+    });
     let mut down = vec![0.0; width * height];
     down.par_chunks_mut(width).enumerate().for_each(|(y, to)| {
         for (place, weight) in kernel.iter().enumerate() {
@@ -101,11 +97,7 @@ impl Octave {
             FloatImage::from_raw(pair[0].width(), pair[0].height(), values)
                 .expect("as many values as pixels")
         });
-        Ok(Self {
-            pixel,
-            differences: differences.collect(),
-            smoothed,
-        })
+        Ok(Self { pixel, differences: differences.collect(), smoothed })
     }
 
     fn at(&self, level: usize, x: u32, y: u32) -> f32 {
@@ -220,11 +212,7 @@ impl Octave {
         let level = (extremum.level.round() as usize).min(self.smoothed.len() - 1);
         let image = &self.smoothed[level];
         let at = Point2::new(extremum.x, extremum.y);
-        let angles = if params.upright {
-            vec![0.0]
-        } else {
-            directions(image, at, sigma)
-        };
+        let angles = if params.upright { vec![0.0] } else { directions(image, at, sigma) };
         // The first octave of an enlarged image has its pixels at even halves of the photo's.
         angles
             .into_iter()

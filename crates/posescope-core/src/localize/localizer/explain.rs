@@ -49,13 +49,7 @@ impl Localizer<'_> {
     ) -> Result<(), Cancelled> {
         let Answer { result, asked, .. } = answer;
         let candidates = result.diagnosis.first().map_or(Vec::new(), |primary| {
-            remedies(
-                primary.code,
-                result.method,
-                result.fell_back(),
-                self.params(),
-                asked.radius_m,
-            )
+            remedies(primary.code, result.method, result.fell_back(), self.params(), asked.radius_m)
         });
         let candidates: Vec<Changed> = candidates
             .iter()
@@ -67,10 +61,7 @@ impl Localizer<'_> {
             checkpoint(observer)?;
             explanation.runs += 1;
             if let Some(error) = changed.run(self, query) {
-                explanation.helped.push(Helped {
-                    args: changed.args.clone(),
-                    error,
-                });
+                explanation.helped.push(Helped { args: changed.args.clone(), error });
             }
         }
         explanation.complete = true;
@@ -81,10 +72,7 @@ impl Localizer<'_> {
         let mut changed = Changed {
             params: self.params().clone(),
             method: answer.result.method,
-            request: Request {
-                setting: None,
-                ..answer.asked.clone()
-            },
+            request: Request { setting: None, ..answer.asked.clone() },
             args: Vec::new(),
         };
         let mut option = |name: &str, value: String| {

@@ -27,15 +27,9 @@ impl Localizer<'_> {
                 continue;
             }
             checkpoint(observer)?;
-            let counted = work
-                .candidate(problem, Method::FB)
-                .and_then(|candidate| candidate.outcome.counts);
-            let Problem {
-                query,
-                reference,
-                matches,
-                ..
-            } = &work.problems[problem];
+            let counted =
+                work.candidate(problem, Method::FB).and_then(|candidate| candidate.outcome.counts);
+            let Problem { query, reference, matches, .. } = &work.problems[problem];
             work.matches[problem] = Some(match (counted, matches.as_deref()) {
                 (Some(counts), _) => counts.unique,
                 (None, Some(PairMatches::Found(found))) => found.count(),
@@ -100,10 +94,7 @@ impl Localizer<'_> {
         // Where one would start from with a single reference: the one with the most matches.
         let best = solved.iter().rev().max_by_key(|(_, matches, _)| *matches);
         let result = QueryResult {
-            references: solved
-                .iter()
-                .map(|(problem, ..)| problem.reference.name.clone())
-                .collect(),
+            references: solved.iter().map(|(problem, ..)| problem.reference.name.clone()).collect(),
             fusion: Some(fusion),
             initial_error: truth.zip(best).map(|(truth, (problem, ..))| {
                 PoseError::between(truth, &problem.reference.world_from_camera)
@@ -115,15 +106,9 @@ impl Localizer<'_> {
                 self.tolerance,
                 matches!(fusion.way, Way::Joint),
             ),
-            confidence: pose
-                .as_ref()
-                .ok()
-                .and_then(|pose| fused_confidence(pose, &fused_members)),
+            confidence: pose.as_ref().ok().and_then(|pose| fused_confidence(pose, &fused_members)),
             per_reference: Some(
-                solved
-                    .iter()
-                    .map(|(.., candidate)| candidate.result.nested())
-                    .collect(),
+                solved.iter().map(|(.., candidate)| candidate.result.nested()).collect(),
             ),
             ..QueryResult::new(
                 self.references.name(),

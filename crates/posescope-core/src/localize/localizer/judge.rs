@@ -35,19 +35,11 @@ impl Localizer<'_> {
         method: Method,
         estimated: Estimated,
     ) -> MethodOutcome {
-        let Estimated {
-            outcome: estimated,
-            evidence,
-            times,
-            verdicts,
-        } = estimated;
+        let Estimated { outcome: estimated, evidence, times, verdicts } = estimated;
         let solved = &work.problems[problem];
         let subject = Subject::new(solved, method, self.params, &estimated, &evidence);
         let outcome = confidence::accepted(&subject, self.least_probability);
-        let subject = Subject {
-            outcome: &outcome,
-            ..subject
-        };
+        let subject = Subject { outcome: &outcome, ..subject };
         let subject = subject.against(work.truth.as_ref(), self.tolerance);
         let assessment = match verdicts {
             Some(verdicts) => Assessment {
@@ -61,12 +53,6 @@ impl Localizer<'_> {
         if let Ok(pose) = &outcome.pose {
             result.agreement = work.agreement(problem, method, pose);
         }
-        MethodOutcome {
-            estimated,
-            outcome,
-            evidence,
-            result,
-            times,
-        }
+        MethodOutcome { estimated, outcome, evidence, result, times }
     }
 }

@@ -115,17 +115,10 @@ impl QueryWork<'_> {
 
     /// The request that gives the result of a problem by itself.
     pub(super) fn asked_alone(&self, problem: usize) -> Request {
-        let Place {
-            reference,
-            radius_m,
-            within_m,
-        } = self.places[problem];
+        let Place { reference, radius_m, within_m } = self.places[problem];
         Request {
             radius_m,
-            references: References {
-                within_m,
-                ..vec![reference].into()
-            },
+            references: References { within_m, ..vec![reference].into() },
             fusions: Vec::new(),
             setting: None,
         }

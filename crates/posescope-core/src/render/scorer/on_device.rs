@@ -26,11 +26,7 @@ pub(super) struct OnDevice {
 impl OnDevice {
     /// Nothing is there yet.
     pub fn new(device: Option<Arc<dyn Device>>) -> Self {
-        Self {
-            device,
-            loaded: OnceLock::new(),
-            is_used: AtomicBool::new(false),
-        }
+        Self { device, loaded: OnceLock::new(), is_used: AtomicBool::new(false) }
     }
 
     /// The same device, for another scorer.
@@ -89,9 +85,7 @@ impl Scorer<'_> {
             |pose: &Pose| Projection::new(&self.intrinsics, reach as i32, &pose.inverse()).rows();
         let projections: Vec<_> = reference_from_camera.iter().map(rows).collect();
         let tallies = loaded.tally(&projections)?;
-        let scored = tallies
-            .par_iter()
-            .map(|tally| Some(tally.as_ref()?.score(&tallying)));
+        let scored = tallies.par_iter().map(|tally| Some(tally.as_ref()?.score(&tallying)));
         let scored: Vec<Option<Score>> = scored.collect();
 
         let (places, again) = self.checked(reference_from_camera, &scored);
@@ -104,12 +98,7 @@ impl Scorer<'_> {
         self.on_device.is_used.store(true, Ordering::Relaxed);
         let mut scores: Vec<Score> = scored
             .into_iter()
-            .map(|score| {
-                score.unwrap_or(Score {
-                    cost: None,
-                    covered: 0,
-                })
-            })
+            .map(|score| score.unwrap_or(Score { cost: None, covered: 0 }))
             .collect();
         for (place, again) in places.into_iter().zip(again) {
             scores[place] = again;
@@ -128,10 +117,8 @@ impl Scorer<'_> {
             .filter_map(|place| cost(&place))
             .min_by(|a, b| a.0.total_cmp(&b.0))
             .map(|(_, place)| place);
-        let mut places: Vec<usize> = undecided
-            .chain((0..poses.len()).step_by(step))
-            .chain(least)
-            .collect();
+        let mut places: Vec<usize> =
+            undecided.chain((0..poses.len()).step_by(step)).chain(least).collect();
         places.sort_unstable();
         places.dedup();
         let again: Vec<Pose> = places.iter().map(|&place| poses[place]).collect();
@@ -247,10 +234,8 @@ mod tests {
         assert!(on_threads.iter().all(|score| score.cost.is_some()));
         for lies in [false, true] {
             let is_distrusted = Arc::new(AtomicBool::new(false));
-            let scorer = scorer(Some(Arc::new(Plain {
-                lies,
-                is_distrusted: Arc::clone(&is_distrusted),
-            })));
+            let scorer =
+                scorer(Some(Arc::new(Plain { lies, is_distrusted: Arc::clone(&is_distrusted) })));
             assert_eq!(scorer.score(&poses), on_threads);
             assert_eq!(is_distrusted.load(Ordering::Relaxed), lies);
             assert_eq!(scorer.is_from_device(), !lies);

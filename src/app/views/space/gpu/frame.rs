@@ -96,10 +96,7 @@ impl Frame {
         const POINT_M: f32 = 0.06;
         let focal_px = self.view_camera.focal[0] as f32 * scale;
         let mut bytes = Vec::new();
-        write_floats(
-            &mut bytes,
-            self.view_camera.clip_from_scene().as_flattened(),
-        );
+        write_floats(&mut bytes, self.view_camera.clip_from_scene().as_flattened());
         write_floats(&mut bytes, &size_px.map(|side| side as f32));
         write_floats(&mut bytes, &POINT.map(|side| side * scale));
         write_floats(&mut bytes, &[POINT_M * focal_px, scale, NEAR_M as f32, 0.0]);

@@ -39,10 +39,7 @@ impl Picture {
 
     /// Whether the picture shows this frame.
     pub(super) fn shows(&self, frame: &Frame, size: [u32; 2], scale: f32) -> bool {
-        let has_size = self
-            .target
-            .as_ref()
-            .is_some_and(|target| target.size == size);
+        let has_size = self.target.as_ref().is_some_and(|target| target.size == size);
         let shown = self.shown.as_ref();
         has_size && shown.is_some_and(|(shown, at)| shown == frame && *at == scale)
     }
@@ -66,10 +63,7 @@ impl Picture {
         match drawn {
             Ok(()) => self.shown = Some((frame.clone(), scale)),
             Err(why) => {
-                *self = Self {
-                    trouble: Some(why),
-                    ..Self::default()
-                };
+                *self = Self { trouble: Some(why), ..Self::default() };
             }
         }
     }
@@ -95,10 +89,7 @@ impl Picture {
         // The rest is a few kilobytes: made anew it needs no bookkeeping of capacities.
         let (mut lines, mut faces) = (Vec::new(), Vec::new());
         frame.lines.iter().for_each(|line| line.write(&mut lines));
-        frame
-            .faces
-            .iter()
-            .for_each(|corner| corner.write(&mut faces));
+        frame.faces.iter().for_each(|corner| corner.write(&mut faces));
         let lines = buffer(&lines, wgpu::BufferUsages::VERTEX);
         let faces = buffer(&faces, wgpu::BufferUsages::VERTEX);
         let view = buffer(&frame.view(size, scale), wgpu::BufferUsages::UNIFORM);
@@ -142,11 +133,7 @@ impl RenderTarget {
         let texture = |format, usage| {
             device.create_texture(&wgpu::TextureDescriptor {
                 label: Some("space"),
-                size: wgpu::Extent3d {
-                    width: size[0],
-                    height: size[1],
-                    depth_or_array_layers: 1,
-                },
+                size: wgpu::Extent3d { width: size[0], height: size[1], depth_or_array_layers: 1 },
                 mip_level_count: 1,
                 sample_count: 1,
                 dimension: wgpu::TextureDimension::D2,
@@ -209,10 +196,7 @@ fn bind(
     device.create_bind_group(&wgpu::BindGroupDescriptor {
         label: Some("space"),
         layout,
-        entries: &[wgpu::BindGroupEntry {
-            binding: 0,
-            resource,
-        }],
+        entries: &[wgpu::BindGroupEntry { binding: 0, resource }],
     })
 }
 

@@ -70,11 +70,7 @@ impl Pipelines {
                 layout: &blit_layout,
                 shaders: &blit,
                 vertex: "cover",
-                fragment: if target.is_srgb() {
-                    "linear"
-                } else {
-                    "encoded"
-                },
+                fragment: if target.is_srgb() { "linear" } else { "encoded" },
                 buffer: None,
                 topology: triangles,
                 format: target,
@@ -93,12 +89,7 @@ fn layout(
 ) -> wgpu::BindGroupLayout {
     device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
         label: Some("space"),
-        entries: &[wgpu::BindGroupLayoutEntry {
-            binding: 0,
-            visibility,
-            ty,
-            count: None,
-        }],
+        entries: &[wgpu::BindGroupLayoutEntry { binding: 0, visibility, ty, count: None }],
     })
 }
 

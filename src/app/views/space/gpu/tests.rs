@@ -36,19 +36,11 @@ impl Card {
         };
         let (device, queue) = pollster::block_on(adapter.request_device(&descriptor)).ok()?;
         let pipelines = Pipelines::new(&device, COLOR).expect("are accepted");
-        Some(Self {
-            device,
-            queue,
-            pipelines,
-        })
+        Some(Self { device, queue, pipelines })
     }
 
     fn draw(&self, picture: &mut Picture, frame: &Frame) {
-        let Self {
-            device,
-            queue,
-            pipelines,
-        } = self;
+        let Self { device, queue, pipelines } = self;
         picture.draw(pipelines, device, queue, frame, SIZE, 1.0);
     }
 
@@ -77,14 +69,8 @@ impl Card {
         );
         self.queue.submit([encoder.finish()]);
         buffer.slice(..).map_async(wgpu::MapMode::Read, |_| ());
-        self.device
-            .poll(wgpu::PollType::wait_indefinitely())
-            .expect("finishes");
-        let bytes = buffer
-            .slice(..)
-            .get_mapped_range()
-            .expect("mapped")
-            .to_vec();
+        self.device.poll(wgpu::PollType::wait_indefinitely()).expect("finishes");
+        let bytes = buffer.slice(..).get_mapped_range().expect("mapped").to_vec();
         image::RgbaImage::from_raw(SIZE[0], SIZE[1], bytes).expect("is whole")
     }
 }
@@ -113,10 +99,7 @@ fn place(x: f64, y: f64, depth: f64) -> [f32; 3] {
         (y - view_camera.centre[1]) / view_camera.focal[1] * depth,
         depth,
     );
-    (view_camera.scene_from_eye * in_eye)
-        .coords
-        .cast::<f32>()
-        .into()
+    (view_camera.scene_from_eye * in_eye).coords.cast::<f32>().into()
 }
 
 fn near_pixel(picture: &image::RgbaImage, x: f64, y: f64) -> Color32 {
@@ -127,26 +110,14 @@ fn near_pixel(picture: &image::RgbaImage, x: f64, y: f64) -> Color32 {
 #[test]
 fn points_are_drawn_where_the_lens_sees_them_and_the_nearer_one_wins() {
     let Some(card) = Card::any() else { return };
-    let places = (
-        4.0..316.0_f64,
-        4.0..236.0_f64,
-        1.0..80.0_f64,
-        0.05..0.5_f64,
-        prop::bool::ANY,
-    );
+    let places = (4.0..316.0_f64, 4.0..236.0_f64, 1.0..80.0_f64, 0.05..0.5_f64, prop::bool::ANY);
     let mut runner = TestRunner::new(Config::with_cases(24));
     runner
         .run(&places, |(x, y, depth, behind, first)| {
             // The middle of a pixel: a point of 1.5 pixels surely covers it.
             let (x, y) = (x.floor() + 0.5, y.floor() + 0.5);
-            let near = Spot {
-                at: place(x, y, depth),
-                color: GREEN,
-            };
-            let far = Spot {
-                at: place(x, y, depth * (1.0 + behind)),
-                color: RED,
-            };
+            let near = Spot { at: place(x, y, depth), color: GREEN };
+            let far = Spot { at: place(x, y, depth * (1.0 + behind)), color: RED };
             let points = if first { [near, far] } else { [far, near] };
             let mut picture = Picture::default();
             card.draw(&mut picture, &frame(&points, Vec::new()));
@@ -166,18 +137,12 @@ fn a_line_from_behind_the_eye_is_drawn_as_far_as_it_is_seen() {
     // Through the place seen at (200, 100) 4 m ahead, from a place behind the eye.
     let [a, b] = [place(120.0, 140.0, -3.0), place(200.0, 100.0, 4.0)];
     let on = |share: f32| std::array::from_fn(|axis| a[axis] + share * (b[axis] - a[axis]));
-    let line = Line {
-        ends: [a, on(2.0)],
-        color: GREEN,
-        width: 3.0,
-    };
+    let line = Line { ends: [a, on(2.0)], color: GREEN, width: 3.0 };
     card.draw(&mut picture, &frame(&[], vec![line]));
     let pixels = card.pixels(&picture);
     for share in [0.8, 1.0, 1.5] {
         let place: [f32; 3] = on(share);
-        let at = view_camera()
-            .project(&Point3::from(place).cast())
-            .expect("in front");
+        let at = view_camera().project(&Point3::from(place).cast()).expect("in front");
         let seen = near_pixel(&pixels, f64::from(at.x), f64::from(at.y));
         assert_eq!(seen, GREEN, "{share}: {at:?}");
     }
@@ -188,10 +153,7 @@ fn a_line_from_behind_the_eye_is_drawn_as_far_as_it_is_seen() {
 fn a_picture_is_drawn_again_only_if_something_changed() {
     let Some(card) = Card::any() else { return };
     let mut picture = Picture::default();
-    let point = Spot {
-        at: place(50.0, 50.0, 3.0),
-        color: RED,
-    };
+    let point = Spot { at: place(50.0, 50.0, 3.0), color: RED };
     let first = frame(&[point], Vec::new());
     assert!(!picture.shows(&first, SIZE, 1.0));
     card.draw(&mut picture, &first);
@@ -208,10 +170,7 @@ fn a_picture_is_drawn_again_only_if_something_changed() {
 fn a_line_is_before_or_behind_a_point() {
     let Some(card) = Card::any() else { return };
     let mut picture = Picture::default();
-    let point = Spot {
-        at: place(50.5, 50.5, 3.0),
-        color: RED,
-    };
+    let point = Spot { at: place(50.5, 50.5, 3.0), color: RED };
     for (depth, color) in [(2.0, GREEN), (5.0, RED)] {
         let line = Line {
             ends: [place(20.0, 50.5, depth), place(80.0, 50.5, depth)],
@@ -229,11 +188,7 @@ fn a_line_is_before_or_behind_a_point() {
 fn an_error_of_the_graphics_card_is_reported_and_kills_nothing() {
     let Some(card) = Card::any() else { return };
     let mut picture = Picture::default();
-    let Card {
-        device,
-        queue,
-        pipelines,
-    } = &card;
+    let Card { device, queue, pipelines } = &card;
     let frame = frame(&[], Vec::new());
     picture.draw(pipelines, device, queue, &frame, [1_000_000, 10], 1.0);
     let why = picture.trouble().expect("is refused");
