@@ -41,7 +41,7 @@ pub(in crate::app) fn height(setup: &Setup) -> f32 {
     let protocol = &setup.task.protocol;
     let fused = usize::from(!protocol.fusions.is_empty());
     let rows = protocol.methods.len() * (1 + fused) + usize::from(!protocol.is_by_hand());
-    rows.max(2) as f32 * (ROW.end() + GAP) + SCRUB + MARGINS
+    rows.max(1) as f32 * (ROW.end() + GAP) + SCRUB + MARGINS
 }
 
 /// Draws all rows and the line below them.

@@ -14,6 +14,12 @@ use crate::method::Method;
 use crate::picture;
 use crate::render::Comparison;
 
+/// The smallest and the largest histogram \[points\].
+const SIDE: egui::Rangef = egui::Rangef { min: 110.0, max: 420.0 };
+/// The height below which it is small, and the room below it, for its axis and with the numbers \[points\].
+const SMALL: f32 = 320.0;
+const AXIS: f32 = 6.0;
+const NUMBERS: f32 = 90.0;
 /// Grey values of an axis.
 const GREYS: f64 = 256.0;
 
@@ -32,7 +38,11 @@ pub(super) fn ui(
         crate::app::textures::color_image(&picture)
     });
     let readout = Readout::reserve(ui);
-    let side = ui.available_width().min(420.0);
+    // A small one is beside something else, and has no room for the numbers below it.
+    let is_small = ui.available_height() < SMALL;
+    let below = if is_small { AXIS } else { NUMBERS };
+    let room = (ui.available_height() - below).max(SIDE.min);
+    let side = ui.available_width().min(room).min(SIDE.max);
     let answer = Plot::new("joint histogram")
         .width(side)
         .height(side)
@@ -83,7 +93,9 @@ pub(super) fn ui(
     }
     let words = pointed_at.as_ref().map(|bin| bin.words.as_str());
     readout.say(ui, words, "Point at a bin (bright: many pairs)");
-    numbers(ui, method, shown, histogram);
+    if !is_small {
+        numbers(ui, method, shown, histogram);
+    }
 }
 
 /// Marks at every quarter of the grey values.

@@ -2,12 +2,16 @@
 
 use std::sync::Arc;
 
+use nalgebra::Point3;
+
 use crate::app::ViewContext;
+use crate::camera::Intrinsics;
 use crate::depth::LiftedMatch;
 use crate::estimator::{self, Parts};
 use crate::event::{Event, Side};
 use crate::features::FeatureState;
 use crate::features::{Features, Keypoint, Match, MatchVerdict};
+use crate::geometry::Pose;
 use crate::method::Method;
 use crate::session::{Run, Span};
 
@@ -33,6 +37,28 @@ pub(super) struct FeatureProgress<'a> {
     decisions: Option<&'a [Option<Match>]>,
     lifted: Option<&'a [LiftedMatch]>,
     states: Option<&'a [FeatureState]>,
+    trial: Option<TrialPose<'a>>,
+}
+
+/// The pose of the trial at the cursor, or the refined one. Until the states are known, it says which matches it explains.
+#[derive(Clone, Copy)]
+struct TrialPose<'a> {
+    query_from_reference: Pose,
+    camera: &'a Intrinsics,
+    /// Matches with a larger reprojection error are outliers.
+    threshold_px: f64,
+}
+
+impl TrialPose<'_> {
+    fn state(&self, keypoint: &Keypoint, point: &Point3<f64>) -> FeatureState {
+        let seen = self.camera.project(&(self.query_from_reference * point));
+        let residual_px = seen.map_or(f64::INFINITY, |seen| (seen - keypoint.pixel()).norm());
+        if residual_px <= self.threshold_px {
+            FeatureState::Inlier { residual_px }
+        } else {
+            FeatureState::Outlier { residual_px }
+        }
+    }
 }
 
 impl<'a> FeatureProgress<'a> {
@@ -49,11 +75,24 @@ impl<'a> FeatureProgress<'a> {
         let mut methods = context.method().into_iter().chain(asked);
         methods
             .find_map(|method| with_features(method).then(|| context.part_of(method))?)
-            .map_or_else(Self::default, |(span, cursor)| Self::until(context.run, span, cursor))
+            .map_or_else(Self::default, |(span, cursor)| {
+                let camera = context.problem().map(|problem| &problem.query.intrinsics);
+                let threshold_px = context.run.params.fb.mlesac.inlier_threshold_px;
+                Self::until(context.run, span, cursor, camera.map(|camera| (camera, threshold_px)))
+            })
     }
 
-    fn until(run: &'a Run, span: &Span, cursor: usize) -> Self {
+    fn until(
+        run: &'a Run,
+        span: &Span,
+        cursor: usize,
+        judge: Option<(&'a Intrinsics, f64)>,
+    ) -> Self {
         let mut progress = Self::default();
+        let judged = |query_from_reference: Pose| {
+            let (camera, threshold_px) = judge?;
+            Some(TrialPose { query_from_reference, camera, threshold_px })
+        };
         let end = span.records.end.min(cursor.saturating_add(1));
         for record in &run.records()[span.records.start.min(end)..end] {
             match &record.event {
@@ -64,6 +103,13 @@ impl<'a> FeatureProgress<'a> {
                 Event::MatchesDecided(decided) => progress.decisions = Some(&decided.decisions),
                 Event::DepthsLifted(lifted) => progress.lifted = Some(&lifted.matches),
                 Event::MatchesGuided(guided) => progress.lifted = Some(&guided.matches),
+                Event::HypothesisTried(tried) => {
+                    progress.trial =
+                        tried.trial.hypothesis.as_ref().and_then(|one| judged(one.pose));
+                }
+                Event::PoseRefined(refined) => {
+                    progress.trial = judged(refined.reference_from_query.inverse());
+                }
                 Event::FeaturesClassified(classified) => progress.states = Some(&classified.states),
                 _ => {}
             }
@@ -98,8 +144,8 @@ impl<'a> FeatureProgress<'a> {
         lifted.get(at.ok()?)
     }
 
-    /// Where a query feature has ended as far as it is known; `None` while it may still become an
-    /// inlier. A feature that a test rejected is known at once.
+    /// Where a query feature has ended as far as it is known, or stands for the trial at the cursor; `None` while
+    /// nothing tells. A feature that a test rejected is known at once.
     pub(super) fn state(&self, feature: usize) -> Option<FeatureState> {
         if let Some(states) = self.states {
             return states.get(feature).copied();
@@ -112,10 +158,10 @@ impl<'a> FeatureProgress<'a> {
             MatchVerdict::NotUnique { rival } => Some(FeatureState::NotUnique { rival }),
             MatchVerdict::Candidate => {
                 let lifted = self.lifted(feature)?;
-                lifted
-                    .point
-                    .is_none()
-                    .then_some(FeatureState::NoDepth { distance_px: lifted.lidar_distance_px })
+                let Some(point) = &lifted.point else {
+                    return Some(FeatureState::NoDepth { distance_px: lifted.lidar_distance_px });
+                };
+                Some(self.trial?.state(self.query().get(feature)?, point))
             }
         }
     }
@@ -160,7 +206,6 @@ pub(super) fn error_px(residual_px: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::Point3;
 
     fn features(columns: &[f32]) -> Arc<Features> {
         let keypoints = columns.iter().map(|&x| Keypoint {
@@ -201,5 +246,14 @@ mod tests {
         });
         progress.lifted = Some(&lifted);
         assert_eq!(progress.kinds(), [0, 1, 2, UNDECIDED, 0]);
+
+        // The point on the axis is seen at the centre, right where the keypoint is: an inlier of this pose.
+        let camera = Intrinsics { fx: 9.0, fy: 9.0, cx: 4.0, cy: 1.0, width: 20, height: 20 };
+        let poses = [0.0, 3.0].map(|right_m| Pose::translation(right_m, 0.0, 0.0));
+        for (pose, state) in poses.into_iter().zip([INLIER, INLIER - 1]) {
+            progress.trial =
+                Some(TrialPose { query_from_reference: pose, camera: &camera, threshold_px: 2.0 });
+            assert_eq!(progress.kinds(), [0, 1, 2, state, 0]);
+        }
     }
 }
