@@ -32,6 +32,8 @@ mod trajectory;
 mod tum;
 mod view_crop;
 
+use std::path::{Path, PathBuf};
+
 pub use posescope_core::scene::{
     CachedScene, DegradedScene, Entry, FrameStore, Scene, SceneError, degraded,
 };
@@ -69,13 +71,37 @@ pub fn open(argument: &str, format: Option<&str>) -> Result<Box<dyn Scene>, Scen
             .ok_or_else(|| SceneError::UnknownFormat { format: name.to_owned(), known: known() }),
         None => (ALL.iter().find(|entry| (entry.recognizes)(argument))).ok_or_else(|| {
             let argument = argument.to_owned();
-            if std::path::Path::new(&argument).exists() {
-                let known = known();
-                SceneError::NotRecognized { argument, known }
+            if Path::new(&argument).exists() {
+                let (known, hint) = (known(), hint(Path::new(&argument)));
+                SceneError::NotRecognized { argument, known, hint }
             } else {
                 SceneError::NotFound { argument }
             }
         }),
     };
     (entry?.open)(argument)
+}
+
+/// What to try where a folder is no scene: a scene inside it, such as a sequence of a data set.
+fn hint(folder: &Path) -> String {
+    const DEPTH: usize = 1;
+    match scene_within(folder, DEPTH) {
+        Some(scene) => format!("`{}` inside it is a scene", scene.display()),
+        None => "describe your own photos, poses and clouds in a scene.toml, as docs/scenes.md shows, or name \
+                 the format with --format"
+            .to_owned(),
+    }
+}
+
+/// The first folder inside this one, or so many levels deeper, that a format recognises.
+fn scene_within(folder: &Path, depth: usize) -> Option<PathBuf> {
+    let entries = std::fs::read_dir(folder).ok()?.filter_map(Result::ok);
+    let mut inside: Vec<PathBuf> =
+        entries.map(|entry| entry.path()).filter(|path| path.is_dir()).collect();
+    inside.sort();
+    let is_scene = |path: &&PathBuf| {
+        path.to_str().is_some_and(|name| ALL.iter().any(|entry| (entry.recognizes)(name)))
+    };
+    let here = inside.iter().find(is_scene).cloned();
+    here.or_else(|| inside.iter().find_map(|path| scene_within(path, depth.checked_sub(1)?)))
 }

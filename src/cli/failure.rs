@@ -7,7 +7,7 @@ use std::process::ExitCode;
 use image::ImageError;
 use posescope::describe::ParamError;
 use posescope::lesson::{LessonError, SettingError};
-use posescope::localize::ChoiceError;
+use posescope::localize::{ChoiceError, Selection};
 use posescope::run::{DrawError, FolderError, ProtocolError, RunError};
 use posescope::scene::{NoIndex, SceneError};
 use posescope::session::JobError;
@@ -25,6 +25,16 @@ const INTERRUPTED: u8 = 130;
 /// The exit code of a panic.
 pub const INTERNAL: u8 = 4;
 
+/// What else may be meant by a frame that is not there: a way of choosing references, without its number.
+fn about_choosing(error: &SceneError) -> String {
+    match error {
+        SceneError::UnknownFrame { frame, .. } if Selection::is_name(frame) => {
+            format!("; `{frame}:1` chooses a reference in this way")
+        }
+        _ => String::new(),
+    }
+}
+
 /// An error that ends a command. It prints as one line.
 #[derive(Debug, thiserror::Error)]
 pub enum CliError {
@@ -34,7 +44,7 @@ pub enum CliError {
     Param(#[from] ParamError),
     #[error(transparent)]
     Protocol(#[from] ProtocolError),
-    #[error(transparent)]
+    #[error("{0}{hint}", hint = about_choosing(.0))]
     Scene(#[from] SceneError),
     #[error("{}: {source}", .path.display())]
     Config { path: PathBuf, source: ParamError },

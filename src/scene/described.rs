@@ -79,7 +79,7 @@ enum PoseMeaning {
 }
 
 #[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "a table [camera] with fx, fy, cx and cy")]
 struct CameraDescription {
     fx: f64,
     fy: f64,

@@ -26,7 +26,9 @@ fn what_is_missing_damaged_or_cannot_be_written_is_named() {
         sequence.path(),
         "
         3 | run sequences/77 --query 5 --reference 4 | sequences/77 ~ no such
-        3 | run . --query 5 --reference 4 | not recognised ~ kitti ~ --format
+        3 | run . --query 5 --reference 4 | not recognised ~ kitti ~ sequences/42` inside it is a scene
+        3 | run sequences/42/velodyne --query 5 | not recognised ~ scene.toml ~ --format
+        3 | run sequences/42 --query 5 --reference nearest | no frame `nearest` ~ `nearest:1` chooses
         3 | run sequences/42 --query 99 --reference 4 | `99` ~ 000004 … 000007 ~ 3 in all
         3 | run sequences/42 --query 5 --reference 7 --method mi | velodyne/000007.bin ~ empty
         3 | run sequences/42 --query 5 --reference 4 --config none.toml | none.toml

@@ -78,6 +78,7 @@ fn why(ui: &mut Ui, state: &AppState, commands: &Queue) {
             ui.label(reason.unwrap_or_else(|| result.evidence()));
         }
     }
+    changed(ui, &state.shown_run().params.changes());
     if let Some(known) = &result.confidence {
         ui.add_space(8.0);
         let mut words = format!(
@@ -102,6 +103,21 @@ fn why(ui: &mut Ui, state: &AppState, commands: &Queue) {
                 one.rotation_deg
             ));
         }
+    }
+}
+
+/// The parameters that are not at their defaults: they may be the cause.
+fn changed(ui: &mut Ui, changes: &[String]) {
+    const MOST: usize = 5;
+    if changes.is_empty() {
+        return;
+    }
+    heading(ui, "Changed from the default");
+    for change in changes.iter().take(MOST) {
+        ui.label(RichText::new(change).monospace().size(12.0));
+    }
+    if let Some(more) = changes.len().checked_sub(MOST + 1) {
+        ui.weak(format!("and {} more", more + 1));
     }
 }
 
@@ -257,7 +273,9 @@ fn helped(
         }
     };
     ui.weak(words);
-    ui.weak("The truth chose these. Click one to run it.");
+    if !explanation.helped.is_empty() {
+        ui.weak("Found with the help of the truth. Click one to run it.");
+    }
 }
 
 fn remedy(ui: &mut Ui, commands: &Queue, helped: &Helped) {

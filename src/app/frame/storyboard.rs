@@ -143,12 +143,7 @@ fn why(
     if result.grade == Grade::Right {
         return;
     }
-    let cause = result.diagnosis.first().map(|found| found.code);
-    let caption = match (cause, result.grade.is_failure()) {
-        (Some(code), true) => format!("why: {}", code.title()),
-        (None, true) => "why".to_owned(),
-        (_, false) => "what decided".to_owned(),
-    };
+    let caption = if result.grade.is_failure() { "why" } else { "what decided" };
     let picture = state.proof(span.part).map(|proof| {
         let picture = &proof.large.picture;
         let texture = state.textures.of(ui.ctx(), "proof", picture, |picture| {
@@ -158,7 +153,7 @@ fn why(
     });
     let cell = Cell {
         spoken: format!("{} why", part_name(row.part)),
-        caption,
+        caption: caption.to_owned(),
         picture,
         has_failed: false,
         is_selected,

@@ -14,14 +14,14 @@ pub enum SceneError {
         argument: String,
     },
     /// A folder of no known layout.
-    #[error(
-        "{argument}: not recognised as any of the formats {known}; name one with --format, or see `posescope run --help`"
-    )]
+    #[error("{argument}: not recognised as any of the formats {known}; {hint}")]
     NotRecognized {
         /// The scene argument.
         argument: String,
         /// Names of all formats.
         known: String,
+        /// What to try instead.
+        hint: String,
     },
     /// `--format` with an unknown name.
     #[error("--format {format}: one of {known} expected")]

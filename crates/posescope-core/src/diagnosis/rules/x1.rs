@@ -347,7 +347,8 @@ const TELLING_GAIN: f64 = 0.02;
 /// stated one.
 fn camera_by_cost(search: &Search<'_, '_>) -> Option<Diagnosis> {
     const TIMES: [f64; 8] = [0.7, 0.8, 0.9, 0.95, 1.05, 1.1, 1.25, 1.4];
-    let near = search.near_truth();
+    // Where the truth is not searched, that alone explains the result.
+    let near = search.near_truth()?;
     let result_cost = search.result_cost?;
     let stated = search.subject.problem.query.intrinsics;
     let camera = |at: &[f64; 3]| Intrinsics {
@@ -372,7 +373,7 @@ fn camera_by_cost(search: &Search<'_, '_>) -> Option<Diagnosis> {
         .filter_map(|(at, cost)| Some(Descended { at, cost: cost? }))
         .reduce(|best, next| if next.cost < best.cost { next } else { best })?;
     let chance = search.shuffled_cost?;
-    let rival = near.map_or(f64::INFINITY, |near| near.cost).min(result_cost);
+    let rival = near.cost.min(result_cost);
     // Far behind is no reason to stop: only with its own centre does another camera catch up.
     if best.cost >= cost_at_truth {
         return None;
@@ -385,11 +386,8 @@ fn camera_by_cost(search: &Search<'_, '_>) -> Option<Diagnosis> {
     // A cost can also fall because dark falls on dark: pixels must go together better than the same pixels
     // shuffled do, and by more than they do with the stated camera.
     let otherwise = search.against_chance_of(&search.scorer.seen_by(&camera), &search.truth)?;
-    let stated_gain = near
-        .and_then(|near| search.gain(&near.offset))
-        .into_iter()
-        .chain(search.gain(&search.result))
-        .fold(0.0, f64::max);
+    let gains = [&near.offset, &search.result].map(|offset| search.gain(offset));
+    let stated_gain = gains.into_iter().flatten().fold(0.0, f64::max);
     if otherwise.deviations() < BEYOND_CHANCE || otherwise.gain() < stated_gain + TELLING_GAIN {
         return None;
     }
