@@ -7,7 +7,7 @@ use super::canvas::PanZoom;
 use super::images::{PhotoPair, photo};
 use super::mesh_painter::{MarkShape, MeshPainter};
 use crate::app::{ViewContext, theme};
-use crate::event::{Event, ReferencesRanked};
+use crate::event::ReferencesRanked;
 use crate::geometry::PoseError;
 use crate::retrieval::{Criterion, Geometry, RankedReference};
 use crate::session::Part;
@@ -25,7 +25,10 @@ pub struct RetrievalView {
 
 impl View for RetrievalView {
     fn ui(&mut self, ui: &mut Ui, context: &ViewContext<'_>) {
-        let Some(event) = ranked(context) else {
+        let span = context.run.span_of(Part::Retrieval);
+        let event: Option<&ReferencesRanked> =
+            span.and_then(|span| context.run.latest_in(span, context.cursor));
+        let Some(event) = event else {
             ui.weak(
                 "No ranking: nothing chose the references by what they look like. Choose \"most matches\" or \
                  \"by the index\" in the list of references.",
@@ -48,17 +51,6 @@ impl View for RetrievalView {
         let area = ScrollArea::both().auto_shrink(false);
         area.show(ui, |ui| self.table(ui, context, event));
     }
-}
-
-/// The ranking of the run, once the cursor has come so far.
-fn ranked<'a>(context: &ViewContext<'a>) -> Option<&'a ReferencesRanked> {
-    let span = context.run.span_of(Part::Retrieval)?;
-    let end = span.records.end.min(context.cursor + 1);
-    let mut records = context.run.records().get(span.records.start..end)?.iter();
-    records.find_map(|record| match &record.event {
-        Event::ReferencesRanked(event) => Some(event),
-        _ => None,
-    })
 }
 
 impl RetrievalView {

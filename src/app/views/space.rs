@@ -15,12 +15,13 @@ use std::sync::Arc;
 use eframe::egui_wgpu::RenderState;
 use egui::containers::menu::{MenuButton, MenuConfig};
 use egui::{
-    Align, Layout, PointerButton, PopupCloseBehavior, Rect, Response, Role, Sense, Ui, UiBuilder,
-    Vec2, WidgetInfo,
+    Align, Layout, PointerButton, PopupCloseBehavior, Rect, Response, Sense, Ui, UiBuilder, Vec2,
 };
 use nalgebra::Point3;
 
 use super::View;
+use super::features::FeatureProgress;
+use super::legend::name_picture;
 use super::surface::scale::{Scale, number};
 use super::surface::search::Search;
 use crate::app::{ViewContext, theme};
@@ -29,7 +30,7 @@ use cloud::PreparedCloud;
 use gpu::{Frame, Painter, Points};
 use ground::Cell;
 use orbit::Orbit;
-use rays::{LiftedFeatures, Rays};
+use rays::Rays;
 use scene_geometry::SceneGeometry;
 use view_camera::ViewCamera;
 
@@ -80,7 +81,7 @@ struct SceneContent<'a> {
 impl<'a> SceneContent<'a> {
     fn at(context: &ViewContext<'a>) -> Option<Self> {
         let geometry = SceneGeometry::of(context)?;
-        let features = LiftedFeatures::at(context);
+        let features = FeatureProgress::at(context);
         let search = Search::at(context, context.direct_method());
         let selected = context.options.selected_feature;
         Some(Self {
@@ -160,10 +161,7 @@ impl SpaceView {
             self.eye = Eye::Through(kind);
         }
         self.menu(ui, pane, content);
-        response.widget_info(|| {
-            let words = format!("3-D view of {count} points. {headline}");
-            WidgetInfo::labeled(Role::Image, true, words)
-        });
+        name_picture(&response, format!("3-D view of {count} points. {headline}"));
     }
 
     /// The menu in the upper right corner.

@@ -2,15 +2,14 @@
 
 use std::sync::Arc;
 
-use egui::{
-    Button, Color32, Grid, Rect, Role, Sense, TextureHandle, Ui, UiBuilder, Vec2, WidgetInfo, vec2,
-};
+use egui::{Button, Color32, Grid, Rect, Sense, TextureHandle, Ui, UiBuilder, Vec2, vec2};
 use nalgebra::Point2;
 
 use super::marks::{color, draw_truth, mark, position};
-use super::progress::{FeatureProgress, UNDECIDED, error_px, name};
 use super::truth::TrueMatch;
 use crate::app::views::canvas::Placement;
+use crate::app::views::features::{FeatureProgress, UNDECIDED, error_px, name};
+use crate::app::views::legend::name_picture;
 use crate::app::views::mesh_painter::MeshPainter;
 use crate::app::{Command, ViewContext, theme};
 use crate::features::{FeatureState, Keypoint};
@@ -52,7 +51,7 @@ pub(super) struct Subject<'a> {
 impl Subject<'_> {
     fn reference(&self) -> Option<&Keypoint> {
         let found = self.progress.matched(self.feature)?;
-        self.progress.reference().get(found.reference)
+        self.progress.reference.get(found.reference)
     }
 
     /// The numbers of the match, each with its name.
@@ -111,7 +110,7 @@ impl Detail {
     }
 
     fn patches(&mut self, ui: &mut Ui, subject: &Subject<'_>) {
-        let query = &subject.progress.query()[subject.feature];
+        let query = &subject.progress.query[subject.feature];
         let reference = subject.reference();
         // The same number of scales in both, so that a true match looks the same.
         let least = reference.map_or(query.scale, |other| other.scale.min(query.scale));
@@ -204,7 +203,7 @@ fn patch(
     photo: &TextureHandle,
 ) -> Placement {
     let (rect, response) = ui.allocate_exact_size(Vec2::splat(PATCH), Sense::hover());
-    response.widget_info(|| WidgetInfo::labeled(Role::Image, true, name));
+    name_picture(&response, name);
     response.on_hover_text(format!(
         "{name}: scale {:.1} px; the crosshair reaches as far as the descriptor. Dots are LiDAR points by depth",
         keypoint.scale

@@ -3,8 +3,8 @@
 use nalgebra::{Point2, Point3};
 
 use super::gpu::Line;
-use super::rays::LiftedFeatures;
 use super::scene_geometry::{SceneGeometry, spot};
+use crate::app::views::features::FeatureProgress;
 use crate::app::views::legend;
 use crate::app::views::surface::search::Search;
 use crate::app::{ViewContext, theme};
@@ -130,7 +130,7 @@ impl SceneCamera {
 pub(super) fn cameras(
     context: &ViewContext<'_>,
     geometry: &SceneGeometry,
-    features: &LiftedFeatures<'_>,
+    features: &FeatureProgress<'_>,
     search: Option<&Search<'_>>,
 ) -> Vec<SceneCamera> {
     let Some(problem) = context.problem() else {
@@ -192,7 +192,7 @@ fn estimate(context: &ViewContext<'_>, method: Method) -> Option<Pose> {
 /// The best pose so far of the estimator at the cursor, in the reference camera's frame, until its end.
 fn best_so_far(
     context: &ViewContext<'_>,
-    features: &LiftedFeatures<'_>,
+    features: &FeatureProgress<'_>,
     search: Option<&Search<'_>>,
 ) -> Option<(Method, Pose)> {
     let span = context.span()?;

@@ -5,7 +5,7 @@ use egui_plot::{HoverPosition, Line, LineStyle, Plot, PlotPoint, Points, VLine};
 
 use super::scale::number;
 use super::search::Search;
-use crate::app::views::legend::{plot_shape, result};
+use crate::app::views::legend::{name_picture, plot_shape, result};
 use crate::app::{Command, CostAlong, CostLine, ViewContext, theme};
 use crate::geometry::Pose;
 use crate::proof::Thing;
@@ -191,10 +191,10 @@ fn draw(
                 }
             }
         });
-    answer.response.widget_info(|| {
-        let words = format!("Cost from the result to the truth: {}", profile.words());
-        egui::WidgetInfo::labeled(egui::Role::Image, true, words)
-    });
+    name_picture(
+        &answer.response,
+        format!("Cost from the result to the truth: {}", profile.words()),
+    );
     let at = answer.response.hover_pos()?;
     if !answer.transform.frame().contains(at) {
         return None;

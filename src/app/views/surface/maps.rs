@@ -6,7 +6,7 @@ use egui_plot::{AxisHints, Plot, PlotBounds, PlotImage, PlotPoint, PlotTransform
 use super::marks::{MapMark, MarkKind, fanned, heading, place};
 use super::scale::{BELOW_FLOOR, Scale, number};
 use super::search::{Search, Searched, cell_of};
-use crate::app::views::legend::{cost_bar, swatch};
+use crate::app::views::legend::{cost_bar, name_picture, swatch};
 use crate::app::{Command, ViewContext, theme};
 use crate::geometry::Pose;
 use crate::grid::{DenseSurface, Lattice, Offset, ScoredLattice};
@@ -246,10 +246,7 @@ fn plot(
                 plot.add(image);
             }
         });
-    answer.response.widget_info(|| {
-        let name = format!("{name}: {}", shown.progress());
-        egui::WidgetInfo::labeled(egui::Role::Image, true, name)
-    });
+    name_picture(&answer.response, format!("{name}: {}", shown.progress()));
     answer
 }
 

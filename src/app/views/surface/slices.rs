@@ -5,6 +5,7 @@ use egui_plot::{HoverPosition, Line, LineStyle, Plot, VLine};
 
 use super::scale::number;
 use super::search::{Search, Searched};
+use crate::app::views::legend::name_picture;
 use crate::app::{ViewContext, theme};
 use crate::grid::{Lattice, Offset, Phase};
 
@@ -146,8 +147,7 @@ fn slice(
                 }
             }
         });
-    let name = format!("Cost along {name}");
-    answer.response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, &name));
+    name_picture(&answer.response, format!("Cost along {name}"));
 }
 
 #[cfg(test)]
