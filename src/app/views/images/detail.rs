@@ -10,6 +10,7 @@ use super::truth::TrueMatch;
 use crate::app::views::canvas::Placement;
 use crate::app::views::features::{FeatureProgress, UNDECIDED, error_px, name};
 use crate::app::views::legend::name_picture;
+use crate::app::views::memo::{Memo, Same};
 use crate::app::views::mesh_painter::MeshPainter;
 use crate::app::{Command, ViewContext, theme};
 use crate::features::{FeatureState, Keypoint};
@@ -30,7 +31,7 @@ const LEAST_HALF_PATCH_PX: f32 = 16.0;
 /// The LiDAR points around the keypoint that was shown last.
 #[derive(Default)]
 pub(super) struct Detail {
-    seen: Option<(Arc<ReferenceTuple>, Point2<f64>, Vec<SeenPoint>)>,
+    seen: Memo<(Same<ReferenceTuple>, Point2<f64>), Vec<SeenPoint>>,
 }
 
 /// A point of the scan: its pixel in the reference \[px\] and its depth \[m\].
@@ -143,12 +144,8 @@ impl Detail {
         pixel: &Point2<f64>,
         at: &Placement,
     ) {
-        let known = self.seen.take();
-        let known = known.filter(|(of, around, _)| Arc::ptr_eq(of, tuple) && around == pixel);
-        let (_, _, seen) = self.seen.insert(known.unwrap_or_else(|| {
-            let seen = lidar_around(tuple, pixel, LIDAR_RADIUS_PX);
-            (Arc::clone(tuple), *pixel, seen)
-        }));
+        let key = (Same(Arc::clone(tuple)), *pixel);
+        let seen = self.seen.get(key, || lidar_around(tuple, pixel, LIDAR_RADIUS_PX));
         let radius = (0.35 * at.scale).clamp(1.5, 4.0);
         for (rank, (pixel, depth_m)) in seen.iter().enumerate() {
             let place = at.on_screen(pixel.cast::<f32>().into());

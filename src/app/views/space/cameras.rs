@@ -9,8 +9,9 @@ use crate::app::views::legend;
 use crate::app::views::surface::search::Search;
 use crate::app::{ViewContext, theme};
 use crate::camera::Intrinsics;
-use crate::estimator::{self, Parts};
+use crate::estimator;
 use crate::geometry::{Pose, PoseError};
+use crate::grid::Offset;
 use crate::method::Method;
 use crate::palette;
 use crate::place::place;
@@ -130,7 +131,6 @@ impl SceneCamera {
 pub(super) fn cameras(
     context: &ViewContext<'_>,
     geometry: &SceneGeometry,
-    features: &FeatureProgress<'_>,
     search: Option<&Search<'_>>,
 ) -> Vec<SceneCamera> {
     let Some(problem) = context.problem() else {
@@ -174,7 +174,7 @@ pub(super) fn cameras(
             all.push(camera(CameraKind::Estimate(method), pose));
         }
     }
-    all.extend(best_so_far(context, features, search).map(|(method, reference_from_query)| {
+    all.extend(best_so_far(context, search).map(|(method, reference_from_query)| {
         let pose = problem.world_from_query(&reference_from_query);
         camera(CameraKind::BestSoFar(method), pose)
     }));
@@ -190,25 +190,14 @@ fn estimate(context: &ViewContext<'_>, method: Method) -> Option<Pose> {
 }
 
 /// The best pose so far of the estimator at the cursor, in the reference camera's frame, until its end.
-fn best_so_far(
-    context: &ViewContext<'_>,
-    features: &FeatureProgress<'_>,
-    search: Option<&Search<'_>>,
-) -> Option<(Method, Pose)> {
+fn best_so_far(context: &ViewContext<'_>, search: Option<&Search<'_>>) -> Option<(Method, Pose)> {
     let span = context.span()?;
     if span.result.is_some() && context.cursor + 1 >= span.records.end {
         return None;
     }
     // The search may be of another part of the run.
-    let by_search = search.filter(|search| search.span.part == span.part);
-    let by_search = by_search.and_then(|search| search.way.last());
-    let by_search = by_search.map(|best| best.reference_from_camera());
-    let method = span.part.method()?;
-    let best = match estimator::find(method).map(|entry| &entry.parts) {
-        Some(Parts::Features) => features.reference_from_query,
-        Some(Parts::Hybrid(_)) => by_search.or(features.reference_from_query),
-        Some(Parts::Own(own)) if own.has_features => by_search.or(features.reference_from_query),
-        Some(Parts::Cost(_) | Parts::Own(_)) | None => by_search,
-    };
-    Some((method, best?))
+    let search = search.filter(|search| search.span.part == span.part);
+    let by_search = search.and_then(|search| search.way.last()).map(Offset::reference_from_camera);
+    let by_features = || FeatureProgress::of(context, span, context.cursor).reference_from_query;
+    Some((span.part.method()?, by_search.or_else(by_features)?))
 }

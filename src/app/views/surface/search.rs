@@ -211,7 +211,11 @@ impl Filling {
 }
 
 /// The cell that a position lies in.
-pub(super) fn cell_of(lattice: &Lattice, right_m: f64, forward_m: f64) -> Option<usize> {
+pub(in crate::app::views) fn cell_of(
+    lattice: &Lattice,
+    right_m: f64,
+    forward_m: f64,
+) -> Option<usize> {
     let index = |value: f64, count: usize| {
         let index = (value / lattice.step).round() + (count / 2) as f64;
         (0.0 <= index && index < count as f64).then_some(index as usize)
