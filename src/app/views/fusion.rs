@@ -4,11 +4,11 @@ use egui::{Grid, RichText, ScrollArea, Ui};
 use egui_plot::{Legend, Plot, PlotUi, Points};
 
 use super::View;
-use super::legend::{name_picture, plot_shape, result};
+use super::legend::{from_truth, name_picture, plot_shape, result};
 use crate::app::{ViewContext, theme};
 use crate::event::{DebugEvent, ReferencesFused};
 use crate::fusion::ShareOutcome;
-use crate::geometry::{Pose, PoseError};
+use crate::geometry::Pose;
 use crate::method::Method;
 use crate::palette;
 use crate::proof::Thing;
@@ -68,14 +68,8 @@ fn reported<'a>(context: &ViewContext<'a>) -> Option<(Method, Vec<&'a References
 
 /// How far a pose is from the truth.
 fn error(context: &ViewContext<'_>, pose: Option<&Pose>) -> String {
-    match (pose, context.truth()) {
-        (None, _) => "× no pose".to_owned(),
-        (Some(_), None) => "a pose".to_owned(),
-        (Some(pose), Some(truth)) => {
-            let error = PoseError::between(truth, pose);
-            format!("{}, {}", error.translation(), error.rotation())
-        }
-    }
+    let known = |pose| from_truth(context, pose).unwrap_or_else(|| "a pose".to_owned());
+    pose.map_or_else(|| "× no pose".to_owned(), known)
 }
 
 fn table(ui: &mut Ui, context: &ViewContext<'_>, fused: &[&ReferencesFused]) {

@@ -1,14 +1,15 @@
 //! What colours and marks of a picture mean: one bar and one mark for one thing in every view.
 
 use egui::{
-    Align2, Color32, FontId, Mesh, Painter, Pos2, Rect, Response, Role, Sense, Shape, Stroke,
-    StrokeKind, TextStyle, Ui, Vec2, WidgetInfo, pos2, vec2,
+    Align2, Color32, FontId, Mesh, Painter, Pos2, Rect, Response, RichText, Role, Sense, Shape,
+    Stroke, StrokeKind, TextStyle, Ui, Vec2, WidgetInfo, pos2, vec2,
 };
-use egui_plot::MarkerShape;
+use egui_plot::{HoverPosition, MarkerShape, PlotPoint};
 
 use crate::app::{ViewContext, theme};
 use crate::diagnosis::Grade;
 use crate::geometry::{Pose, PoseError};
+use crate::method::Method;
 use crate::palette;
 use crate::proof::Thing;
 
@@ -97,6 +98,35 @@ pub(super) fn result(context: &ViewContext<'_>, pose: &Pose) -> Thing {
         Some(_) => Grade::Wrong,
     };
     Thing::Result(palette::grade(grade))
+}
+
+/// The name of a method in its colour.
+pub(super) fn method_name(ui: &Ui, method: Method) -> RichText {
+    RichText::new(method.label()).color(theme::text(ui.visuals(), theme::method(method)))
+}
+
+/// How far a pose is from the truth, in words, if that is known and shown.
+pub(super) fn from_truth(context: &ViewContext<'_>, pose: &Pose) -> Option<String> {
+    let error = PoseError::between(context.truth()?, pose);
+    Some(format!("{}, {}", error.translation(), error.rotation()))
+}
+
+/// Writes what is at the point of a plot under the pointer; `words` take the name of its line.
+pub(super) fn at_points<'a>(
+    words: impl Fn(&str, PlotPoint) -> String + 'a,
+) -> impl Fn(&HoverPosition<'_>) -> Option<String> + 'a {
+    move |position| match position {
+        HoverPosition::NearDataPoint { plot_name, position, .. } => {
+            Some(words(plot_name, *position))
+        }
+        HoverPosition::Elsewhere { .. } => None,
+    }
+}
+
+/// The stretches of a curve where it is known.
+pub(super) fn stretches(curve: &[Option<[f64; 2]>]) -> impl Iterator<Item = Vec<[f64; 2]>> {
+    let known = curve.split(Option::is_none).filter(|stretch| !stretch.is_empty());
+    known.map(|stretch| stretch.iter().copied().flatten().collect())
 }
 
 /// Paints a mark of a radius \[points\] with a dark rim, in the shapes that proofs have.

@@ -5,10 +5,10 @@ use egui::{Grid, RichText, ScrollArea, Ui};
 use super::View;
 use super::canvas::PanZoom;
 use super::images::{PhotoPair, photo};
+use super::legend::from_truth;
 use super::mesh_painter::{MarkShape, MeshPainter};
 use crate::app::{ViewContext, theme};
 use crate::event::ReferencesRanked;
-use crate::geometry::PoseError;
 use crate::retrieval::{Criterion, Geometry, RankedReference};
 use crate::session::Part;
 
@@ -84,7 +84,9 @@ impl RetrievalView {
                     Geometry::Refused => "× too few".to_owned(),
                     Geometry::Verified(found) => format!("{} words", found.inliers),
                 });
-                ui.label(distance(context, frame));
+                let pose = frame.world_from_camera.as_ref();
+                let distance = pose.and_then(|pose| from_truth(context, pose));
+                ui.label(distance.unwrap_or_else(|| "–".to_owned()));
                 ui.end_row();
             }
         });
@@ -131,15 +133,5 @@ impl RetrievalView {
         let rank = self.selected + 1;
         pair.name(ui, ["Query".to_owned(), format!("Rank {rank}: {}", frame.name)]);
         ui.advance_cursor_after_rect(area);
-    }
-}
-
-fn distance(context: &ViewContext<'_>, frame: &RankedReference) -> String {
-    match (context.truth(), &frame.world_from_camera) {
-        (Some(truth), Some(pose)) => {
-            let error = PoseError::between(truth, pose);
-            format!("{}, {}", error.translation(), error.rotation())
-        }
-        _ => "–".to_owned(),
     }
 }

@@ -37,33 +37,21 @@ impl CameraKind {
         match self {
             Self::Reference => "Reference".to_owned(),
             Self::Truth => "Truth".to_owned(),
-            Self::Estimate(method) => method.name().to_uppercase(),
-            Self::BestSoFar(method) => format!("{}, best so far", method.name().to_uppercase()),
+            Self::Estimate(method) => method.label(),
+            Self::BestSoFar(method) => format!("{}, best so far", method.label()),
             Self::Hand => "In hand".to_owned(),
             Self::Pointer => "Under the pointer".to_owned(),
         }
     }
 
-    /// Frusta at the same place are nested, not on top of each other.
-    fn size(self) -> f64 {
+    /// Its size and the width of its lines. Frusta at the same place are nested, not on top of each other.
+    fn look(self) -> (f64, f32) {
         match self {
-            Self::Reference | Self::Hand => 1.0,
-            Self::Truth => 1.24,
-            Self::Estimate(method) => 1.0 + 0.08 * rank(method) as f64,
-            Self::BestSoFar(_) | Self::Pointer => 0.7,
+            Self::Reference | Self::Hand => (1.0, 2.5),
+            Self::Truth => (1.24, 2.5),
+            Self::Estimate(method) => (1.0 + 0.08 * rank(method) as f64, 2.5),
+            Self::BestSoFar(_) | Self::Pointer => (0.7, 1.0),
         }
-    }
-
-    fn line_width(self) -> f32 {
-        match self {
-            Self::Reference | Self::Truth | Self::Estimate(_) | Self::Hand => 2.5,
-            Self::BestSoFar(_) | Self::Pointer => 1.0,
-        }
-    }
-
-    /// Whether it takes the query photo; the reference camera took the reference photo.
-    pub(super) fn is_query(self) -> bool {
-        self != Self::Reference
     }
 }
 
@@ -77,8 +65,6 @@ fn rank(method: Method) -> usize {
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct SceneCamera {
     pub(super) kind: CameraKind,
-    /// `world_from_camera`.
-    pub(super) world: Pose,
     pub(super) scene_from_camera: Pose,
     pub(super) intrinsics: Intrinsics,
     /// How far the image plane is drawn from the centre \[m\].
@@ -114,7 +100,7 @@ impl SceneCamera {
         let line = |from: Point3<f64>, to: Point3<f64>| Line {
             ends: [spot(&from), spot(&to)],
             color: theme::rgb(self.thing.color()),
-            width: self.kind.line_width(),
+            width: self.kind.look().1,
         };
         let mut lines = vec![line(centre, *foot)];
         for side in 0..4 {
@@ -155,14 +141,13 @@ pub(super) fn cameras(
         };
         SceneCamera {
             kind,
-            world,
             scene_from_camera: geometry.scene_from_world * world,
-            intrinsics: if kind.is_query() {
-                problem.query.intrinsics
-            } else {
-                problem.reference.intrinsics
+            // The reference camera took the reference photo, all others take the query's.
+            intrinsics: match kind {
+                CameraKind::Reference => problem.reference.intrinsics,
+                _ => problem.query.intrinsics,
             },
-            depth_m: kind.size() * geometry.camera_m(),
+            depth_m: kind.look().0 * geometry.camera_m(),
             about,
             thing,
         }
