@@ -7,6 +7,7 @@ mod batch;
 mod breakpoints;
 mod canvas;
 mod charts;
+mod features;
 mod fusion;
 mod histogram;
 mod images;
@@ -14,6 +15,7 @@ mod in_sight;
 mod legend;
 mod lockstep;
 mod log;
+mod memo;
 mod mesh_painter;
 mod parameters;
 mod queries;
@@ -28,6 +30,9 @@ mod synthetic;
 use eframe::egui_wgpu::RenderState;
 
 use super::view_context::ViewContext;
+use crate::event::DebugEvent;
+use crate::method::Method;
+use crate::session::Span;
 
 /// A part of the window.
 pub trait View {
@@ -56,6 +61,19 @@ pub(super) const PARAMETERS: &str = "parameters";
 pub(super) fn name_of(name: &str) -> Option<&'static str> {
     let mut names = ALL.iter().map(|entry| entry.name);
     names.find(|known| *known == name)
+}
+
+/// The part of the run in which a method reports events of a type, and the cursor in it. A hybrid at the cursor may
+/// run the method inside itself.
+fn part_with<'a, E: DebugEvent + 'static>(
+    context: &ViewContext<'a>,
+    method: Method,
+) -> Option<(&'a Span, usize)> {
+    if context.is_inside_hybrid(method) && context.latest::<E>().is_some() {
+        Some((context.span()?, context.cursor))
+    } else {
+        context.part_of(method)
+    }
 }
 
 /// Every view, in the order of the menu.

@@ -354,7 +354,8 @@ impl Run {
             .filter_map(move |(at, record)| Some((start + at, E::from_event(&record.event)?)))
     }
 
-    fn until(&self, span: &Span, cursor: usize) -> &[Record] {
+    /// What a part has reported up to a cursor.
+    pub fn until(&self, span: &Span, cursor: usize) -> &[Record] {
         let end = span.records.end.min(cursor.saturating_add(1));
         &self.records()[span.records.start.min(end)..end]
     }

@@ -7,6 +7,7 @@ use egui::{Button, RichText, ScrollArea, Sense, TextEdit, Ui};
 use egui_extras::{Column, TableBuilder, TableRow};
 
 use super::View;
+use super::memo::Memo;
 use crate::app::{Command, ResultRow, ViewContext, theme};
 use crate::localize::QueryResult;
 use crate::measure::{Field, Order, select, verdict_name};
@@ -36,21 +37,8 @@ const CAUSE: f32 = 120.0;
 #[derive(Default)]
 pub struct BatchView {
     order: Option<Order>,
-    /// What was shown last, with what it was made from.
-    made: Option<(Made, Shown)>,
-}
-
-/// The rows in their order, and a line about them.
-struct Shown {
-    rows: Vec<ResultRow>,
-    words: String,
-}
-
-/// What the rows were made from.
-struct Made {
-    chosen: Rc<[ResultRow]>,
-    order: Option<Order>,
-    version: u64,
+    /// The rows in their order, and a line about them; of the chosen results at a version.
+    shown: Memo<(Rc<[ResultRow]>, Option<Order>, u64), (Vec<ResultRow>, String)>,
 }
 
 impl View for BatchView {
@@ -80,10 +68,16 @@ impl View for BatchView {
             ui.weak("No query was run yet: Run all in the list of queries, or open a run folder");
             return;
         }
-        self.make(context, chosen);
-        let Some((_, Shown { rows, words })) = &self.made else {
-            return;
-        };
+        // Clicks on the names of the columns sort from the next frame on.
+        let mut order = self.order;
+        let key = (Rc::clone(&chosen), order, context.results_version());
+        let (rows, words) = self.shown.get(key, || {
+            let known = chosen.iter().filter_map(|row| context.result(*row));
+            let sorted = select(&known.collect::<Vec<_>>(), None, order).into_iter();
+            let rows: Vec<ResultRow> = sorted.map(|index| chosen[index]).collect();
+            let words = words(context, &rows);
+            (rows, words)
+        });
         ui.weak(words);
         let (height, has_before) = (ui.spacing().interact_size.y, context.has_results_before());
         // The names of the columns move sideways with the rows, and stay above them.
@@ -100,7 +94,7 @@ impl View for BatchView {
             }
             let table = table.header(height, |mut names| {
                 for (name, _) in COLUMNS {
-                    names.col(|ui| header(ui, name, &mut self.order));
+                    names.col(|ui| header(ui, name, &mut order));
                 }
                 if has_before {
                     names.col(|ui| {
@@ -116,27 +110,7 @@ impl View for BatchView {
                 });
             });
         });
-    }
-}
-
-impl BatchView {
-    /// Sorts when something has changed.
-    fn make(&mut self, context: &ViewContext<'_>, chosen: Rc<[ResultRow]>) {
-        let version = context.results_version();
-        if let Some((made, _)) = &self.made
-            && Rc::ptr_eq(&made.chosen, &chosen)
-            && made.order == self.order
-            && made.version == version
-        {
-            return;
-        }
-        let results: Vec<&QueryResult> =
-            chosen.iter().filter_map(|row| context.result(*row)).collect();
-        let order = select(&results, None, self.order);
-        let rows: Vec<ResultRow> = order.into_iter().map(|index| chosen[index]).collect();
-        let words = words(context, &rows);
-        let made = Made { chosen, order: self.order, version };
-        self.made = Some((made, Shown { rows, words }));
+        self.order = order;
     }
 }
 

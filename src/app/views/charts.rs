@@ -9,6 +9,7 @@ use egui::{ComboBox, DragValue, Ui};
 use egui_plot::{Legend, MarkerShape, Plot, PlotPoint, Points};
 
 use super::View;
+use super::legend::name_picture;
 use crate::app::{Command, ResultRow, ViewContext, theme};
 use crate::diagnosis::Grade;
 use crate::localize::QueryResult;
@@ -157,10 +158,7 @@ impl ChartsView {
                 }
             });
         let answer = &plot.response;
-        answer.widget_info(|| {
-            let words = format!("{} results: {up} over {across}", places.len());
-            egui::WidgetInfo::labeled(egui::Role::Image, true, words)
-        });
+        name_picture(answer, format!("{} results: {up} over {across}", places.len()));
         let Some(pointer) = answer.hover_pos() else {
             return;
         };

@@ -4,11 +4,11 @@ use egui::{Grid, RichText, ScrollArea, Ui};
 use egui_plot::{Legend, Plot, PlotUi, Points};
 
 use super::View;
-use super::legend::{plot_shape, result};
+use super::legend::{from_truth, name_picture, plot_shape, result};
 use crate::app::{ViewContext, theme};
-use crate::event::{Event, ReferencesFused};
+use crate::event::{DebugEvent, ReferencesFused};
 use crate::fusion::ShareOutcome;
-use crate::geometry::{Pose, PoseError};
+use crate::geometry::Pose;
 use crate::method::Method;
 use crate::palette;
 use crate::proof::Thing;
@@ -57,15 +57,9 @@ fn spans<'a>(context: &ViewContext<'a>, method: Method) -> impl Iterator<Item = 
 /// that has.
 fn reported<'a>(context: &ViewContext<'a>) -> Option<(Method, Vec<&'a ReferencesFused>)> {
     let of = |method: Method| -> Vec<&'a ReferencesFused> {
-        let records = spans(context, method).flat_map(|span| {
-            let end = span.records.end.min(context.cursor + 1);
-            context.run.records().get(span.records.start..end).unwrap_or_default()
-        });
-        let fused = records.filter_map(|record| match &record.event {
-            Event::ReferencesFused(fused) => Some(fused),
-            _ => None,
-        });
-        fused.collect()
+        let records = spans(context, method);
+        let records = records.flat_map(|span| context.run.until(span, context.cursor));
+        records.filter_map(|record| DebugEvent::from_event(&record.event)).collect()
     };
     let others = context.setup.task.protocol.methods.iter().copied().rev();
     let methods = context.method().into_iter().chain(others);
@@ -74,14 +68,8 @@ fn reported<'a>(context: &ViewContext<'a>) -> Option<(Method, Vec<&'a References
 
 /// How far a pose is from the truth.
 fn error(context: &ViewContext<'_>, pose: Option<&Pose>) -> String {
-    match (pose, context.truth()) {
-        (None, _) => "× no pose".to_owned(),
-        (Some(_), None) => "a pose".to_owned(),
-        (Some(pose), Some(truth)) => {
-            let error = PoseError::between(truth, pose);
-            format!("{}, {}", error.translation(), error.rotation())
-        }
-    }
+    let known = |pose| from_truth(context, pose).unwrap_or_else(|| "a pose".to_owned());
+    pose.map_or_else(|| "× no pose".to_owned(), known)
 }
 
 fn table(ui: &mut Ui, context: &ViewContext<'_>, fused: &[&ReferencesFused]) {
@@ -170,6 +158,5 @@ fn map(ui: &mut Ui, context: &ViewContext<'_>, fused: &[&ReferencesFused], heigh
                 mark(plot, "+ truth", truth, Thing::Truth, 7.0);
             }
         });
-    let name = format!("Map of the fusion {}", present.fusion);
-    answer.response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, &name));
+    name_picture(&answer.response, format!("Map of the fusion {}", present.fusion));
 }

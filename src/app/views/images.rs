@@ -4,7 +4,6 @@ mod detail;
 mod funnel;
 mod marks;
 mod pair;
-mod progress;
 mod truth;
 mod visible;
 
@@ -13,11 +12,11 @@ use egui::{Rect, Response, Ui, UiBuilder, vec2};
 use self::detail::{Detail, Subject};
 use self::marks::draw_truth;
 pub(super) use self::pair::{PhotoPair, photo};
-use self::progress::{FeatureProgress, INLIER, KINDS};
 use self::truth::TrueMatch;
 use self::visible::VisibleFeatures;
 use super::View;
 use super::canvas::PanZoom;
+use super::features::{FeatureProgress, INLIER, KINDS};
 use super::mesh_painter::MeshPainter;
 use crate::app::{Command, ViewContext};
 use crate::diagnosis::TRUE_MATCH_THRESHOLDS;
@@ -66,8 +65,8 @@ impl View for ImagesView {
             format!("reference photo {}", problem.reference.name),
         ];
         let captions = [
-            caption("Query", progress.query().len()),
-            caption("Reference", progress.reference().len()),
+            caption("Query", progress.query.len()),
+            caption("Reference", progress.reference.len()),
         ];
         let pair = PhotoPair::show(ui, photos, [query, reference], names, &mut self.pan_zoom);
 
@@ -106,7 +105,7 @@ impl View for ImagesView {
                 depth_radius_px: context.run.params.fb.depth_radius_px,
             };
             // On the side where the match is not. Making room for it would move the photos under the pointer.
-            let keypoint = &progress.query()[feature];
+            let keypoint = &progress.query[feature];
             let at = pair.at[0].on_screen([keypoint.x, keypoint.y]);
             let corner = if at.x < photos.center().x {
                 photos.right_bottom() - detail::SIZE
@@ -117,7 +116,7 @@ impl View for ImagesView {
             self.detail.ui(ui, context, &subject, panel);
         }
         ui.scope_builder(UiBuilder::new().max_rect(chips), |ui| {
-            if kinds.is_empty() && progress.has_begun() {
+            if kinds.is_empty() && progress.has_begun {
                 ui.weak("The query has no keypoints");
             } else if kinds.is_empty() {
                 ui.weak("No features yet: FB finds them first");
@@ -148,8 +147,8 @@ fn true_match(
     Some(TrueMatch::of(
         problem,
         context.truth()?,
-        &progress.query().get(feature)?.pixel(),
-        &progress.reference().get(found.reference)?.pixel(),
+        &progress.query.get(feature)?.pixel(),
+        &progress.reference.get(found.reference)?.pixel(),
         lifted.and_then(|lifted| lifted.point.as_ref()),
         TRUE_MATCH_THRESHOLDS * context.run.params.fb.mlesac.inlier_threshold_px,
     ))

@@ -1,16 +1,23 @@
 //! What colours and marks of a picture mean: one bar and one mark for one thing in every view.
 
 use egui::{
-    Align2, Color32, FontId, Mesh, Painter, Pos2, Role, Sense, Shape, Stroke, TextStyle, Ui, Vec2,
-    WidgetInfo, pos2, vec2,
+    Align2, Color32, FontId, Mesh, Painter, Pos2, Rect, Response, RichText, Role, Sense, Shape,
+    Stroke, StrokeKind, TextStyle, Ui, Vec2, WidgetInfo, pos2, vec2,
 };
-use egui_plot::MarkerShape;
+use egui_plot::{HoverPosition, MarkerShape, PlotPoint};
 
 use crate::app::{ViewContext, theme};
 use crate::diagnosis::Grade;
 use crate::geometry::{Pose, PoseError};
+use crate::method::Method;
 use crate::palette;
 use crate::proof::Thing;
+
+/// Says to assistive technology what a picture shows.
+pub(super) fn name_picture(response: &Response, words: impl Into<String>) {
+    let words = words.into();
+    response.widget_info(|| WidgetInfo::labeled(Role::Image, true, &words));
+}
 
 /// A bar of colours from 0 to 1, with words at some of its places beneath it. `name` says what it
 /// shows, with the unit.
@@ -22,37 +29,43 @@ pub(super) fn color_bar(
     ticks: &[(f64, &str)],
 ) {
     const BAR: f32 = 9.0;
-    const STEPS: u32 = 32;
     let font = TextStyle::Small.resolve(ui.style());
     let size = vec2(width, BAR + 2.0 + font.size);
     let (rect, response) = ui.allocate_exact_size(size, Sense::hover());
-    response.widget_info(|| WidgetInfo::labeled(Role::Image, true, name));
+    name_picture(&response, name);
     response.on_hover_text(name);
     let at = |share: f64| rect.left() + share as f32 * rect.width();
-    let (top, bottom) = (rect.top(), rect.top() + BAR);
+    let painter = ui.painter();
+    let bar = rect.with_max_y(rect.top() + BAR);
+    gradient(painter, bar, color);
+    let text = ui.visuals().text_color();
+    for (share, words) in ticks {
+        let x = at(*share);
+        painter.vline(x, bar.bottom() - 3.0..=bar.bottom() + 2.0, (1.0, text));
+        let galley = painter.layout_no_wrap((*words).to_owned(), font.clone(), text);
+        // Words at an end stay within the bar.
+        let half = 0.5 * galley.size().x;
+        let middle = x.max(rect.left() + half).min(rect.right() - half);
+        painter.galley(pos2(middle - half, bar.bottom() + 1.0), galley, text);
+    }
+}
+
+/// Fills a rectangle with colours from 0 on the left to 1 on the right.
+pub(super) fn gradient(painter: &Painter, rect: Rect, color: impl Fn(f64) -> Color32) {
+    const STEPS: u32 = 32;
     let mut mesh = Mesh::default();
     for step in 0..=STEPS {
         let share = f64::from(step) / f64::from(STEPS);
-        mesh.colored_vertex(pos2(at(share), top), color(share));
-        mesh.colored_vertex(pos2(at(share), bottom), color(share));
+        let x = rect.left() + share as f32 * rect.width();
+        mesh.colored_vertex(pos2(x, rect.top()), color(share));
+        mesh.colored_vertex(pos2(x, rect.bottom()), color(share));
         if step > 0 {
             let here = 2 * step;
             mesh.add_triangle(here - 2, here - 1, here);
             mesh.add_triangle(here, here - 1, here + 1);
         }
     }
-    let painter = ui.painter();
     painter.add(mesh);
-    let text = ui.visuals().text_color();
-    for (share, words) in ticks {
-        let x = at(*share);
-        painter.vline(x, bottom - 3.0..=bottom + 2.0, (1.0, text));
-        let galley = painter.layout_no_wrap((*words).to_owned(), font.clone(), text);
-        // Words at an end stay within the bar.
-        let half = 0.5 * galley.size().x;
-        let middle = x.max(rect.left() + half).min(rect.right() - half);
-        painter.galley(pos2(middle - half, bottom + 1.0), galley, text);
-    }
 }
 
 /// The bar of [`palette::viridis`] between two numbers.
@@ -72,7 +85,8 @@ pub(super) fn depth_bar(ui: &mut Ui, width: f32) {
 /// A square of a colour.
 pub(super) fn swatch(ui: &mut Ui, color: Color32) {
     let (rect, _) = ui.allocate_exact_size(Vec2::splat(10.0), Sense::hover());
-    ui.painter().rect_filled(rect, 1.0, color);
+    let rim = Stroke::new(1.0, ui.visuals().weak_text_color());
+    ui.painter().rect(rect, 1.0, color, rim, StrokeKind::Inside);
 }
 
 /// The mark of a result. It has the colour of its grade, which is grey where the truth is unknown or hidden.
@@ -84,6 +98,35 @@ pub(super) fn result(context: &ViewContext<'_>, pose: &Pose) -> Thing {
         Some(_) => Grade::Wrong,
     };
     Thing::Result(palette::grade(grade))
+}
+
+/// The name of a method in its colour.
+pub(super) fn method_name(ui: &Ui, method: Method) -> RichText {
+    RichText::new(method.label()).color(theme::text(ui.visuals(), theme::method(method)))
+}
+
+/// How far a pose is from the truth, in words, if that is known and shown.
+pub(super) fn from_truth(context: &ViewContext<'_>, pose: &Pose) -> Option<String> {
+    let error = PoseError::between(context.truth()?, pose);
+    Some(format!("{}, {}", error.translation(), error.rotation()))
+}
+
+/// Writes what is at the point of a plot under the pointer; `words` take the name of its line.
+pub(super) fn at_points<'a>(
+    words: impl Fn(&str, PlotPoint) -> String + 'a,
+) -> impl Fn(&HoverPosition<'_>) -> Option<String> + 'a {
+    move |position| match position {
+        HoverPosition::NearDataPoint { plot_name, position, .. } => {
+            Some(words(plot_name, *position))
+        }
+        HoverPosition::Elsewhere { .. } => None,
+    }
+}
+
+/// The stretches of a curve where it is known.
+pub(super) fn stretches(curve: &[Option<[f64; 2]>]) -> impl Iterator<Item = Vec<[f64; 2]>> {
+    let known = curve.split(Option::is_none).filter(|stretch| !stretch.is_empty());
+    known.map(|stretch| stretch.iter().copied().flatten().collect())
 }
 
 /// Paints a mark of a radius \[points\] with a dark rim, in the shapes that proofs have.

@@ -6,6 +6,7 @@ use egui::{Label, RichText, Slider, Ui, vec2};
 
 use super::View;
 use super::images::ImagesView;
+use super::legend::method_name;
 use super::surface::SurfaceView;
 use crate::app::{Command, ViewContext, theme};
 use crate::event::PoseScored;
@@ -76,8 +77,7 @@ impl LockstepView {
         let cursor = span.records.start + step.min(steps - 1);
         let here = context.at(cursor);
         ui.horizontal(|ui| {
-            let color = theme::text(ui.visuals(), theme::method(method));
-            ui.strong(RichText::new(method.label()).color(color));
+            ui.strong(method_name(ui, method));
             let Some(result) = span.result.as_ref().filter(|_| step + 1 >= steps) else {
                 let stages = context.run.stages_at(cursor).skip(1);
                 let stages: Vec<_> = stages.map(|bar| bar.stage.name()).collect();

@@ -3,6 +3,7 @@
 use egui::{ComboBox, DragValue, Image, RichText, ScrollArea, Sense, Ui, Vec2, vec2};
 
 use super::View;
+use super::memo::Memo;
 use super::queries::dots;
 use crate::app::{Command, ReferencePick, ViewContext};
 use crate::event::Side;
@@ -25,7 +26,7 @@ const THUMBNAIL: Vec2 = vec2(124.0, 38.0);
 pub struct ReferencesView {
     /// Frames that could be references, for a query, a radius \[m\] and a scene. Looking for them in a long
     /// scene at every frame would be too slow.
-    nearby: Option<((usize, f64, String), Vec<usize>)>,
+    nearby: Memo<(usize, f64, String), Vec<usize>>,
 }
 
 impl View for ReferencesView {
@@ -37,9 +38,7 @@ impl View for ReferencesView {
         let setup = context.setup;
         let radius_m = setup.task.reach_m();
         let key = (setup.query, radius_m, setup.references.name().to_owned());
-        let known = self.nearby.take().filter(|(of, _)| *of == key);
-        let (_, frames) =
-            self.nearby.insert(known.unwrap_or_else(|| (key, setup.candidates(setup.query))));
+        let frames = self.nearby.get(key, || setup.candidates(setup.query));
         // Those that were named may be farther away than the radius.
         let chosen = &setup.chosen.frames;
         let mut shown: Vec<usize> = chosen.clone();

@@ -5,10 +5,10 @@ use egui::{Grid, RichText, ScrollArea, Ui};
 use super::View;
 use super::canvas::PanZoom;
 use super::images::{PhotoPair, photo};
+use super::legend::from_truth;
 use super::mesh_painter::{MarkShape, MeshPainter};
 use crate::app::{ViewContext, theme};
-use crate::event::{Event, ReferencesRanked};
-use crate::geometry::PoseError;
+use crate::event::ReferencesRanked;
 use crate::retrieval::{Criterion, Geometry, RankedReference};
 use crate::session::Part;
 
@@ -25,7 +25,10 @@ pub struct RetrievalView {
 
 impl View for RetrievalView {
     fn ui(&mut self, ui: &mut Ui, context: &ViewContext<'_>) {
-        let Some(event) = ranked(context) else {
+        let span = context.run.span_of(Part::Retrieval);
+        let event: Option<&ReferencesRanked> =
+            span.and_then(|span| context.run.latest_in(span, context.cursor));
+        let Some(event) = event else {
             ui.weak(
                 "No ranking: nothing chose the references by what they look like. Choose \"most matches\" or \
                  \"by the index\" in the list of references.",
@@ -48,17 +51,6 @@ impl View for RetrievalView {
         let area = ScrollArea::both().auto_shrink(false);
         area.show(ui, |ui| self.table(ui, context, event));
     }
-}
-
-/// The ranking of the run, once the cursor has come so far.
-fn ranked<'a>(context: &ViewContext<'a>) -> Option<&'a ReferencesRanked> {
-    let span = context.run.span_of(Part::Retrieval)?;
-    let end = span.records.end.min(context.cursor + 1);
-    let mut records = context.run.records().get(span.records.start..end)?.iter();
-    records.find_map(|record| match &record.event {
-        Event::ReferencesRanked(event) => Some(event),
-        _ => None,
-    })
 }
 
 impl RetrievalView {
@@ -92,7 +84,9 @@ impl RetrievalView {
                     Geometry::Refused => "× too few".to_owned(),
                     Geometry::Verified(found) => format!("{} words", found.inliers),
                 });
-                ui.label(distance(context, frame));
+                let pose = frame.world_from_camera.as_ref();
+                let distance = pose.and_then(|pose| from_truth(context, pose));
+                ui.label(distance.unwrap_or_else(|| "–".to_owned()));
                 ui.end_row();
             }
         });
@@ -139,15 +133,5 @@ impl RetrievalView {
         let rank = self.selected + 1;
         pair.name(ui, ["Query".to_owned(), format!("Rank {rank}: {}", frame.name)]);
         ui.advance_cursor_after_rect(area);
-    }
-}
-
-fn distance(context: &ViewContext<'_>, frame: &RankedReference) -> String {
-    match (context.truth(), &frame.world_from_camera) {
-        (Some(truth), Some(pose)) => {
-            let error = PoseError::between(truth, pose);
-            format!("{}, {}", error.translation(), error.rotation())
-        }
-        _ => "–".to_owned(),
     }
 }

@@ -15,21 +15,24 @@ use std::sync::Arc;
 use eframe::egui_wgpu::RenderState;
 use egui::containers::menu::{MenuButton, MenuConfig};
 use egui::{
-    Align, Layout, PointerButton, PopupCloseBehavior, Rect, Response, Role, Sense, Ui, UiBuilder,
-    Vec2, WidgetInfo,
+    Align, Layout, PointerButton, PopupCloseBehavior, Rect, Response, Sense, Ui, UiBuilder, Vec2,
 };
 use nalgebra::Point3;
 
 use super::View;
+use super::features::FeatureProgress;
+use super::legend::name_picture;
+use super::memo::{Memo, Same};
 use super::surface::scale::{Scale, number};
 use super::surface::search::Search;
 use crate::app::{ViewContext, theme};
+use crate::grid::ScoredLattice;
+use crate::problem::ReferenceTuple;
+use crate::render::RenderParams;
 use cameras::{CameraKind, SceneCamera};
-use cloud::PreparedCloud;
 use gpu::{Frame, Painter, Points};
-use ground::Cell;
 use orbit::Orbit;
-use rays::{LiftedFeatures, Rays};
+use rays::Rays;
 use scene_geometry::SceneGeometry;
 use view_camera::ViewCamera;
 
@@ -45,24 +48,35 @@ enum Eye {
     Through(CameraKind),
 }
 
-/// What of the scene is shown.
-struct Layers {
-    cloud: bool,
-    cost: bool,
-    path: bool,
-    rays: bool,
-    grid: bool,
+/// A part of the scene that can be hidden.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Layer {
+    Cloud,
+    Cost,
+    Path,
+    Rays,
+    Grid,
 }
+
+/// The layers with their names.
+const LAYERS: [(Layer, &str); 5] = [
+    (Layer::Cloud, "Cloud"),
+    (Layer::Cost, "Cost on the ground"),
+    (Layer::Path, "Way of the search"),
+    (Layer::Rays, "Rays to lifted points"),
+    (Layer::Grid, "Grid"),
+];
 
 /// The view of the scene in 3-D.
 pub struct SpaceView {
     /// `None` without a graphics card.
     painter: Option<Painter>,
-    layers: Layers,
+    hidden: Vec<Layer>,
     eye: Eye,
     /// The shape of the pane.
     height_over_width: f32,
-    cloud: Option<PreparedCloud>,
+    /// The points of a reference's cloud.
+    cloud: Memo<(Same<ReferenceTuple>, SceneGeometry, RenderParams), Arc<Points>>,
     /// The points of an empty cloud.
     nothing: Arc<Points>,
 }
@@ -73,24 +87,27 @@ struct SceneContent<'a> {
     cameras: Vec<SceneCamera>,
     rays: Rays,
     search: Option<Search<'a>>,
-    cells: Vec<Cell>,
     scale: Option<Scale>,
 }
 
 impl<'a> SceneContent<'a> {
     fn at(context: &ViewContext<'a>) -> Option<Self> {
         let geometry = SceneGeometry::of(context)?;
-        let features = LiftedFeatures::at(context);
+        let features = FeatureProgress::at(context);
         let search = Search::at(context, context.direct_method());
         let selected = context.options.selected_feature;
         Some(Self {
-            cameras: cameras::cameras(context, &geometry, &features, search.as_ref()),
+            cameras: cameras::cameras(context, &geometry, search.as_ref()),
             rays: rays::rays(&geometry, &features, selected),
-            cells: search.as_ref().map_or(Vec::new(), ground::cells),
             scale: search.as_ref().map(|search| Scale::of(context.run, search)),
             geometry,
             search,
         })
+    }
+
+    /// The cost map on the ground.
+    fn lattices(&self) -> Vec<&ScoredLattice> {
+        self.search.as_ref().map_or(Vec::new(), ground::lattices)
     }
 }
 
@@ -99,10 +116,10 @@ impl SpaceView {
     pub fn new(state: Option<&RenderState>) -> Self {
         Self {
             painter: state.map(Painter::new),
-            layers: Layers { cloud: true, cost: true, path: true, rays: true, grid: true },
+            hidden: Vec::new(),
             eye: Eye::default(),
             height_over_width: 1.0,
-            cloud: None,
+            cloud: Memo::default(),
             nothing: Arc::default(),
         }
     }
@@ -137,6 +154,10 @@ impl View for SpaceView {
 }
 
 impl SpaceView {
+    fn shows(&self, layer: Layer) -> bool {
+        !self.hidden.contains(&layer)
+    }
+
     fn pane(&mut self, ui: &mut Ui, context: &ViewContext<'_>, content: &SceneContent<'_>) {
         let size = ui.available_size().max(Vec2::splat(60.0));
         let (pane, response) = ui.allocate_exact_size(size, Sense::click_and_drag());
@@ -147,12 +168,12 @@ impl SpaceView {
         let points = self.points(context, &content.geometry);
         let count = points.len();
         self.draw(ui, pane, content, &view_camera, points);
-        let cost = self.layers.cost && !content.cells.is_empty();
+        let cost = self.shows(Layer::Cost) && !content.lattices().is_empty();
         let ends = content.scale.as_ref().and_then(Scale::cost_ends);
         let method = content.search.as_ref().map(|search| search.method.label());
         let cost = method.as_deref().zip(ends.filter(|_| cost));
         let no_rays = Rays::default();
-        let rays = if self.layers.rays { &content.rays } else { &no_rays };
+        let rays = if self.shows(Layer::Rays) { &content.rays } else { &no_rays };
         labels::legend(ui, pane, cost, rays);
         let headline = self.headline(&view_camera, &response, content);
         labels::headline(ui, pane, &headline);
@@ -160,10 +181,7 @@ impl SpaceView {
             self.eye = Eye::Through(kind);
         }
         self.menu(ui, pane, content);
-        response.widget_info(|| {
-            let words = format!("3-D view of {count} points. {headline}");
-            WidgetInfo::labeled(Role::Image, true, words)
-        });
+        name_picture(&response, format!("3-D view of {count} points. {headline}"));
     }
 
     /// The menu in the upper right corner.
@@ -191,12 +209,13 @@ impl SpaceView {
                 }
             }
             ui.separator();
-            let Layers { cloud, cost, path, rays, grid } = &mut self.layers;
-            ui.checkbox(cloud, "Cloud");
-            ui.checkbox(cost, "Cost on the ground");
-            ui.checkbox(path, "Way of the search");
-            ui.checkbox(rays, "Rays to lifted points");
-            ui.checkbox(grid, "Grid");
+            for (layer, name) in LAYERS {
+                let mut is_shown = self.shows(layer);
+                if ui.checkbox(&mut is_shown, name).changed() {
+                    self.hidden.retain(|hidden| *hidden != layer);
+                    self.hidden.extend((!is_shown).then_some(layer));
+                }
+            }
         });
     }
 
@@ -272,16 +291,13 @@ impl SpaceView {
 
     /// The points of the cloud, prepared once.
     fn points(&mut self, context: &ViewContext<'_>, geometry: &SceneGeometry) -> Arc<Points> {
-        let Some(problem) = context.problem().filter(|_| self.layers.cloud) else {
+        let Some(problem) = context.problem().filter(|_| self.shows(Layer::Cloud)) else {
             return Arc::clone(&self.nothing);
         };
         let (reference, params) = (&problem.reference, &context.run.params.render);
-        let known = self.cloud.take();
-        let known = known.filter(|cloud| cloud.is(geometry, reference, params));
-        let cloud = known.unwrap_or_else(|| PreparedCloud::new(geometry, reference, params));
-        let points = Arc::clone(&cloud.points);
-        self.cloud = Some(cloud);
-        points
+        let key = (Same(Arc::clone(reference)), *geometry, params.clone());
+        let points = || Arc::new(cloud::points(geometry, reference, params));
+        Arc::clone(self.cloud.get(key, points))
     }
 
     /// Draws all but marks and labels of cameras.
@@ -296,20 +312,22 @@ impl SpaceView {
         let (visuals, geometry) = (ui.visuals(), &content.geometry);
         let mut lines = Vec::new();
         let mut metres = Vec::new();
-        if self.layers.grid {
+        if self.shows(Layer::Grid) {
             let text = visuals.text_color();
             let [pale, strong] = [0.25, 0.6].map(|share| text.gamma_multiply(share));
             (lines, metres) = ground::grid(geometry, pale, strong);
         }
         let faces = match &content.scale {
-            Some(scale) if self.layers.cost => ground::faces(geometry, &content.cells, scale),
+            Some(scale) if self.shows(Layer::Cost) => {
+                ground::faces(geometry, &content.lattices(), scale)
+            }
             _ => Vec::new(),
         };
-        if let Some(search) = content.search.as_ref().filter(|_| self.layers.path) {
+        if let Some(search) = content.search.as_ref().filter(|_| self.shows(Layer::Path)) {
             let color = theme::method(search.method);
             lines.extend(ground::path(geometry, &search.way, color));
         }
-        if self.layers.rays {
+        if self.shows(Layer::Rays) {
             lines.extend_from_slice(&content.rays.lines);
         }
         for camera in &content.cameras {
@@ -352,11 +370,10 @@ impl SpaceView {
             (place.coords.norm() < 3.0 * geometry.radius_m).then_some(place)
         });
         if let Some(place) = under {
-            let cell = ground::cell_at(&content.cells, place.x, place.z);
-            let cell = cell.filter(|_| self.layers.cost);
+            let cell = self.shows(Layer::Cost).then(|| content.lattices());
+            let cell = cell.and_then(|lattices| ground::cell_at(&lattices, place.x, place.z));
             let (what, [right_m, forward_m]) = match cell {
-                Some(cell) => {
-                    let Cell { offset, cost, .. } = cell;
+                Some((offset, cost)) => {
                     let cost = cost.map(|cost| format!("cost {}", number(cost)));
                     let what = cost.unwrap_or_else(|| "below the coverage floor".to_owned());
                     (what, [offset.right_m, offset.forward_m])

@@ -5,11 +5,12 @@ mod mode;
 
 use std::time::Duration;
 
-use egui::{Color32, Role, Sense, TextureHandle, Ui, Vec2, WidgetInfo, vec2};
+use egui::{Color32, Sense, TextureHandle, Ui, Vec2, vec2};
 
 use self::mode::Mode;
 use super::View;
 use super::canvas::{self, PanZoom};
+use super::legend::name_picture;
 use crate::app::textures::color_image;
 use crate::app::{Command, ShownView, ViewContext};
 use crate::event::Side;
@@ -120,8 +121,7 @@ impl SynthesisView {
         };
         let name = mode.name(method).to_lowercase();
         let response = ui.allocate_rect(area, Sense::click_and_drag());
-        let spoken = format!("{} picture: {name}", method.label());
-        response.widget_info(|| WidgetInfo::labeled(Role::Image, true, &spoken));
+        name_picture(&response, format!("{} picture: {name}", method.label()));
 
         let query = gray_query(ui, context, problem);
         // At the top, below its legend.
@@ -199,17 +199,12 @@ fn caption(
 /// The place of the cost between that of shuffled pixels and that of the truth; for both methods
 /// where a pose of one's own was tried.
 fn costs(ui: &mut Ui, context: &ViewContext<'_>, method: Method, shown: &ShownView) {
-    let probe = context.looking_at().and_then(|_| context.probe());
-    match probe {
+    match context.looking_at().and_then(|_| context.probe()) {
         Some(probe) => {
             for (method, comparison) in &probe.comparisons {
-                let bounds = context.cost_bounds(*method);
-                cost_bar::ui(ui, *method, &bounds, comparison.score.cost);
+                cost_bar::ui(ui, context, *method, comparison.score.cost);
             }
         }
-        None => {
-            let bounds = context.cost_bounds(method);
-            cost_bar::ui(ui, method, &bounds, shown.comparison.score.cost);
-        }
+        None => cost_bar::ui(ui, context, method, shown.comparison.score.cost),
     }
 }

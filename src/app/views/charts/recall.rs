@@ -6,6 +6,7 @@ use egui::Ui;
 use egui_plot::{Legend, Line, LineStyle, Plot, VLine};
 
 use super::Chosen;
+use crate::app::views::legend::name_picture;
 use crate::app::{ViewContext, theme};
 use crate::diagnosis::Tolerance;
 use crate::localize::QueryResult;
@@ -76,10 +77,7 @@ pub(super) fn ui(ui: &mut Ui, context: &ViewContext<'_>, results: &[Chosen<'_>],
                 }
             }
         });
-    plot.response.widget_info(|| {
-        let words = format!("Recall. {words}");
-        egui::WidgetInfo::labeled(egui::Role::Image, true, words)
-    });
+    name_picture(&plot.response, format!("Recall. {words}"));
 }
 
 /// The share \[%\] of `all` results within each tolerance, as a line of steps. The tolerances that results

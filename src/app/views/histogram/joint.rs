@@ -6,6 +6,7 @@ use egui::{Color32, Rect, Stroke, Ui};
 use egui_plot::{GridInput, GridMark, Plot, PlotImage, PlotPoint};
 
 use crate::app::ViewContext;
+use crate::app::views::legend::name_picture;
 use crate::app::views::readout::Readout;
 use crate::cost::JointHistogram;
 use crate::cost::Similarity;
@@ -68,12 +69,14 @@ pub(super) fn ui(
             let size = [GREYS as f32; 2];
             plot.add(PlotImage::new("bins", texture.id(), middle, size));
         });
-    let name = format!(
-        "Joint histogram of {} pairs in {} bins per axis",
-        histogram.counts.iter().sum::<u32>(),
-        histogram.bins
+    name_picture(
+        &answer.response,
+        format!(
+            "Joint histogram of {} pairs in {} bins per axis",
+            histogram.counts.iter().sum::<u32>(),
+            histogram.bins
+        ),
     );
-    answer.response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, &name));
     let pointed_at = answer.response.hover_pos().and_then(|at| {
         let point = answer.transform.value_from_position(at);
         bin_at(histogram, point.x, point.y)

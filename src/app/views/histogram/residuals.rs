@@ -4,7 +4,7 @@ use egui::Ui;
 use egui_plot::{Bar, BarChart, HoverPosition, LineStyle, Plot, VLine};
 
 use crate::app::theme;
-use crate::app::views::legend::swatch;
+use crate::app::views::legend::{name_picture, swatch};
 use crate::cost::{IntensityPair, PhotometricWeights};
 use crate::method::Method;
 use crate::render::Comparison;
@@ -43,8 +43,7 @@ pub(super) fn ui(ui: &mut Ui, method: Method, shown: &Comparison, weights: &Phot
                 plot.vline(line.style(LineStyle::dashed_loose()).allow_hover(false));
             }
         });
-    let name = format!("Residuals of {} pixels", shown.pairs.len());
-    answer.response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, &name));
+    name_picture(&answer.response, format!("Residuals of {} pixels", shown.pairs.len()));
     let kept = weights.counted.iter().filter(|counted| **counted).count();
     let left_out = weights.counted.len() - kept;
     ui.horizontal_wrapped(|ui| {

@@ -2,15 +2,15 @@
 
 use std::sync::Arc;
 
-use egui::{
-    Button, Color32, Grid, Rect, Role, Sense, TextureHandle, Ui, UiBuilder, Vec2, WidgetInfo, vec2,
-};
+use egui::{Button, Color32, Grid, Rect, Sense, TextureHandle, Ui, UiBuilder, Vec2, vec2};
 use nalgebra::Point2;
 
 use super::marks::{color, draw_truth, mark, position};
-use super::progress::{FeatureProgress, UNDECIDED, error_px, name};
 use super::truth::TrueMatch;
 use crate::app::views::canvas::Placement;
+use crate::app::views::features::{FeatureProgress, UNDECIDED, error_px, name};
+use crate::app::views::legend::name_picture;
+use crate::app::views::memo::{Memo, Same};
 use crate::app::views::mesh_painter::MeshPainter;
 use crate::app::{Command, ViewContext, theme};
 use crate::features::{FeatureState, Keypoint};
@@ -31,7 +31,7 @@ const LEAST_HALF_PATCH_PX: f32 = 16.0;
 /// The LiDAR points around the keypoint that was shown last.
 #[derive(Default)]
 pub(super) struct Detail {
-    seen: Option<(Arc<ReferenceTuple>, Point2<f64>, Vec<SeenPoint>)>,
+    seen: Memo<(Same<ReferenceTuple>, Point2<f64>), Vec<SeenPoint>>,
 }
 
 /// A point of the scan: its pixel in the reference \[px\] and its depth \[m\].
@@ -52,7 +52,7 @@ pub(super) struct Subject<'a> {
 impl Subject<'_> {
     fn reference(&self) -> Option<&Keypoint> {
         let found = self.progress.matched(self.feature)?;
-        self.progress.reference().get(found.reference)
+        self.progress.reference.get(found.reference)
     }
 
     /// The numbers of the match, each with its name.
@@ -111,7 +111,7 @@ impl Detail {
     }
 
     fn patches(&mut self, ui: &mut Ui, subject: &Subject<'_>) {
-        let query = &subject.progress.query()[subject.feature];
+        let query = &subject.progress.query[subject.feature];
         let reference = subject.reference();
         // The same number of scales in both, so that a true match looks the same.
         let least = reference.map_or(query.scale, |other| other.scale.min(query.scale));
@@ -144,12 +144,8 @@ impl Detail {
         pixel: &Point2<f64>,
         at: &Placement,
     ) {
-        let known = self.seen.take();
-        let known = known.filter(|(of, around, _)| Arc::ptr_eq(of, tuple) && around == pixel);
-        let (_, _, seen) = self.seen.insert(known.unwrap_or_else(|| {
-            let seen = lidar_around(tuple, pixel, LIDAR_RADIUS_PX);
-            (Arc::clone(tuple), *pixel, seen)
-        }));
+        let key = (Same(Arc::clone(tuple)), *pixel);
+        let seen = self.seen.get(key, || lidar_around(tuple, pixel, LIDAR_RADIUS_PX));
         let radius = (0.35 * at.scale).clamp(1.5, 4.0);
         for (rank, (pixel, depth_m)) in seen.iter().enumerate() {
             let place = at.on_screen(pixel.cast::<f32>().into());
@@ -204,7 +200,7 @@ fn patch(
     photo: &TextureHandle,
 ) -> Placement {
     let (rect, response) = ui.allocate_exact_size(Vec2::splat(PATCH), Sense::hover());
-    response.widget_info(|| WidgetInfo::labeled(Role::Image, true, name));
+    name_picture(&response, name);
     response.on_hover_text(format!(
         "{name}: scale {:.1} px; the crosshair reaches as far as the descriptor. Dots are LiDAR points by depth",
         keypoint.scale

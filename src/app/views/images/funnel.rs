@@ -3,8 +3,8 @@
 use egui::{Align2, Role, Sense, Stroke, Ui, WidgetInfo, pos2, vec2};
 
 use super::marks::{color, mark};
-use super::progress::{KINDS, UNDECIDED, name};
 use crate::app::theme;
+use crate::app::views::features::{KINDS, UNDECIDED, name};
 use crate::app::views::mesh_painter::MeshPainter;
 
 /// Height of the chips \[points\].

@@ -3,10 +3,10 @@
 use egui::Color32;
 use nalgebra::Point2;
 
-use super::progress::UNDECIDED;
 use super::truth::TrueMatch;
 use crate::app::theme;
 use crate::app::views::canvas::Placement;
+use crate::app::views::features::UNDECIDED;
 use crate::app::views::mesh_painter::{MarkShape, MeshPainter};
 use crate::camera::Intrinsics;
 use crate::features::Keypoint;

@@ -2,12 +2,13 @@
 
 use std::sync::Arc;
 
-use egui::{Color32, Rect, Response, Role, Sense, TextureHandle, Ui, Vec2, WidgetInfo, pos2, vec2};
+use egui::{Color32, Rect, Response, Sense, TextureHandle, Ui, Vec2, pos2, vec2};
 
 use super::GAP;
 use crate::app::ViewContext;
 use crate::app::textures::color_image;
 use crate::app::views::canvas::{self, PanZoom, Placement};
+use crate::app::views::legend::name_picture;
 use crate::image::Photo;
 use crate::picture;
 
@@ -41,7 +42,7 @@ impl PhotoPair {
         let over = [0, 1].map(|side| {
             let id = ui.scope_id().with(("photo", side));
             let response = ui.interact(before[side].visible(), id, Sense::click_and_drag());
-            response.widget_info(|| WidgetInfo::labeled(Role::Image, true, &names[side]));
+            name_picture(&response, names[side].as_str());
             pan_zoom.handle_input(ui, &response, &before[side]);
             response
         });

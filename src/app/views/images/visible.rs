@@ -3,9 +3,9 @@
 use egui::{Color32, Pos2};
 
 use super::marks::{color, mark, position};
-use super::progress::{FeatureProgress, INLIER, KINDS, UNDECIDED};
 use crate::app::theme;
 use crate::app::views::canvas::Placement;
+use crate::app::views::features::{FeatureProgress, INLIER, KINDS, UNDECIDED};
 use crate::app::views::mesh_painter::{MarkShape, MeshPainter};
 
 /// How near the pointer must be \[points\].
@@ -40,7 +40,7 @@ impl VisibleFeatures {
         is_false: impl Fn(usize) -> bool,
     ) -> Self {
         let mut all = Vec::new();
-        let mut is_matched = vec![false; progress.reference().len()];
+        let mut is_matched = vec![false; progress.reference.len()];
         for layer in LAYERS {
             let of_layer = (0..kinds.len()).filter(|&feature| kinds[feature] == layer);
             for feature in of_layer.filter(|&feature| is_shown(feature)) {
@@ -49,10 +49,8 @@ impl VisibleFeatures {
                 if let Some(index) = there {
                     is_matched[index] = true;
                 }
-                let keypoints = [
-                    Some(&progress.query()[feature]),
-                    there.map(|index| &progress.reference()[index]),
-                ];
+                let keypoints =
+                    [Some(&progress.query[feature]), there.map(|index| &progress.reference[index])];
                 let ends = [0, 1].map(|side| {
                     let end = at[side].on_screen(position(keypoints[side]?));
                     at[side].visible().contains(end).then_some(end)
@@ -141,7 +139,7 @@ impl VisibleFeatures {
             (MarkShape::Disc, 1.3, color(0))
         };
         let color = color.gamma_multiply(strength);
-        for (keypoint, is_matched) in progress.reference().iter().zip(&self.is_matched) {
+        for (keypoint, is_matched) in progress.reference.iter().zip(&self.is_matched) {
             let place = at.on_screen(position(keypoint));
             if !is_matched && at.visible().contains(place) {
                 mesh.mark(mark, place, radius, color);

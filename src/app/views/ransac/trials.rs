@@ -12,10 +12,8 @@ const STRETCHES: usize = 400;
 pub(super) struct Trials {
     pub(super) likelihood: Series,
     pub(super) inliers: Series,
-    /// Logarithm to base ten of the trials needed, as steps over the trials.
-    pub(super) needed_steps: Vec<[f64; 2]>,
-    /// Logarithm to base ten of the trials made, by trial.
-    pub(super) made_curve: Vec<[f64; 2]>,
+    /// Logarithm to base ten of the trials needed by the best.
+    pub(super) needed_series: Series,
     /// Samples for which the solver had no pose.
     pub(super) without_pose: usize,
     /// The best trial: that whose hypothesis was refined last.
@@ -30,8 +28,10 @@ pub(super) struct Trials {
 pub(super) struct Series {
     /// Some of the hypotheses: `[trial, value]`.
     pub(super) points: Vec<[f64; 2]>,
-    /// The best so far as steps.
+    /// That of the best so far, as steps.
     pub(super) best: Vec<[f64; 2]>,
+    /// Logarithm to base ten of the trials made, by trial, beside those needed.
+    pub(super) made: Vec<[f64; 2]>,
 }
 
 impl Trials {
@@ -60,21 +60,22 @@ impl Trials {
             }
             if trial.is_best || all.last.is_none() {
                 let needed = (trial.trials_needed.max(1) as f64).log10();
-                step(&mut all.needed_steps, x, needed);
+                step(&mut all.needed_series.best, x, needed);
             }
             all.records.push(start + at);
             all.last = Some(*trial);
         }
         if let Some(last) = &all.last {
             let x = last.index as f64;
-            let curves = [&mut all.likelihood.best, &mut all.inliers.best, &mut all.needed_steps];
+            let curves =
+                [&mut all.likelihood.best, &mut all.inliers.best, &mut all.needed_series.best];
             for curve in curves {
                 if let Some(&[_, value]) = curve.last() {
                     curve.push([x, value]);
                 }
             }
             const STEPS: usize = 100;
-            all.made_curve = (0..=STEPS)
+            all.needed_series.made = (0..=STEPS)
                 .map(|step| x * step as f64 / STEPS as f64)
                 .map(|x| [x, (x + 1.0).log10()])
                 .collect();
@@ -99,12 +100,13 @@ impl Trials {
         self.last.as_ref()
     }
 
-    /// The record of the trial whose point is nearest by `distance`.
+    /// The record of the trial whose point is nearest by `distance`; without points the corners of the line count.
     pub(super) fn nearest(
         &self,
-        points: &[[f64; 2]],
+        series: &Series,
         distance: impl Fn([f64; 2]) -> f32,
     ) -> Option<usize> {
+        let points = if series.points.is_empty() { &series.best } else { &series.points };
         let nearest = points.iter().min_by(|a, b| distance(**a).total_cmp(&distance(**b)))?;
         self.records.get(nearest[0] as usize).copied()
     }

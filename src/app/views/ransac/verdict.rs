@@ -1,31 +1,37 @@
 //! In words: the sample at the cursor, the refined pose, the test of it.
 
 use egui::{Grid, RichText, Ui};
-use nalgebra::{Point2, Point3};
 
 use super::trials::Trials;
+use crate::app::views::features::{FeatureProgress, residual_px};
 use crate::app::{Command, ViewContext};
 use crate::depth::LiftedMatch;
-use crate::event::{ConsensusJudged, DepthsLifted, FeaturesDetected, PoseRefined, Side};
-use crate::geometry::Pose;
+use crate::event::{ConsensusJudged, DepthsLifted, PoseRefined};
+use crate::features::Keypoint;
 use crate::localize::Status;
 use crate::robust::{AcceptanceRule, Counted, Hypothesis, Trial};
 use crate::session::Span;
 
-/// Draws what is known at the end of the records that are shown.
-pub(super) fn ui(ui: &mut Ui, context: &ViewContext<'_>, span: &Span, end: usize, trials: &Trials) {
+/// Draws what is known at the cursor of a part.
+pub(super) fn ui(
+    ui: &mut Ui,
+    context: &ViewContext<'_>,
+    span: &Span,
+    cursor: usize,
+    trials: &Trials,
+) {
     ui.separator();
     if let Some(trial) = trials.at_cursor() {
-        sample(ui, context, span, end, trial);
+        sample(ui, context, span, cursor, trial);
     }
-    if let Some(refined) = context.run.latest_in::<PoseRefined>(span, end - 1) {
+    if let Some(refined) = context.run.latest_in::<PoseRefined>(span, cursor) {
         ui.separator();
         refinement(ui, refined, trials.best.as_ref());
     }
-    if let Some(judged) = context.run.latest_in::<ConsensusJudged>(span, end - 1) {
-        acceptance(ui, context, span, judged);
+    if let Some(judged) = context.run.latest_in::<ConsensusJudged>(span, cursor) {
+        acceptance(ui, context, judged);
     } else if let Some(result) = &span.result
-        && end == span.records.end
+        && cursor + 1 >= span.records.end
         && result.status == Status::Failed
         && let Some(reason) = &result.reason
     {
@@ -33,7 +39,7 @@ pub(super) fn ui(ui: &mut Ui, context: &ViewContext<'_>, span: &Span, end: usize
     }
 }
 
-fn sample(ui: &mut Ui, context: &ViewContext<'_>, span: &Span, end: usize, trial: &Trial) {
+fn sample(ui: &mut Ui, context: &ViewContext<'_>, span: &Span, cursor: usize, trial: &Trial) {
     let score = |hypothesis: &Option<Hypothesis>| match hypothesis {
         Some(Hypothesis { score, .. }) => format!(
             "log likelihood {:.1}, {} inliers, share of true matches {:.2}",
@@ -51,12 +57,12 @@ fn sample(ui: &mut Ui, context: &ViewContext<'_>, span: &Span, end: usize, trial
         ui.label(score(&trial.best));
         ui.end_row();
     });
-    let Some(lifted) = context.run.latest_in::<DepthsLifted>(span, end - 1) else {
+    let Some(lifted) = context.run.latest_in::<DepthsLifted>(span, cursor) else {
         return;
     };
     let correspondences: Vec<&LiftedMatch> =
         lifted.matches.iter().filter(|lifted| lifted.point.is_some()).collect();
-    let features = SampleKeypoints::of(context, span, end);
+    let features = FeatureProgress::of(context, span, cursor);
     Grid::new("sample").striped(true).show(ui, |ui| {
         let columns =
             ["sample", "query [px]", "reference [px]", "depth [m]", "here [px]", "best [px]"];
@@ -79,71 +85,31 @@ fn sample(ui: &mut Ui, context: &ViewContext<'_>, span: &Span, end: usize, trial
     ui.weak("here, best: reprojection errors of this hypothesis and of the best so far");
 }
 
-/// The keypoints that a sample's indices refer to.
-struct SampleKeypoints<'a> {
-    query: Option<&'a FeaturesDetected>,
-    reference: Option<&'a FeaturesDetected>,
-}
-
-impl<'a> SampleKeypoints<'a> {
-    fn of(context: &ViewContext<'a>, span: &Span, end: usize) -> Self {
-        let records = context.run.records().get(span.records.start..end);
-        let of = |side: Side| {
-            let mut detected = records.unwrap_or_default().iter().filter_map(|record| {
-                let detected: &FeaturesDetected =
-                    crate::event::DebugEvent::from_event(&record.event)?;
-                (detected.side == side).then_some(detected)
-            });
-            detected.next()
-        };
-        Self { query: of(Side::Query), reference: of(Side::Reference) }
-    }
-
-    fn pixel(detected: Option<&FeaturesDetected>, index: usize) -> Option<Point2<f64>> {
-        let keypoint = detected?.features.keypoints.get(index)?;
-        Some(keypoint.pixel())
-    }
-}
-
 fn row(
     ui: &mut Ui,
     context: &ViewContext<'_>,
-    features: &SampleKeypoints<'_>,
+    features: &FeatureProgress<'_>,
     lifted: &LiftedMatch,
     trial: &Trial,
 ) {
-    let seen = SampleKeypoints::pixel(features.query, lifted.query);
-    let pixel = |pixel: Option<Point2<f64>>| {
-        pixel.map_or("–".to_owned(), |p| format!("({:.0}, {:.0})", p.x, p.y))
-    };
-    ui.label(pixel(seen));
-    ui.label(pixel(SampleKeypoints::pixel(features.reference, lifted.reference)));
-    let Some(point) = lifted.point else { return };
+    let seen = features.query.get(lifted.query);
+    for keypoint in [seen, features.reference.get(lifted.reference)] {
+        let words = |at: &Keypoint| format!("({:.0}, {:.0})", at.x, at.y);
+        ui.label(keypoint.map_or("–".to_owned(), words));
+    }
+    let (Some(point), Some(problem)) = (lifted.point, context.problem()) else { return };
     ui.label(format!("{:.1}", point.z));
+    let inlier_px = context.run.params.fb.mlesac.inlier_threshold_px;
     for hypothesis in [&trial.hypothesis, &trial.best] {
-        let error = hypothesis
-            .as_ref()
-            .zip(seen)
-            .and_then(|(hypothesis, seen)| residual_px(context, &hypothesis.pose, &point, &seen));
-        let inlier_px = context.run.params.fb.mlesac.inlier_threshold_px;
+        let error = hypothesis.as_ref().zip(seen).and_then(|(hypothesis, seen)| {
+            residual_px(&problem.query.intrinsics, &hypothesis.pose, &point, seen)
+        });
         ui.label(match error {
             Some(error) if error <= inlier_px => format!("{error:.1} inlier"),
             Some(error) => format!("{error:.1} outlier"),
             None => "–".to_owned(),
         });
     }
-}
-
-/// The reprojection error of a point \[px\]; `None` behind the camera.
-fn residual_px(
-    context: &ViewContext<'_>,
-    camera_from_points: &Pose,
-    point: &Point3<f64>,
-    seen: &Point2<f64>,
-) -> Option<f64> {
-    let intrinsics = &context.problem()?.query.intrinsics;
-    let projected = intrinsics.project(&(camera_from_points * point))?;
-    Some((projected - seen).norm())
 }
 
 fn refinement(ui: &mut Ui, refined: &PoseRefined, best: Option<&Trial>) {
@@ -159,7 +125,7 @@ fn refinement(ui: &mut Ui, refined: &PoseRefined, best: Option<&Trial>) {
     ));
 }
 
-fn acceptance(ui: &mut Ui, context: &ViewContext<'_>, span: &Span, judged: &ConsensusJudged) {
+fn acceptance(ui: &mut Ui, context: &ViewContext<'_>, judged: &ConsensusJudged) {
     let verdict = if judged.accepted { "Accepted" } else { "Refused" };
     ui.label(RichText::new(verdict).strong());
     let ConsensusJudged { acceptance, counted, distance_m, .. } = judged;
@@ -185,14 +151,7 @@ fn acceptance(ui: &mut Ui, context: &ViewContext<'_>, span: &Span, judged: &Cons
             format!("{inliers} {agreeing} {} 4, the paper's rule", compared(is_met))
         }
     });
-    let Some(problem) = context
-        .run
-        .loaded
-        .as_deref()
-        .and_then(|loaded| loaded.problems.get(span.part.reference()?))
-    else {
-        return;
-    };
+    let Some(problem) = context.problem() else { return };
     let radius_m = problem.uncertainty_radius_m;
     let limit_m = radius_m * (1.0 + params.radius_slack);
     let note = match params.accept {

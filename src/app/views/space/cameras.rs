@@ -3,14 +3,15 @@
 use nalgebra::{Point2, Point3};
 
 use super::gpu::Line;
-use super::rays::LiftedFeatures;
 use super::scene_geometry::{SceneGeometry, spot};
+use crate::app::views::features::FeatureProgress;
 use crate::app::views::legend;
 use crate::app::views::surface::search::Search;
 use crate::app::{ViewContext, theme};
 use crate::camera::Intrinsics;
-use crate::estimator::{self, Parts};
+use crate::estimator;
 use crate::geometry::{Pose, PoseError};
+use crate::grid::Offset;
 use crate::method::Method;
 use crate::palette;
 use crate::place::place;
@@ -36,33 +37,21 @@ impl CameraKind {
         match self {
             Self::Reference => "Reference".to_owned(),
             Self::Truth => "Truth".to_owned(),
-            Self::Estimate(method) => method.name().to_uppercase(),
-            Self::BestSoFar(method) => format!("{}, best so far", method.name().to_uppercase()),
+            Self::Estimate(method) => method.label(),
+            Self::BestSoFar(method) => format!("{}, best so far", method.label()),
             Self::Hand => "In hand".to_owned(),
             Self::Pointer => "Under the pointer".to_owned(),
         }
     }
 
-    /// Frusta at the same place are nested, not on top of each other.
-    fn size(self) -> f64 {
+    /// Its size and the width of its lines. Frusta at the same place are nested, not on top of each other.
+    fn look(self) -> (f64, f32) {
         match self {
-            Self::Reference | Self::Hand => 1.0,
-            Self::Truth => 1.24,
-            Self::Estimate(method) => 1.0 + 0.08 * rank(method) as f64,
-            Self::BestSoFar(_) | Self::Pointer => 0.7,
+            Self::Reference | Self::Hand => (1.0, 2.5),
+            Self::Truth => (1.24, 2.5),
+            Self::Estimate(method) => (1.0 + 0.08 * rank(method) as f64, 2.5),
+            Self::BestSoFar(_) | Self::Pointer => (0.7, 1.0),
         }
-    }
-
-    fn line_width(self) -> f32 {
-        match self {
-            Self::Reference | Self::Truth | Self::Estimate(_) | Self::Hand => 2.5,
-            Self::BestSoFar(_) | Self::Pointer => 1.0,
-        }
-    }
-
-    /// Whether it takes the query photo; the reference camera took the reference photo.
-    pub(super) fn is_query(self) -> bool {
-        self != Self::Reference
     }
 }
 
@@ -76,8 +65,6 @@ fn rank(method: Method) -> usize {
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct SceneCamera {
     pub(super) kind: CameraKind,
-    /// `world_from_camera`.
-    pub(super) world: Pose,
     pub(super) scene_from_camera: Pose,
     pub(super) intrinsics: Intrinsics,
     /// How far the image plane is drawn from the centre \[m\].
@@ -113,7 +100,7 @@ impl SceneCamera {
         let line = |from: Point3<f64>, to: Point3<f64>| Line {
             ends: [spot(&from), spot(&to)],
             color: theme::rgb(self.thing.color()),
-            width: self.kind.line_width(),
+            width: self.kind.look().1,
         };
         let mut lines = vec![line(centre, *foot)];
         for side in 0..4 {
@@ -130,7 +117,6 @@ impl SceneCamera {
 pub(super) fn cameras(
     context: &ViewContext<'_>,
     geometry: &SceneGeometry,
-    features: &LiftedFeatures<'_>,
     search: Option<&Search<'_>>,
 ) -> Vec<SceneCamera> {
     let Some(problem) = context.problem() else {
@@ -155,14 +141,13 @@ pub(super) fn cameras(
         };
         SceneCamera {
             kind,
-            world,
             scene_from_camera: geometry.scene_from_world * world,
-            intrinsics: if kind.is_query() {
-                problem.query.intrinsics
-            } else {
-                problem.reference.intrinsics
+            // The reference camera took the reference photo, all others take the query's.
+            intrinsics: match kind {
+                CameraKind::Reference => problem.reference.intrinsics,
+                _ => problem.query.intrinsics,
             },
-            depth_m: kind.size() * geometry.camera_m(),
+            depth_m: kind.look().0 * geometry.camera_m(),
             about,
             thing,
         }
@@ -174,7 +159,7 @@ pub(super) fn cameras(
             all.push(camera(CameraKind::Estimate(method), pose));
         }
     }
-    all.extend(best_so_far(context, features, search).map(|(method, reference_from_query)| {
+    all.extend(best_so_far(context, search).map(|(method, reference_from_query)| {
         let pose = problem.world_from_query(&reference_from_query);
         camera(CameraKind::BestSoFar(method), pose)
     }));
@@ -190,25 +175,14 @@ fn estimate(context: &ViewContext<'_>, method: Method) -> Option<Pose> {
 }
 
 /// The best pose so far of the estimator at the cursor, in the reference camera's frame, until its end.
-fn best_so_far(
-    context: &ViewContext<'_>,
-    features: &LiftedFeatures<'_>,
-    search: Option<&Search<'_>>,
-) -> Option<(Method, Pose)> {
+fn best_so_far(context: &ViewContext<'_>, search: Option<&Search<'_>>) -> Option<(Method, Pose)> {
     let span = context.span()?;
     if span.result.is_some() && context.cursor + 1 >= span.records.end {
         return None;
     }
     // The search may be of another part of the run.
-    let by_search = search.filter(|search| search.span.part == span.part);
-    let by_search = by_search.and_then(|search| search.way.last());
-    let by_search = by_search.map(|best| best.reference_from_camera());
-    let method = span.part.method()?;
-    let best = match estimator::find(method).map(|entry| &entry.parts) {
-        Some(Parts::Features) => features.reference_from_query,
-        Some(Parts::Hybrid(_)) => by_search.or(features.reference_from_query),
-        Some(Parts::Own(own)) if own.has_features => by_search.or(features.reference_from_query),
-        Some(Parts::Cost(_) | Parts::Own(_)) | None => by_search,
-    };
-    Some((method, best?))
+    let search = search.filter(|search| search.span.part == span.part);
+    let by_search = search.and_then(|search| search.way.last()).map(Offset::reference_from_camera);
+    let by_features = || FeatureProgress::of(context, span, context.cursor).reference_from_query;
+    Some((span.part.method()?, by_search.or_else(by_features)?))
 }

@@ -1,7 +1,5 @@
 //! The reference's cloud in the colours of its photo.
 
-use std::sync::Arc;
-
 use egui::Color32;
 use nalgebra::Point3;
 
@@ -10,43 +8,14 @@ use super::scene_geometry::SceneGeometry;
 use crate::problem::ReferenceTuple;
 use crate::render::{self, RenderParams};
 
-/// A cloud that is ready to be drawn, and what it was made from.
-pub(super) struct PreparedCloud {
-    reference: Arc<ReferenceTuple>,
-    geometry: SceneGeometry,
-    params: RenderParams,
-    pub(super) points: Arc<Points>,
-}
-
-impl PreparedCloud {
-    pub(super) fn new(
-        geometry: &SceneGeometry,
-        reference: &Arc<ReferenceTuple>,
-        params: &RenderParams,
-    ) -> Self {
-        let spots = colored(reference, params).into_iter();
-        let points = Points::new(
-            spots.map(|(point, color)| Spot { at: geometry.spot(&point.cast()), color }),
-        );
-        Self {
-            reference: Arc::clone(reference),
-            geometry: *geometry,
-            params: params.clone(),
-            points: Arc::new(points),
-        }
-    }
-
-    /// Whether it was made from the same.
-    pub(super) fn is(
-        &self,
-        geometry: &SceneGeometry,
-        reference: &Arc<ReferenceTuple>,
-        params: &RenderParams,
-    ) -> bool {
-        Arc::ptr_eq(&self.reference, reference)
-            && self.geometry == *geometry
-            && self.params == *params
-    }
+/// The points of a reference's scan.
+pub(super) fn points(
+    geometry: &SceneGeometry,
+    reference: &ReferenceTuple,
+    params: &RenderParams,
+) -> Points {
+    let spots = colored(reference, params).into_iter();
+    Points::new(spots.map(|(point, color)| Spot { at: geometry.spot(&point.cast()), color }))
 }
 
 /// All points of the scan: those that the photo shows in its colours, the others grey.
@@ -56,14 +25,13 @@ fn colored(reference: &ReferenceTuple, params: &RenderParams) -> Vec<(Point3<f32
     let visible = render::color_cloud(cloud, &photo.gray, intrinsics, params);
     // The visible points are in the order of the scan.
     let mut visible = visible.points.iter().peekable();
-    let color = |point: &Point3<f32>| match visible.next_if(|seen| seen.position == *point) {
+    let mut color = |point: &Point3<f32>| match visible.next_if(|seen| seen.position == *point) {
         Some(seen) => {
             let gray = seen.intensity.round().clamp(0.0, 255.0) as u8;
             photo_color(reference, point).unwrap_or(Color32::from_gray(gray))
         }
         None => UNSEEN,
     };
-    let mut color = color;
     let points = cloud.points.iter();
     points.map(|point| (*point, color(point))).collect()
 }

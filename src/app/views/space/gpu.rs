@@ -10,7 +10,7 @@ mod pipelines;
 #[cfg(test)]
 mod tests;
 
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use eframe::egui_wgpu::{
     Callback, CallbackResources, CallbackTrait, RenderState, ScreenDescriptor,
@@ -22,6 +22,7 @@ use picture::Picture;
 use pipelines::Pipelines;
 
 /// Draws one view's frames. Errors of the graphics card stay inside and can be asked for.
+#[derive(Clone)]
 pub(super) struct Painter {
     /// `Err` says what the device refused.
     pipelines: Arc<Result<Pipelines, String>>,
@@ -39,31 +40,26 @@ impl Painter {
         Self { pipelines: Arc::clone(pipelines), picture: Arc::default() }
     }
 
+    fn picture(&self) -> MutexGuard<'_, Picture> {
+        self.picture.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
     /// Why nothing can be drawn, if so.
     pub(super) fn trouble(&self) -> Option<String> {
-        let picture = self.picture.lock().unwrap_or_else(PoisonError::into_inner);
         let refused = self.pipelines.as_ref().as_ref().err();
-        refused.or(picture.trouble()).cloned()
+        refused.or(self.picture().trouble()).cloned()
     }
 
     /// Puts a frame into the pane.
     pub(super) fn paint(&self, painter: &egui::Painter, rect: Rect, frame: Frame) {
-        painter.add(Callback::new_paint_callback(
-            rect,
-            PaintCallback {
-                pipelines: Arc::clone(&self.pipelines),
-                picture: Arc::clone(&self.picture),
-                rect,
-                frame,
-            },
-        ));
+        let callback = PaintCallback { painter: self.clone(), rect, frame };
+        painter.add(Callback::new_paint_callback(rect, callback));
     }
 }
 
 /// A frame on its way to the screen.
 struct PaintCallback {
-    pipelines: Arc<Result<Pipelines, String>>,
-    picture: Arc<Mutex<Picture>>,
+    painter: Painter,
     rect: Rect,
     frame: Frame,
 }
@@ -85,12 +81,11 @@ impl CallbackTrait for PaintCallback {
         };
         let viewport = info.viewport_in_pixels();
         let size = [viewport.width_px, viewport.height_px].map(|side| side.max(0) as u32);
-        if let Ok(pipelines) = self.pipelines.as_ref()
+        if let Ok(pipelines) = self.painter.pipelines.as_ref()
             && !size.contains(&0)
         {
-            let mut picture = self.picture.lock().unwrap_or_else(PoisonError::into_inner);
             let scale = screen.pixels_per_point;
-            picture.draw(pipelines, device, queue, &self.frame, size, scale);
+            self.painter.picture().draw(pipelines, device, queue, &self.frame, size, scale);
         }
         // Submitted already: an error in it then belongs to this view and not to all of egui.
         Vec::new()
@@ -102,9 +97,8 @@ impl CallbackTrait for PaintCallback {
         pass: &mut wgpu::RenderPass<'static>,
         _resources: &CallbackResources,
     ) {
-        if let Ok(pipelines) = self.pipelines.as_ref() {
-            let picture = self.picture.lock().unwrap_or_else(PoisonError::into_inner);
-            picture.show(pipelines, pass);
+        if let Ok(pipelines) = self.painter.pipelines.as_ref() {
+            self.painter.picture().show(pipelines, pass);
         }
     }
 }

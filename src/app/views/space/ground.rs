@@ -6,7 +6,7 @@ use nalgebra::Point3;
 use super::gpu::{Line, Spot};
 use super::scene_geometry::{SceneGeometry, spot};
 use crate::app::views::surface::scale::{BELOW_FLOOR, Scale};
-use crate::app::views::surface::search::{Search, Searched};
+use crate::app::views::surface::search::{Search, Searched, cell_of};
 use crate::grid::{Offset, Phase, ScoredLattice};
 
 /// The layers above the ground \[m\], so that none hides another.
@@ -14,61 +14,50 @@ const FINE_ABOVE_M: f64 = 0.02;
 const GRID_ABOVE_M: f64 = 0.04;
 const PATH_ABOVE_M: f64 = 0.06;
 
-/// A square of the cost map.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Cell {
-    pub(super) offset: Offset,
-    /// Side of the square \[m\].
-    pub(super) step_m: f64,
-    /// `None` below the coverage floor.
-    pub(super) cost: Option<f64>,
-    /// Height above the ground \[m\].
-    above_m: f64,
-}
-
-/// The cost map at the cursor: the latest coarse positions and the fine ones on top of them.
-pub(super) fn cells(search: &Search<'_>) -> Vec<Cell> {
+/// The lattices of the cost map at the cursor: the latest coarse positions and the fine ones on top of them.
+pub(super) fn lattices<'a>(search: &'a Search<'_>) -> Vec<&'a ScoredLattice> {
     let positions: Vec<&Searched> = search.positions().collect();
     let is_coarse = |searched: &&Searched| searched.phase() == Phase::PositionCoarse;
     // A new round covers the one before.
     let first = positions.iter().rposition(is_coarse).unwrap_or(0);
-    positions[first..].iter().flat_map(|searched| cells_of(&searched.surface)).collect()
+    positions[first..].iter().map(|searched| searched.surface.as_ref()).collect()
 }
 
-fn cells_of(surface: &ScoredLattice) -> impl Iterator<Item = Cell> {
-    let lattice = &surface.lattice;
-    let is_fine = lattice.phase == Phase::PositionFine;
-    let scored = lattice.hypotheses().filter(|(cell, _)| surface.scores[*cell].is_some());
-    scored.map(move |(cell, offset)| Cell {
-        offset,
-        step_m: lattice.step,
-        cost: surface.eligible_cost(cell),
-        above_m: if is_fine { FINE_ABOVE_M } else { 0.0 },
+/// The scored cell at a place of the ground, a fine one before the coarse one below it; and its cost, unless it is
+/// below the coverage floor.
+pub(super) fn cell_at(
+    lattices: &[&ScoredLattice],
+    right_m: f64,
+    forward_m: f64,
+) -> Option<(Offset, Option<f64>)> {
+    lattices.iter().rev().find_map(|surface| {
+        let cell = cell_of(&surface.lattice, right_m, forward_m)?;
+        surface.scores[cell]?;
+        Some((surface.lattice.offset(cell)?, surface.eligible_cost(cell)))
     })
 }
 
-/// The cell at a place of the ground; a fine one before the coarse one below it.
-pub(super) fn cell_at(cells: &[Cell], right_m: f64, forward_m: f64) -> Option<&Cell> {
-    cells.iter().rev().find(|cell| {
-        let right = (right_m - cell.offset.right_m).abs();
-        let forward = (forward_m - cell.offset.forward_m).abs();
-        right.max(forward) <= 0.5 * cell.step_m
-    })
-}
-
-/// The squares in the colours of the cost map, as two triangles each.
-pub(super) fn faces(geometry: &SceneGeometry, cells: &[Cell], scale: &Scale) -> Vec<Spot> {
-    let mut faces = Vec::with_capacity(6 * cells.len());
-    for cell in cells {
-        let half = 0.5 * cell.step_m;
-        let color = cell.cost.map_or(BELOW_FLOOR, |cost| scale.cost(cost));
-        let corners = [(-half, -half), (half, -half), (half, half), (-half, half)];
-        let corners = corners.map(|(right, forward)| {
-            let (x, z) = (cell.offset.right_m + right, cell.offset.forward_m + forward);
-            spot(&geometry.on_ground(x, z, cell.above_m))
-        });
-        let order = [0, 1, 2, 0, 2, 3];
-        faces.extend(order.map(|corner| Spot { at: corners[corner], color }));
+/// The scored cells as squares in the colours of the cost map, as two triangles each.
+pub(super) fn faces(
+    geometry: &SceneGeometry,
+    lattices: &[&ScoredLattice],
+    scale: &Scale,
+) -> Vec<Spot> {
+    let mut faces = Vec::new();
+    for surface in lattices {
+        let ScoredLattice { lattice, scores, .. } = surface;
+        let above_m = if lattice.phase == Phase::PositionFine { FINE_ABOVE_M } else { 0.0 };
+        let half = 0.5 * lattice.step;
+        for (cell, offset) in lattice.hypotheses().filter(|(cell, _)| scores[*cell].is_some()) {
+            let cost = surface.eligible_cost(cell);
+            let color = cost.map_or(BELOW_FLOOR, |cost| scale.cost(cost));
+            let corners = [(-half, -half), (half, -half), (half, half), (-half, half)];
+            let corners = corners.map(|(right, forward)| {
+                let (x, z) = (offset.right_m + right, offset.forward_m + forward);
+                spot(&geometry.on_ground(x, z, above_m))
+            });
+            faces.extend([0, 1, 2, 0, 2, 3].map(|at: usize| Spot { at: corners[at], color }));
+        }
     }
     faces
 }
@@ -140,6 +129,8 @@ pub(super) fn path(geometry: &SceneGeometry, offsets: &[Offset], color: Color32)
 mod tests {
     use super::*;
     use crate::geometry::Pose;
+    use crate::grid::{GridParams, Lattice};
+    use crate::render::Score;
 
     const SITE: f64 = 5.0;
 
@@ -151,24 +142,27 @@ mod tests {
         }
     }
 
-    fn cell(right_m: f64, step_m: f64, cost: Option<f64>) -> Cell {
-        Cell { offset: Offset { right_m, ..Offset::default() }, step_m, cost, above_m: 0.0 }
-    }
-
     #[test]
     fn the_pointer_finds_the_fine_cell_above_the_coarse_one() {
-        let cells = [
-            cell(0.0, 1.0, Some(2.0)),
-            cell(1.0, 1.0, Some(4.0)),
-            cell(2.0, 1.0, None),
-            cell(1.0, 0.2, Some(3.0)),
-        ];
-        let cost_at = |right| cell_at(&cells, right, 0.0).map(|cell| cell.cost);
-        assert_eq!(cost_at(1.05), Some(Some(3.0)));
-        assert_eq!(cost_at(1.3), Some(Some(4.0)));
-        assert_eq!(cost_at(2.0), Some(None));
+        let surface = |phase, cost| {
+            let lattice = Lattice::new(phase, Offset::default(), 3.0, &GridParams::default());
+            let lattice = lattice.expect("small");
+            let mut scores = vec![None; lattice.cells()];
+            for (cell, offset) in lattice.hypotheses() {
+                let covered = if offset.right_m < 2.5 { 9 } else { 1 };
+                scores[cell] = Some(Score { cost: Some(cost), covered });
+            }
+            ScoredLattice { lattice, scores, least_covered: 5 }
+        };
+        let [coarse, fine] =
+            [(Phase::PositionCoarse, 4.0), (Phase::PositionFine, 3.0)].map(|(p, c)| surface(p, c));
+        let cost_at = |right| {
+            cell_at(&[&coarse, &fine], right, 0.0).map(|(offset, cost)| (offset.right_m, cost))
+        };
+        assert_eq!(cost_at(0.05), Some((0.0, Some(3.0))));
+        assert_eq!(cost_at(-2.2), Some((-2.0, Some(4.0))));
+        assert_eq!(cost_at(3.2), Some((3.0, None)));
         assert_eq!(cost_at(9.0), None);
-        assert_eq!(cell_at(&cells, 0.0, 0.6), None);
     }
 
     #[test]

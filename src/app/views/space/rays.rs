@@ -5,64 +5,9 @@ use nalgebra::Point3;
 
 use super::gpu::Line;
 use super::scene_geometry::SceneGeometry;
-use crate::app::{ViewContext, theme};
-use crate::depth::LiftedMatch;
-use crate::event::Event;
+use crate::app::theme;
+use crate::app::views::features::FeatureProgress;
 use crate::features::FeatureState;
-use crate::geometry::Pose;
-use crate::method::Method;
-use crate::session::Run;
-
-/// The matches that FB lifts into space, and the camera that it finds with them.
-#[derive(Default)]
-pub(super) struct LiftedFeatures<'a> {
-    lifted: &'a [LiftedMatch],
-    states: Option<&'a [FeatureState]>,
-    /// The best pose so far: that of MLESAC, then the refined one.
-    pub(super) reference_from_query: Option<Pose>,
-}
-
-impl<'a> LiftedFeatures<'a> {
-    /// From the estimator at the cursor, if it lifts matches; else from FB's part.
-    pub(super) fn at(context: &ViewContext<'a>) -> Self {
-        let here = if context.is_inside_hybrid(Method::FB) {
-            Self::until(context.run, context.cursor)
-        } else {
-            Self::default()
-        };
-        if !here.lifted.is_empty() {
-            return here;
-        }
-        match context.part_of(Method::FB) {
-            Some((_, cursor)) => Self::until(context.run, cursor),
-            None => here,
-        }
-    }
-
-    /// What the estimator at a cursor reported up to there.
-    fn until(run: &'a Run, cursor: usize) -> Self {
-        let mut features = Self::default();
-        let start = run.span_at(cursor).map_or(cursor, |span| span.records.start);
-        let records = run.records().get(start..=cursor).unwrap_or_default();
-        for record in records {
-            match &record.event {
-                Event::DepthsLifted(event) => features.lifted = &event.matches,
-                Event::MatchesGuided(event) => features.lifted = &event.matches,
-                Event::FeaturesClassified(event) => features.states = Some(&event.states),
-                Event::HypothesisTried(event) => {
-                    if let Some(best) = &event.trial.best {
-                        features.reference_from_query = Some(best.pose.inverse());
-                    }
-                }
-                Event::PoseRefined(event) => {
-                    features.reference_from_query = Some(event.reference_from_query);
-                }
-                _ => {}
-            }
-        }
-        features
-    }
-}
 
 /// The rays, and how many of each kind.
 #[derive(Default)]
@@ -77,7 +22,7 @@ pub(super) struct Rays {
 /// Rays of outliers are dashed. `selected` is drawn broad.
 pub(super) fn rays(
     geometry: &SceneGeometry,
-    features: &LiftedFeatures<'_>,
+    features: &FeatureProgress<'_>,
     selected: Option<usize>,
 ) -> Rays {
     let centre = match &features.reference_from_query {

@@ -1,11 +1,11 @@
 //! The cost along the line from the result to the truth.
 
 use egui::Ui;
-use egui_plot::{HoverPosition, Line, LineStyle, Plot, PlotPoint, Points, VLine};
+use egui_plot::{Line, LineStyle, Plot, PlotPoint, Points, VLine};
 
 use super::scale::number;
 use super::search::Search;
-use crate::app::views::legend::{plot_shape, result};
+use crate::app::views::legend::{at_points, name_picture, plot_shape, result, stretches};
 use crate::app::{Command, CostAlong, CostLine, ViewContext, theme};
 use crate::geometry::Pose;
 use crate::proof::Thing;
@@ -135,16 +135,6 @@ impl Profile {
         };
         format!("{costs}; {meaning}")
     }
-
-    /// The stretches of the curve where the cost is known.
-    fn stretches(&self) -> impl Iterator<Item = Vec<[f64; 2]>> {
-        let stretches = self.costs.split(|(_, cost)| cost.is_none());
-        let known = stretches.map(|stretch| {
-            let points = stretch.iter();
-            points.filter_map(|(way, cost)| Some([*way, (*cost)?])).collect()
-        });
-        known.filter(|stretch: &Vec<_>| !stretch.is_empty())
-    }
 }
 
 fn draw(
@@ -154,13 +144,10 @@ fn draw(
     profile: &Profile,
 ) -> Option<Pose> {
     let unit = profile.unit;
-    let label = |position: &HoverPosition<'_>| match position {
-        HoverPosition::NearDataPoint { plot_name, position, .. } => {
-            let cost = number(position.y);
-            Some(format!("{plot_name} {cost} at {:.2} {unit}", position.x))
-        }
-        HoverPosition::Elsewhere { .. } => None,
-    };
+    let label =
+        at_points(|name, PlotPoint { x, y }| format!("{name} {} at {x:.2} {unit}", number(y)));
+    let costs = profile.costs.iter();
+    let curve: Vec<_> = costs.map(|(way, cost)| cost.map(|cost| [*way, cost])).collect();
     let result = result(context, &profile.line.from);
     let dashed = LineStyle::dashed_loose();
     // The truth last, so that nothing hides it.
@@ -176,7 +163,7 @@ fn draw(
         .y_axis_label("cost")
         .label_formatter(label)
         .show(ui, |plot| {
-            for (index, stretch) in profile.stretches().enumerate() {
+            for (index, stretch) in stretches(&curve).enumerate() {
                 let line = Line::new(search.method.label(), stretch).width(2.0);
                 let line = line.color(theme::method(search.method));
                 plot.line(line.id(("along", index)));
@@ -191,10 +178,10 @@ fn draw(
                 }
             }
         });
-    answer.response.widget_info(|| {
-        let words = format!("Cost from the result to the truth: {}", profile.words());
-        egui::WidgetInfo::labeled(egui::Role::Image, true, words)
-    });
+    name_picture(
+        &answer.response,
+        format!("Cost from the result to the truth: {}", profile.words()),
+    );
     let at = answer.response.hover_pos()?;
     if !answer.transform.frame().contains(at) {
         return None;

@@ -3,10 +3,10 @@
 use egui::{Color32, ColorImage, Id, PointerButton, Pos2, Rect, Stroke, TextureHandle, Ui};
 use egui_plot::{AxisHints, Plot, PlotBounds, PlotImage, PlotPoint, PlotTransform};
 
-use super::marks::{MapMark, MarkKind, heading, place};
+use super::marks::{MapMark, MarkKind, fanned, heading, place};
 use super::scale::{BELOW_FLOOR, Scale, number};
 use super::search::{Search, Searched, cell_of};
-use crate::app::views::legend::{cost_bar, swatch};
+use crate::app::views::legend::{cost_bar, name_picture, swatch};
 use crate::app::{Command, ViewContext, theme};
 use crate::geometry::Pose;
 use crate::grid::{DenseSurface, Lattice, Offset, ScoredLattice};
@@ -246,10 +246,7 @@ fn plot(
                 plot.add(image);
             }
         });
-    answer.response.widget_info(|| {
-        let name = format!("{name}: {}", shown.progress());
-        egui::WidgetInfo::labeled(egui::Role::Image, true, name)
-    });
+    name_picture(&answer.response, format!("{name}: {}", shown.progress()));
     answer
 }
 
@@ -353,8 +350,14 @@ fn overlay(ui: &Ui, shown: &MapContent<'_>, transform: &PlotTransform, pointed_a
     }
     // Marks must not cover a small map.
     let reach = (transform.frame().width() / 40.0).clamp(3.0, 8.0);
-    for mark in shown.marks {
-        let at = screen(&mark.offset);
+    let places: Vec<Pos2> = shown.marks.iter().map(|mark| screen(&mark.offset)).collect();
+    let stands = fanned(&places, 2.2 * reach, *transform.frame());
+    for (place, stand) in places.iter().zip(&stands).filter(|(place, stand)| place != stand) {
+        for (width, color) in [(2.5, Color32::BLACK), (1.0, Color32::WHITE)] {
+            painter.line_segment([*place, *stand], Stroke::new(width, color));
+        }
+    }
+    for (mark, at) in shown.marks.iter().zip(stands) {
         if mark.kind == MarkKind::Thing(Thing::Truth) && !transform.frame().contains(at) {
             mark.paint_beyond(&painter, *transform.frame(), at, reach);
         } else {

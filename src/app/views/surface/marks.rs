@@ -1,6 +1,8 @@
 //! Places on the map with their legend.
 
-use egui::{Color32, Painter, Pos2, Rect, Stroke, Ui, vec2};
+use std::f32::consts::TAU;
+
+use egui::{Color32, Painter, Pos2, Rect, Stroke, Ui, Vec2, vec2};
 
 use super::scale::number;
 use super::search::{Minimum, Search};
@@ -116,6 +118,31 @@ impl MapMark {
     }
 }
 
+/// Where marks stand so that none hides another: at their places or, where a later mark is nearer than `apart`,
+/// beside them. A mark without a free place within the map stays at its own.
+pub(super) fn fanned(places: &[Pos2], apart: f32, map: Rect) -> Vec<Pos2> {
+    /// Places that are tried for each turn around the mark, and turns.
+    const STEPS: u16 = 8;
+    const TURNS: u16 = 4;
+    let is_free = |at: Pos2, others: &[Pos2]| others.iter().all(|o| o.distance(at) >= apart);
+    let mut stands = Vec::new();
+    for &place in places.iter().rev() {
+        // Outwards in a spiral, which begins at the upper right.
+        let mut around = (STEPS..STEPS * TURNS).map(|step| {
+            let turns = f32::from(step) / f32::from(STEPS);
+            place + 1.01 * apart * turns * Vec2::angled(TAU * (turns - 0.125))
+        });
+        let stand = if !map.contains(place) || is_free(place, &stands) {
+            Some(place)
+        } else {
+            around.find(|at| map.contains(*at) && is_free(*at, places) && is_free(*at, &stands))
+        };
+        stands.push(stand.unwrap_or(place));
+    }
+    stands.reverse();
+    stands
+}
+
 /// The local minima of the coarse positions, the lowest first, with the cost of the first and by how much the
 /// others are higher. Only the lowest while the search is incomplete and where all costs are equal.
 fn minima(search: &Search<'_>) -> Vec<(Minimum, String)> {
@@ -220,6 +247,26 @@ pub(super) fn legend(ui: &mut Ui, context: &ViewContext<'_>, marks: &[MapMark]) 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use egui::pos2;
+
+    #[test]
+    fn marks_on_each_other_fan_out_and_the_last_keeps_its_place() {
+        let map = Rect::from_min_max(pos2(0.0, 0.0), pos2(200.0, 100.0));
+        let places = [pos2(52.0, 50.0), pos2(50.0, 50.0), pos2(150.0, 50.0), pos2(50.0, 51.0)];
+        let stands = fanned(&places, 16.0, map);
+        assert_eq!(stands[2..], places[2..]);
+        for (index, stand) in stands.iter().enumerate() {
+            assert!(map.contains(*stand));
+            let others = stands[index + 1..].iter().chain(&places[2..3]);
+            assert!(others.filter(|o| *o != stand).all(|o| o.distance(*stand) >= 16.0));
+        }
+        // Where there is no room, marks stay where they are.
+        let crowded = [pos2(5.0, 5.0); 3];
+        assert_eq!(
+            fanned(&crowded, 16.0, Rect::from_min_max(pos2(0.0, 0.0), pos2(9.0, 9.0))),
+            crowded
+        );
+    }
 
     #[test]
     fn a_heading_says_to_which_side() {

@@ -25,43 +25,39 @@ pub(in crate::app::views) struct Scale {
 }
 
 impl Scale {
-    const EMPTY: Self = Self { costs: None, coverage: 1.0 };
-
     /// The scale of every position that the method scored, after the cursor too: a step must not
     /// change what a colour means.
     pub(in crate::app::views) fn of(run: &Run, search: &Search<'_>) -> Self {
-        let mut scale = Self::EMPTY;
-        let records = run.records().get(search.span.records.clone());
-        for record in records.unwrap_or_default() {
-            match &record.event {
-                Event::PoseScored(scored) if !scored.phase.is_yaw() => {
-                    scale.take(&scored.score, search);
-                }
-                // A descent emits the surface below it at once.
-                Event::PhaseSearched(searched) if scale.costs.is_none() => {
-                    let scores = searched.surface.scores.iter().flatten();
-                    scores.for_each(|score| scale.take(score, search));
-                }
-                _ => {}
-            }
-        }
-        scale
+        let records = run.records().get(search.span.records.clone()).unwrap_or_default();
+        let scored = records.iter().filter_map(|record| match &record.event {
+            Event::PoseScored(scored) if !scored.phase.is_yaw() => Some(&scored.score),
+            _ => None,
+        });
+        let scale = Self::over(scored, search);
+        // A descent emits the surface below it at once.
+        let mut surfaces = records.iter().filter_map(|record| match &record.event {
+            Event::PhaseSearched(searched) if scale.costs.is_none() => Some(&searched.surface),
+            _ => None,
+        });
+        let first = surfaces.next().map(|surface| surface.scores.iter().flatten());
+        first.map_or(scale, |scores| Self::over(scores, search))
     }
 
     /// The scale of a dense map, as far as it is filled.
     pub(super) fn of_dense(dense: &DenseSurface, search: &Search<'_>) -> Self {
-        let mut scale = Self::EMPTY;
-        let scores = dense.cheapest().scores.iter().flatten();
-        scores.for_each(|score| scale.take(score, search));
-        scale
+        Self::over(dense.cheapest().scores.iter().flatten(), search)
     }
 
-    fn take(&mut self, score: &Score, search: &Search<'_>) {
-        self.coverage = self.coverage.max(search.coverage(score.covered));
-        if let Some(cost) = score.eligible_cost(search.least_covered) {
-            let (least, greatest) = self.costs.unwrap_or((cost, cost));
-            self.costs = Some((least.min(cost), greatest.max(cost)));
+    fn over<'s>(scores: impl Iterator<Item = &'s Score>, search: &Search<'_>) -> Self {
+        let mut scale = Self { costs: None, coverage: 1.0 };
+        for score in scores {
+            scale.coverage = scale.coverage.max(search.coverage(score.covered));
+            if let Some(cost) = score.eligible_cost(search.least_covered) {
+                let (least, greatest) = scale.costs.unwrap_or((cost, cost));
+                scale.costs = Some((least.min(cost), greatest.max(cost)));
+            }
         }
+        scale
     }
 
     /// The colour of a cost; grey where it is no number.

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use crate::app::ViewContext;
+use crate::app::views::part_with;
 use crate::event::{DescentStepped, Event, MinimumAssessed, Moment, PoseScored};
 use crate::geometry::Pose;
 use crate::grid::{self, Lattice, Offset, Phase, ScoredLattice};
@@ -43,12 +44,10 @@ pub(in crate::app::views) struct Searched {
 impl<'a> Search<'a> {
     /// The search of `method` on the reference at the cursor; `None` before its first view.
     pub(in crate::app::views) fn at(context: &ViewContext<'a>, method: Method) -> Option<Self> {
-        let (span, cursor) = part(context, method)?;
+        let (span, cursor) = part_with::<PoseScored>(context, method)?;
         let problems = &context.run.loaded.as_deref()?.problems;
         let problem = problems.get(span.part.reference()?)?;
-        let end = span.records.end.min(cursor + 1);
-        let records = context.run.records().get(span.records.start..end)?;
-        let mut events = records.iter().map(|record| &record.event);
+        let mut events = context.run.until(span, cursor).iter().map(|record| &record.event);
         let start = events.find_map(|event| match event {
             Event::ViewRendered(view) if view.moment == Moment::Start => Some(view),
             _ => None,
@@ -171,13 +170,6 @@ pub(super) struct Minimum {
     pub(super) cost: f64,
 }
 
-/// The part of the run to read a direct method's search from, and the cursor in it. A hybrid at the
-/// cursor may run the method inside itself.
-fn part<'a>(context: &ViewContext<'a>, method: Method) -> Option<(&'a Span, usize)> {
-    let is_inside = context.is_inside_hybrid(method) && context.latest::<PoseScored>().is_some();
-    if is_inside { Some((context.span()?, context.cursor)) } else { context.part_of(method) }
-}
-
 /// A lattice whose scores come in one by one.
 struct Filling {
     lattice: Lattice,
@@ -219,7 +211,11 @@ impl Filling {
 }
 
 /// The cell that a position lies in.
-pub(super) fn cell_of(lattice: &Lattice, right_m: f64, forward_m: f64) -> Option<usize> {
+pub(in crate::app::views) fn cell_of(
+    lattice: &Lattice,
+    right_m: f64,
+    forward_m: f64,
+) -> Option<usize> {
     let index = |value: f64, count: usize| {
         let index = (value / lattice.step).round() + (count / 2) as f64;
         (0.0 <= index && index < count as f64).then_some(index as usize)

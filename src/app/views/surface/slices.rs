@@ -1,12 +1,13 @@
 //! The cost along each axis through the minimum.
 
 use egui::{Color32, Ui};
-use egui_plot::{HoverPosition, Line, LineStyle, Plot, VLine};
+use egui_plot::{Line, LineStyle, Plot, PlotPoint, VLine};
 
 use super::scale::number;
-use super::search::{Search, Searched};
+use super::search::{Minimum, Search, Searched};
+use crate::app::views::legend::{at_points, name_picture, stretches};
 use crate::app::{ViewContext, theme};
-use crate::grid::{Lattice, Offset, Phase};
+use crate::grid::{Offset, Phase};
 
 /// Height of a plot \[points\].
 const PLOT_HEIGHT: f32 = 130.0;
@@ -40,37 +41,22 @@ impl SliceAxis {
         }
     }
 
-    /// The cells of a lattice through a cell, in their order.
-    fn cells(self, lattice: &Lattice, through: usize) -> Vec<usize> {
-        let Lattice { columns, rows, .. } = *lattice;
-        match self {
-            Self::Right | Self::Yaw => {
-                let row = through / columns;
-                (0..columns).map(|column| row * columns + column).collect()
-            }
-            Self::Forward => {
-                let column = through % columns;
-                (0..rows).map(|row| row * columns + column).collect()
-            }
-        }
-    }
-
-    /// The stretches of a lattice's slice through its minimum that are above the coverage floor.
-    fn stretches(self, searched: &Searched, least_covered: u32) -> Vec<Vec<[f64; 2]>> {
-        let Some(minimum) = searched.minimum(least_covered) else {
+    /// The slice of a lattice through its minimum; nothing where it is not eligible.
+    fn curve(self, searched: &Searched, least_covered: u32) -> Vec<Option<[f64; 2]>> {
+        let Some(Minimum { offset: through, .. }) = searched.minimum(least_covered) else {
             return Vec::new();
         };
-        let lattice = &searched.surface.lattice;
-        let points = self.cells(lattice, minimum.cell).into_iter().map(|cell| {
+        let is_on_slice = |offset: &Offset| match self {
+            Self::Right => offset.forward_m == through.forward_m,
+            Self::Forward => offset.right_m == through.right_m,
+            Self::Yaw => true,
+        };
+        let cells = searched.surface.lattice.hypotheses();
+        let cells = cells.filter(|(_, offset)| is_on_slice(offset)).map(|(cell, offset)| {
             let cost = searched.surface.scores[cell]?.eligible_cost(least_covered)?;
-            Some([self.of(&lattice.offset(cell)?), cost])
+            Some([self.of(&offset), cost])
         });
-        let points: Vec<Option<[f64; 2]>> = points.collect();
-        points
-            .split(Option::is_none)
-            .filter(|stretch| !stretch.is_empty())
-            .map(|stretch| stretch.iter().flatten().copied().collect())
-            .collect()
+        cells.collect()
     }
 }
 
@@ -117,13 +103,8 @@ fn slice(
     search: &Search<'_>,
     marks: &[LineMark],
 ) {
-    let label = |position: &HoverPosition<'_>| match position {
-        HoverPosition::NearDataPoint { position, .. } => {
-            let cost = number(position.y);
-            Some(format!("cost {cost} at {name} {:.2} {unit}", position.x))
-        }
-        HoverPosition::Elsewhere { .. } => None,
-    };
+    let label =
+        at_points(|_, PlotPoint { x, y }| format!("cost {} at {name} {x:.2} {unit}", number(y)));
     let answer = Plot::new(name)
         .width(width)
         .height(PLOT_HEIGHT)
@@ -137,32 +118,43 @@ fn slice(
             }
             for (phase, width) in axis.phases().into_iter().zip([1.0, 2.5]) {
                 let searched = search.last(phase);
-                let stretches =
-                    searched.map(|searched| axis.stretches(searched, search.least_covered));
-                for (index, stretch) in stretches.into_iter().flatten().enumerate() {
+                let curve = searched.map(|searched| axis.curve(searched, search.least_covered));
+                let curve = curve.unwrap_or_default();
+                for (index, stretch) in stretches(&curve).enumerate() {
                     let line = Line::new(search.method.label(), stretch).width(width);
                     let line = line.color(theme::method(search.method));
                     plot.line(line.id((phase, index)));
                 }
             }
         });
-    let name = format!("Cost along {name}");
-    answer.response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, &name));
+    name_picture(&answer.response, format!("Cost along {name}"));
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::grid::GridParams;
+    use std::sync::Arc;
+
+    use crate::grid::{GridParams, Lattice, ScoredLattice};
+    use crate::render::Score;
 
     #[test]
-    fn a_slice_takes_the_row_or_the_column_of_its_cell() {
-        let params = GridParams::default();
+    fn a_slice_takes_the_row_or_the_column_of_the_minimum() {
         let lattice =
-            Lattice::new(Phase::PositionCoarse, Offset::default(), 1.0, &params).expect("small");
-        assert_eq!(SliceAxis::Right.cells(&lattice, 5), [3, 4, 5]);
-        assert_eq!(SliceAxis::Forward.cells(&lattice, 5), [2, 5, 8]);
-        let yaw = Lattice::new(Phase::YawCoarse, Offset::default(), 1.0, &params).expect("small");
-        assert_eq!(SliceAxis::Yaw.cells(&yaw, 5).len(), yaw.columns);
+            Lattice::new(Phase::PositionCoarse, Offset::default(), 1.0, &GridParams::default());
+        let lattice = lattice.expect("small");
+        let lowest = Offset { right_m: 0.0, forward_m: -1.0, yaw_rad: 0.0 };
+        let mut scores = vec![None; lattice.cells()];
+        for (cell, offset) in lattice.hypotheses() {
+            let cost = if offset == lowest { 1.0 } else { 2.0 };
+            scores[cell] = Some(Score { cost: Some(cost), covered: 9 });
+        }
+        let surface = Arc::new(ScoredLattice { lattice, scores, least_covered: 5 });
+        let searched = Searched { tried: 5, surface, is_complete: true };
+        let curve = |axis: SliceAxis| axis.curve(&searched, 5);
+        let column = [[-1.0, 1.0], [0.0, 2.0], [1.0, 2.0]].map(Some);
+        assert_eq!(curve(SliceAxis::Forward), column);
+        assert_eq!(curve(SliceAxis::Right), [Some([0.0, 1.0])]);
+        assert_eq!(SliceAxis::Forward.curve(&searched, 10), []);
     }
 }

@@ -1,11 +1,13 @@
 //! Where a cost lies between no relation at all and the truth.
 
-use egui::{Color32, Mesh, RichText, Role, Sense, Ui, WidgetInfo, pos2, vec2};
+use egui::{RichText, Sense, Ui, pos2, vec2};
 
-use crate::app::theme;
 use crate::app::view_context::CostBounds;
-use crate::app::views::mesh_painter::{MarkShape, MeshPainter};
+use crate::app::views::legend;
+use crate::app::{ViewContext, theme};
 use crate::method::Method;
+use crate::palette;
+use crate::proof::Thing;
 
 /// Height of the bar with its marks \[points\].
 const HEIGHT: f32 = 16.0;
@@ -13,63 +15,41 @@ const HEIGHT: f32 = 16.0;
 const BEYOND: f64 = 0.04;
 
 /// A bar from the cost of shuffled pixels to the least known cost, with a mark for each cost.
-pub(super) fn ui(ui: &mut Ui, method: Method, bounds: &CostBounds, present: Option<f64>) {
-    let range = BarRange::of(bounds);
+pub(super) fn ui(ui: &mut Ui, context: &ViewContext<'_>, method: Method, present: Option<f64>) {
+    let bounds = context.cost_bounds(method);
+    let range = BarRange::of(&bounds);
+    let result = context.estimate(method).map(|pose| legend::result(context, &pose));
+    let result = result.unwrap_or(Thing::Result(palette::NO_POSE));
     let costs = [
-        NamedCost::new("shuffled", "■", MarkShape::Square, bounds.shuffled, |ui| {
-            ui.visuals().text_color()
-        }),
-        NamedCost::new("best", "▲", MarkShape::Triangle, bounds.best, |_| theme::ESTIMATE),
-        NamedCost::new("truth", "◆", MarkShape::Diamond, bounds.truth, |_| theme::TRUTH),
-        NamedCost::new("present", "○", MarkShape::Ring, present, |_| theme::CAMERA),
+        ("shuffled", Thing::Dot(palette::NO_POSE), bounds.shuffled),
+        ("best", result, bounds.best),
+        ("truth", Thing::Truth, bounds.truth),
+        ("present", Thing::Dot(palette::UNDECIDED), present),
     ];
-    let name = method.name().to_uppercase();
+    let costs = costs.into_iter().filter_map(|(name, thing, cost)| Some((name, thing, cost?)));
+    let costs: Vec<(&str, Thing, f64)> = costs.collect();
+    let name = method.label();
     if let Some(range) = &range {
         bar(ui, &name, range, &costs);
     }
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing.x = 4.0;
         ui.label(RichText::new(&name).strong());
-        for cost in &costs {
-            let Some(value) = cost.value else { continue };
-            ui.label(RichText::new(cost.glyph).color(theme::text(ui.visuals(), (cost.color)(ui))));
-            ui.label(format!("{} {value:.4}", cost.name));
+        for (name, thing, cost) in &costs {
+            let (place, _) = ui.allocate_exact_size(vec2(12.0, 12.0), Sense::hover());
+            legend::paint_mark(ui.painter(), *thing, place.center(), 4.0);
+            ui.label(format!("{name} {cost:.4}"));
             ui.add_space(6.0);
         }
         match (&range, present) {
             (Some(range), Some(present)) => {
                 let share = 100.0 * range.share(present);
-                ui.weak(format!("{share:.0} % of the way from shuffled pixels"));
+                ui.weak(format!("{share:.0} % of the way from shuffled pixels"))
             }
-            (None, _) => {
-                ui.weak("what shuffled pixels cost is told at the end of the search");
-            }
-            (Some(_), None) => {
-                ui.weak("no cost here");
-            }
+            (None, _) => ui.weak("what shuffled pixels cost is told at the end of the search"),
+            (Some(_), None) => ui.weak("no cost here"),
         }
     });
-}
-
-/// A cost with its mark.
-struct NamedCost {
-    name: &'static str,
-    glyph: &'static str,
-    mark: MarkShape,
-    value: Option<f64>,
-    color: fn(&Ui) -> Color32,
-}
-
-impl NamedCost {
-    fn new(
-        name: &'static str,
-        glyph: &'static str,
-        mark: MarkShape,
-        value: Option<f64>,
-        color: fn(&Ui) -> Color32,
-    ) -> Self {
-        Self { name, glyph, mark, value, color }
-    }
 }
 
 /// The costs at the ends of the bar.
@@ -95,46 +75,20 @@ impl BarRange {
     }
 }
 
-fn bar(ui: &mut Ui, name: &str, range: &BarRange, costs: &[NamedCost]) {
+fn bar(ui: &mut Ui, name: &str, range: &BarRange, costs: &[(&str, Thing, f64)]) {
     let size = vec2(ui.available_width(), HEIGHT);
     let (rect, response) = ui.allocate_exact_size(size, Sense::hover());
-    let spoken = format!("{name} cost from shuffled pixels to the least");
-    response.widget_info(|| WidgetInfo::labeled(Role::Image, true, &spoken));
+    legend::name_picture(&response, format!("{name} cost from shuffled pixels to the least"));
     response.on_hover_text(
         "Left: what no relation at all costs. Right: the truth, or the best where that costs less",
     );
     let line = rect.shrink2(vec2(0.05 * rect.width(), 0.5 * HEIGHT - 3.0));
-    let at = |share: f64| {
-        let share = share.clamp(-BEYOND, 1.0 + BEYOND) as f32;
-        pos2(line.left() + share * line.width(), line.center().y)
-    };
-    const STEPS: u32 = 24;
-    let mut mesh = Mesh::default();
-    for step in 0..=STEPS {
-        let share = f64::from(step) / f64::from(STEPS);
-        let (color, x) = (theme::viridis(share), at(share).x);
-        mesh.colored_vertex(pos2(x, line.top()), color);
-        mesh.colored_vertex(pos2(x, line.bottom()), color);
-        if step > 0 {
-            let here = 2 * step;
-            mesh.add_triangle(here - 2, here - 1, here);
-            mesh.add_triangle(here, here - 1, here + 1);
-        }
+    legend::gradient(ui.painter(), line, theme::viridis);
+    for (_, thing, cost) in costs {
+        let share = range.share(*cost).clamp(-BEYOND, 1.0 + BEYOND) as f32;
+        let at = pos2(line.left() + share * line.width(), line.center().y);
+        legend::paint_mark(ui.painter(), *thing, at, 5.0);
     }
-    ui.painter().add(mesh);
-    let mut mesh = MeshPainter::new(ui.pixels_per_point());
-    for cost in costs {
-        let Some(value) = cost.value else { continue };
-        let place = at(range.share(value));
-        // The present cost goes around those that it equals.
-        if cost.mark == MarkShape::Ring {
-            mesh.ring(place, 7.0, 2.2, (cost.color)(ui));
-        } else {
-            mesh.disc(place, 7.0, ui.visuals().panel_fill);
-            mesh.mark(cost.mark, place, 4.5, (cost.color)(ui));
-        }
-    }
-    mesh.paint_on(ui.painter());
 }
 
 #[cfg(test)]

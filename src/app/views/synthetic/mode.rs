@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use egui::{Color32, Sense, TextureHandle, Ui, Vec2};
+use egui::{Color32, TextureHandle, Ui};
 use image::DynamicImage;
 
 use crate::app::pictures;
@@ -118,9 +118,9 @@ impl Mode {
             }
             (Self::Weights, Some(Explanation::Weights(weights))) => {
                 let most = weights.threshold.sqrt();
-                swatch(ui, 1);
+                legend::swatch(ui, Color32::from_gray(picture::WEIGHT_GRAYS[1]));
                 ui.label(format!("counted: off by at most {most:.1} grey values"));
-                swatch(ui, 0);
+                legend::swatch(ui, Color32::from_gray(picture::WEIGHT_GRAYS[0]));
                 ui.label("ignored");
             }
             (Self::Weights, Some(Explanation::JointHistogram(_))) => {
@@ -155,16 +155,4 @@ fn weights(made: &Comparison) -> DynamicImage {
 fn diverging_bar(ui: &mut Ui, name: &str, ticks: &[(f64, &str)]) {
     let color = |share: f64| theme::rgb(palette::diverging(2.0 * share - 1.0));
     legend::color_bar(ui, LEGEND, name, color, ticks);
-}
-
-fn swatch(ui: &mut Ui, counted: usize) {
-    let (rect, _) = ui.allocate_exact_size(Vec2::splat(12.0), Sense::hover());
-    let gray = Color32::from_gray(picture::WEIGHT_GRAYS[counted]);
-    ui.painter().rect(
-        rect,
-        1.0,
-        gray,
-        (1.0, ui.visuals().weak_text_color()),
-        egui::StrokeKind::Inside,
-    );
 }

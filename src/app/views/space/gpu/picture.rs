@@ -5,12 +5,14 @@ use std::sync::Arc;
 use super::frame::{Frame, Points};
 use super::guarded;
 use super::pipelines::{COLOR, DEPTH, Pipelines};
+use crate::app::views::memo::Same;
 
 /// The picture and what is needed to draw it anew.
 #[derive(Default)]
 pub(super) struct Picture {
     target: Option<RenderTarget>,
-    cloud: Option<UploadedCloud>,
+    /// A cloud on the card, with the points that it was made from.
+    cloud: Option<(Same<Points>, wgpu::Buffer)>,
     /// What the picture shows, and how many pixels one of egui's points has.
     shown: Option<(Frame, f32)>,
     trouble: Option<String>,
@@ -22,13 +24,6 @@ struct RenderTarget {
     color: wgpu::Texture,
     depth: wgpu::TextureView,
     bind_group: wgpu::BindGroup,
-}
-
-/// A cloud on the graphics card, with the points that it was made from: they stay alive, so that
-/// their address stays their own.
-struct UploadedCloud {
-    points: Arc<Points>,
-    buffer: wgpu::Buffer,
 }
 
 impl Picture {
@@ -80,34 +75,33 @@ impl Picture {
         let target = self.target.take().filter(|target| target.size == size);
         let target = target.unwrap_or_else(|| RenderTarget::new(device, pipelines, size));
         let buffer = |bytes: &[u8], usage| filled(device, queue, bytes, usage);
-        let known = self.cloud.take();
-        let known = known.filter(|cloud| Arc::ptr_eq(&cloud.points, &frame.points));
-        let cloud = known.unwrap_or_else(|| UploadedCloud {
-            points: Arc::clone(&frame.points),
-            buffer: buffer(&frame.points.bytes, wgpu::BufferUsages::VERTEX),
-        });
+        let of = Same(Arc::clone(&frame.points));
+        let known = self.cloud.take().filter(|(known, _)| *known == of);
+        let cloud =
+            known.unwrap_or_else(|| (of, buffer(&frame.points.bytes, wgpu::BufferUsages::VERTEX)));
         // The rest is a few kilobytes: made anew it needs no bookkeeping of capacities.
         let (mut lines, mut faces) = (Vec::new(), Vec::new());
         frame.lines.iter().for_each(|line| line.write(&mut lines));
         frame.faces.iter().for_each(|corner| corner.write(&mut faces));
-        let lines = buffer(&lines, wgpu::BufferUsages::VERTEX);
-        let faces = buffer(&faces, wgpu::BufferUsages::VERTEX);
+        let [lines, faces] = [lines, faces].map(|bytes| buffer(&bytes, wgpu::BufferUsages::VERTEX));
         let view = buffer(&frame.view(size, scale), wgpu::BufferUsages::UNIFORM);
-        let view = bind(device, &pipelines.view_layout, view.as_entire_binding());
+        let [points, strokes, corners] =
+            [frame.points.len(), frame.lines.len(), frame.faces.len()].map(|count| count as u32);
+        let Pipelines { points: point, faces: face, lines: line, .. } = pipelines;
 
         let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         {
             let mut pass = target.begin(&mut encoder, frame);
-            pass.set_bind_group(0, &view, &[]);
-            pass.set_pipeline(&pipelines.points);
-            pass.set_vertex_buffer(0, cloud.buffer.slice(..));
-            pass.draw(0..4, 0..frame.points.len() as u32);
-            pass.set_pipeline(&pipelines.faces);
-            pass.set_vertex_buffer(0, faces.slice(..));
-            pass.draw(0..frame.faces.len() as u32, 0..1);
-            pass.set_pipeline(&pipelines.lines);
-            pass.set_vertex_buffer(0, lines.slice(..));
-            pass.draw(0..4, 0..frame.lines.len() as u32);
+            for (pipeline, buffer, vertices, instances) in [
+                (point, &cloud.1, 4, points),
+                (face, &faces, corners, 1),
+                (line, &lines, 4, strokes),
+            ] {
+                pass.set_pipeline(pipeline);
+                pass.set_bind_group(0, &bind(device, pipeline, view.as_entire_binding()), &[]);
+                pass.set_vertex_buffer(0, buffer.slice(..));
+                pass.draw(0..vertices, 0..instances);
+            }
         }
         queue.submit([encoder.finish()]);
         (self.target, self.cloud) = (Some(target), Some(cloud));
@@ -150,7 +144,7 @@ impl RenderTarget {
         Self {
             size,
             depth: view(&texture(DEPTH, attached)),
-            bind_group: bind(device, &pipelines.blit_layout, whole),
+            bind_group: bind(device, &pipelines.blit, whole),
             color,
         }
     }
@@ -190,12 +184,12 @@ impl RenderTarget {
 
 fn bind(
     device: &wgpu::Device,
-    layout: &wgpu::BindGroupLayout,
+    pipeline: &wgpu::RenderPipeline,
     resource: wgpu::BindingResource<'_>,
 ) -> wgpu::BindGroup {
     device.create_bind_group(&wgpu::BindGroupDescriptor {
         label: Some("space"),
-        layout,
+        layout: &pipeline.get_bind_group_layout(0),
         entries: &[wgpu::BindGroupEntry { binding: 0, resource }],
     })
 }

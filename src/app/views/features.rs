@@ -1,6 +1,4 @@
-//! What FB has reported up to the cursor about each query feature.
-
-use std::sync::Arc;
+//! What an estimator has reported up to the cursor about each query feature.
 
 use nalgebra::Point3;
 
@@ -9,11 +7,10 @@ use crate::camera::Intrinsics;
 use crate::depth::LiftedMatch;
 use crate::estimator::{self, Parts};
 use crate::event::{Event, Side};
-use crate::features::FeatureState;
-use crate::features::{Features, Keypoint, Match, MatchVerdict};
+use crate::features::{FeatureState, Keypoint, Match, MatchVerdict};
 use crate::geometry::Pose;
 use crate::method::Method;
-use crate::session::{Run, Span};
+use crate::session::Span;
 
 /// Position of the inliers in [`FeatureState::NAMES`].
 pub(super) const INLIER: usize = UNDECIDED - 1;
@@ -32,34 +29,28 @@ pub(super) fn name(kind: usize) -> &'static str {
 /// The features of both photos, and how far each has come.
 #[derive(Clone, Copy, Default)]
 pub(super) struct FeatureProgress<'a> {
-    query: Option<&'a Arc<Features>>,
-    reference: Option<&'a Arc<Features>>,
+    /// Whether the query's keypoints are known, even if there are none.
+    pub(super) has_begun: bool,
+    /// Query keypoints; none before they are detected.
+    pub(super) query: &'a [Keypoint],
+    /// Reference keypoints; none before they are detected.
+    pub(super) reference: &'a [Keypoint],
     decisions: Option<&'a [Option<Match>]>,
-    lifted: Option<&'a [LiftedMatch]>,
-    states: Option<&'a [FeatureState]>,
-    trial: Option<TrialPose<'a>>,
+    /// The matches that were lifted into space, or should have been.
+    pub(super) lifted: &'a [LiftedMatch],
+    /// Where the query features ended.
+    pub(super) states: Option<&'a [FeatureState]>,
+    /// The best pose so far: that of MLESAC, then the refined one.
+    pub(super) reference_from_query: Option<Pose>,
+    /// The pose of the trial at the cursor, or the refined one. Until the states are known, it says which matches it
+    /// explains.
+    trial: Option<Pose>,
+    /// What judges a match by a pose.
+    judge: Option<Judge<'a>>,
 }
 
-/// The pose of the trial at the cursor, or the refined one. Until the states are known, it says which matches it explains.
-#[derive(Clone, Copy)]
-struct TrialPose<'a> {
-    query_from_reference: Pose,
-    camera: &'a Intrinsics,
-    /// Matches with a larger reprojection error are outliers.
-    threshold_px: f64,
-}
-
-impl TrialPose<'_> {
-    fn state(&self, keypoint: &Keypoint, point: &Point3<f64>) -> FeatureState {
-        let seen = self.camera.project(&(self.query_from_reference * point));
-        let residual_px = seen.map_or(f64::INFINITY, |seen| (seen - keypoint.pixel()).norm());
-        if residual_px <= self.threshold_px {
-            FeatureState::Inlier { residual_px }
-        } else {
-            FeatureState::Outlier { residual_px }
-        }
-    }
-}
+/// The query's camera; matches with a larger reprojection error \[px\] are outliers.
+type Judge<'a> = (&'a Intrinsics, f64);
 
 impl<'a> FeatureProgress<'a> {
     /// The progress at the cursor; for the direct methods that of FB, or of the hybrid where FB was
@@ -72,64 +63,45 @@ impl<'a> FeatureProgress<'a> {
             })
         };
         let asked = context.setup.task.protocol.methods.iter().copied();
-        let mut methods = context.method().into_iter().chain(asked);
-        methods
-            .find_map(|method| with_features(method).then(|| context.part_of(method))?)
-            .map_or_else(Self::default, |(span, cursor)| {
-                let camera = context.problem().map(|problem| &problem.query.intrinsics);
-                let threshold_px = context.run.params.fb.mlesac.inlier_threshold_px;
-                Self::until(context.run, span, cursor, camera.map(|camera| (camera, threshold_px)))
-            })
+        let methods = context.method().into_iter().chain(asked);
+        let mut parts = methods.filter(|method| with_features(*method));
+        let part = parts.find_map(|method| context.part_of(method));
+        part.map_or_else(Self::default, |(span, cursor)| Self::of(context, span, cursor))
     }
 
-    fn until(
-        run: &'a Run,
-        span: &Span,
-        cursor: usize,
-        judge: Option<(&'a Intrinsics, f64)>,
-    ) -> Self {
-        let mut progress = Self::default();
-        let judged = |query_from_reference: Pose| {
-            let (camera, threshold_px) = judge?;
-            Some(TrialPose { query_from_reference, camera, threshold_px })
-        };
-        let end = span.records.end.min(cursor.saturating_add(1));
-        for record in &run.records()[span.records.start.min(end)..end] {
+    /// The progress of a part up to a cursor.
+    pub(super) fn of(context: &ViewContext<'a>, span: &Span, cursor: usize) -> Self {
+        let threshold_px = context.run.params.fb.mlesac.inlier_threshold_px;
+        let camera = context.problem().map(|problem| &problem.query.intrinsics);
+        let mut progress =
+            Self { judge: camera.map(|camera| (camera, threshold_px)), ..Self::default() };
+        for record in context.run.until(span, cursor) {
             match &record.event {
                 Event::FeaturesDetected(detected) => match detected.side {
-                    Side::Query => progress.query = Some(&detected.features),
-                    Side::Reference => progress.reference = Some(&detected.features),
+                    Side::Query => {
+                        progress.has_begun = true;
+                        progress.query = &detected.features.keypoints;
+                    }
+                    Side::Reference => progress.reference = &detected.features.keypoints,
                 },
                 Event::MatchesDecided(decided) => progress.decisions = Some(&decided.decisions),
-                Event::DepthsLifted(lifted) => progress.lifted = Some(&lifted.matches),
-                Event::MatchesGuided(guided) => progress.lifted = Some(&guided.matches),
+                Event::DepthsLifted(lifted) => progress.lifted = &lifted.matches,
+                Event::MatchesGuided(guided) => progress.lifted = &guided.matches,
                 Event::HypothesisTried(tried) => {
-                    progress.trial =
-                        tried.trial.hypothesis.as_ref().and_then(|one| judged(one.pose));
+                    progress.trial = tried.trial.hypothesis.as_ref().map(|one| one.pose);
+                    if let Some(best) = &tried.trial.best {
+                        progress.reference_from_query = Some(best.pose.inverse());
+                    }
                 }
                 Event::PoseRefined(refined) => {
-                    progress.trial = judged(refined.reference_from_query.inverse());
+                    progress.trial = Some(refined.reference_from_query.inverse());
+                    progress.reference_from_query = Some(refined.reference_from_query);
                 }
                 Event::FeaturesClassified(classified) => progress.states = Some(&classified.states),
                 _ => {}
             }
         }
         progress
-    }
-
-    /// Whether the query's keypoints are known, even if there are none.
-    pub(super) fn has_begun(&self) -> bool {
-        self.query.is_some()
-    }
-
-    /// Query keypoints; none before they are detected.
-    pub(super) fn query(&self) -> &'a [Keypoint] {
-        self.query.map_or(&[], |features| &features.keypoints)
-    }
-
-    /// Reference keypoints; none before they are detected.
-    pub(super) fn reference(&self) -> &'a [Keypoint] {
-        self.reference.map_or(&[], |features| &features.keypoints)
     }
 
     /// The nearest reference feature of a query feature, once it is known.
@@ -139,9 +111,8 @@ impl<'a> FeatureProgress<'a> {
 
     /// What the depth lift said about a query feature.
     pub(super) fn lifted(&self, feature: usize) -> Option<&'a LiftedMatch> {
-        let lifted = self.lifted?;
-        let at = lifted.binary_search_by_key(&feature, |lifted| lifted.query);
-        lifted.get(at.ok()?)
+        let at = self.lifted.binary_search_by_key(&feature, |lifted| lifted.query);
+        self.lifted.get(at.ok()?)
     }
 
     /// Where a query feature has ended as far as it is known, or stands for the trial at the cursor; `None` while
@@ -161,9 +132,21 @@ impl<'a> FeatureProgress<'a> {
                 let Some(point) = &lifted.point else {
                     return Some(FeatureState::NoDepth { distance_px: lifted.lidar_distance_px });
                 };
-                Some(self.trial?.state(self.query().get(feature)?, point))
+                self.judged(self.query.get(feature)?, point)
             }
         }
+    }
+
+    /// Whether the trial at the cursor explains a match.
+    fn judged(&self, keypoint: &Keypoint, point: &Point3<f64>) -> Option<FeatureState> {
+        let (camera, threshold_px) = self.judge?;
+        let residual_px = residual_px(camera, &self.trial?, point, keypoint);
+        let residual_px = residual_px.unwrap_or(f64::INFINITY);
+        Some(if residual_px <= threshold_px {
+            FeatureState::Inlier { residual_px }
+        } else {
+            FeatureState::Outlier { residual_px }
+        })
     }
 
     /// A query feature's state with the number that decided it.
@@ -192,7 +175,7 @@ impl<'a> FeatureProgress<'a> {
 
     /// The position of each query feature's state in [`FeatureState::NAMES`], or [`UNDECIDED`].
     pub(super) fn kinds(&self) -> Vec<usize> {
-        (0..self.query().len())
+        (0..self.query.len())
             .map(|feature| self.state(feature).map_or(UNDECIDED, |state| state.index()))
             .collect()
     }
@@ -203,20 +186,31 @@ pub(super) fn error_px(residual_px: f64) -> String {
     if residual_px.is_infinite() { "no pose".to_owned() } else { format!("{residual_px:.2} px") }
 }
 
+/// How far from its keypoint a point is seen \[px\]; `None` behind the camera.
+pub(super) fn residual_px(
+    camera: &Intrinsics,
+    camera_from_points: &Pose,
+    point: &Point3<f64>,
+    keypoint: &Keypoint,
+) -> Option<f64> {
+    let seen = camera.project(&(camera_from_points * point))?;
+    Some((seen - keypoint.pixel()).norm())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn features(columns: &[f32]) -> Arc<Features> {
-        let keypoints = columns.iter().map(|&x| Keypoint {
+    fn keypoints(columns: &[f32]) -> Vec<Keypoint> {
+        let keypoint = |&x: &f32| Keypoint {
             x,
             y: 1.0,
             scale: 2.0,
             angle: 0.0,
             response: 1.0,
             laplacian_positive: true,
-        });
-        Arc::new(Features { keypoints: keypoints.collect(), descriptors: Vec::new() })
+        };
+        columns.iter().map(keypoint).collect()
     }
 
     fn decision(query: usize, verdict: MatchVerdict) -> Option<Match> {
@@ -225,7 +219,7 @@ mod tests {
 
     #[test]
     fn a_feature_is_decided_as_soon_as_a_test_rejects_it() {
-        let query = features(&[1.0, 2.0, 3.0, 4.0, 5.0]);
+        let query = keypoints(&[1.0, 2.0, 3.0, 4.0, 5.0]);
         let decisions = [
             decision(0, MatchVerdict::Ambiguous),
             decision(1, MatchVerdict::NotUnique { rival: 0 }),
@@ -233,7 +227,7 @@ mod tests {
             decision(3, MatchVerdict::Candidate),
             None,
         ];
-        let mut progress = FeatureProgress { query: Some(&query), ..FeatureProgress::default() };
+        let mut progress = FeatureProgress { query: &query, ..FeatureProgress::default() };
         assert_eq!(progress.kinds(), [UNDECIDED; 5]);
         progress.decisions = Some(&decisions);
         assert_eq!(progress.kinds(), [0, 1, UNDECIDED, UNDECIDED, 0]);
@@ -244,15 +238,15 @@ mod tests {
             depth_range_m: None,
             point: (feature == 3).then(|| Point3::new(0.0, 0.0, 9.0)),
         });
-        progress.lifted = Some(&lifted);
+        progress.lifted = &lifted;
         assert_eq!(progress.kinds(), [0, 1, 2, UNDECIDED, 0]);
 
         // The point on the axis is seen at the centre, right where the keypoint is: an inlier of this pose.
         let camera = Intrinsics { fx: 9.0, fy: 9.0, cx: 4.0, cy: 1.0, width: 20, height: 20 };
         let poses = [0.0, 3.0].map(|right_m| Pose::translation(right_m, 0.0, 0.0));
+        progress.judge = Some((&camera, 2.0));
         for (pose, state) in poses.into_iter().zip([INLIER, INLIER - 1]) {
-            progress.trial =
-                Some(TrialPose { query_from_reference: pose, camera: &camera, threshold_px: 2.0 });
+            progress.trial = Some(pose);
             assert_eq!(progress.kinds(), [0, 1, 2, state, 0]);
         }
     }
