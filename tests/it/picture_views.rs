@@ -13,24 +13,16 @@ use posescope::event::{
 use posescope::features::FeatureState;
 use posescope::features::Features;
 use posescope::method::Method;
-use posescope::session::RunMode;
 
 use crate::two_walls::CAMERA;
-use crate::window::{app, finish, run_until_idle, send, setup, wait, window};
+use crate::window::{app, finished, run_until_idle, send, setup, wait, window};
 
 /// The small world after its run, at the end of a method, with a view in front.
-fn finished(method: Method, view: &'static str) -> Harness<'static, App> {
-    let mut setup = setup();
-    setup.mode = RunMode::Running;
-    let mut window = window(setup);
-    finish(&mut window);
-    order(&mut window, Command::SelectMethod(method));
-    order(&mut window, Command::Maximize(Some(view)));
+fn at_end(method: Method, view: &'static str) -> Harness<'static, App> {
+    let mut window = finished(setup());
+    send(&mut window, Command::SelectMethod(method));
+    send(&mut window, Command::Maximize(Some(view)));
     window
-}
-
-fn order(window: &mut Harness<'_, App>, command: Command) {
-    send(window, command);
 }
 
 fn latest<E: DebugEvent + Clone + 'static>(window: &Harness<'_, App>) -> E {
@@ -86,7 +78,7 @@ fn lonely_inlier(window: &Harness<'_, App>) -> (usize, Pos2) {
 fn before_detection_there_are_just_the_photos() {
     let mut window = window(setup());
     run_until_idle(&mut window);
-    order(&mut window, Command::ShowView("images"));
+    send(&mut window, Command::ShowView("images"));
     window.get_by_label("No features yet: FB finds them first");
     window.get_by_label("query photo 000001");
     window.get_by_label("reference photo 000000");
@@ -95,7 +87,7 @@ fn before_detection_there_are_just_the_photos() {
 
 #[test]
 fn the_funnel_counts_every_feature_and_hides_the_states_that_are_clicked() {
-    let mut window = finished(Method::FB, "images");
+    let mut window = at_end(Method::FB, "images");
     let states = latest::<FeaturesClassified>(&window).states;
     let count = |name: &str| states.iter().filter(|state| state.name() == name).count();
     for name in FeatureState::NAMES {
@@ -124,7 +116,7 @@ fn the_funnel_counts_every_feature_and_hides_the_states_that_are_clicked() {
 
 #[test]
 fn a_clicked_match_shows_the_numbers_that_were_told_about_it() {
-    let mut window = finished(Method::FB, "images");
+    let mut window = at_end(Method::FB, "images");
     let (feature, place) = lonely_inlier(&window);
     click(&mut window, place);
     assert_eq!(app(&window).options.selected_feature, Some(feature));
@@ -160,19 +152,19 @@ fn a_clicked_match_shows_the_numbers_that_were_told_about_it() {
 
 #[test]
 fn a_match_is_compared_with_the_truth_while_the_truth_is_shown() {
-    let mut window = finished(Method::FB, "images");
+    let mut window = at_end(Method::FB, "images");
     let (feature, _) = lonely_inlier(&window);
-    order(&mut window, Command::SelectFeature(Some(feature)));
+    send(&mut window, Command::SelectFeature(Some(feature)));
     window.get_by_label("true match");
     window.get_by_label("Off the epipolar line");
-    order(&mut window, Command::ShowTruth);
+    send(&mut window, Command::ShowTruth);
     assert!(window.query_by_label("true match").is_none());
     assert!(window.query_by_label("Off the epipolar line").is_none());
 }
 
 #[test]
 fn both_photos_zoom_together_and_a_double_click_shows_them_whole() {
-    let mut window = finished(Method::FB, "images");
+    let mut window = at_end(Method::FB, "images");
     let (feature, whole) = lonely_inlier(&window);
     let area = window.get_by_label("query photo 000001").rect();
     window.hover_at(area.center());
@@ -190,21 +182,21 @@ fn both_photos_zoom_together_and_a_double_click_shows_them_whole() {
     // The match is elsewhere on the screen, so a click at its old place does not select it.
     click(&mut window, whole);
     assert_ne!(app(&window).options.selected_feature, Some(feature));
-    order(&mut window, Command::SelectFeature(None));
+    send(&mut window, Command::SelectFeature(None));
     // Each step of the test takes a quarter of a second; these clicks are one second apart, the one before is earlier.
     window.ctx.options_mut(|options| options.input_options.max_double_click_delay = 1.3);
     click(&mut window, area.center());
     click(&mut window, area.center());
-    order(&mut window, Command::SelectFeature(None));
+    send(&mut window, Command::SelectFeature(None));
     click(&mut window, whole);
     assert_eq!(app(&window).options.selected_feature, Some(feature));
 }
 
 #[test]
 fn the_synthetic_view_shows_the_recorded_cost_and_place() {
-    let mut window = finished(Method::MI, "synthetic");
+    let mut window = at_end(Method::MI, "synthetic");
     for method in [Method::MI, Method::PM] {
-        order(&mut window, Command::SelectMethod(method));
+        send(&mut window, Command::SelectMethod(method));
         let event = latest::<ViewRendered>(&window);
         let cost = event.comparison.score.cost.expect("a cost");
         assert!(event.offset.right_m.abs() < 0.005 && event.offset.yaw_rad == 0.0);
@@ -226,9 +218,9 @@ fn the_synthetic_view_shows_the_recorded_cost_and_place() {
 
 #[test]
 fn a_pose_of_ones_own_has_the_costs_of_both_methods() {
-    let mut window = finished(Method::MI, "synthetic");
+    let mut window = at_end(Method::MI, "synthetic");
     let truth = app(&window).run().loaded.as_ref().expect("loaded").truth;
-    order(&mut window, Command::TakeCamera(truth));
+    send(&mut window, Command::TakeCamera(truth));
     wait(&mut window, |app| app.app_state().probe().is_some());
     window.step();
     window.get_by_label_contains("MI, camera in hand: cost ");
@@ -243,17 +235,17 @@ fn a_pose_of_ones_own_has_the_costs_of_both_methods() {
 
 #[test]
 fn the_pictures_of_the_synthetic_view_are_chosen_by_name_and_blink_with_the_query() {
-    let mut window = finished(Method::MI, "synthetic");
+    let mut window = at_end(Method::MI, "synthetic");
     let common = ["query", "view", "blend", "residual", "coverage"];
     for (method, own) in [(Method::MI, "shares"), (Method::PM, "weights")] {
-        order(&mut window, Command::SelectMethod(method));
+        send(&mut window, Command::SelectMethod(method));
         for name in common.into_iter().chain([own]) {
             window.get_by_label(&format!("Show {name}")).click();
             window.run_steps(2);
             window.get_by_label(&format!("{} picture: {name}", method.label()));
         }
     }
-    order(&mut window, Command::Blink);
+    send(&mut window, Command::Blink);
     let mut seen = [0, 0];
     for _ in 0..200 {
         window.step();
@@ -267,8 +259,8 @@ fn the_pictures_of_the_synthetic_view_are_chosen_by_name_and_blink_with_the_quer
 
 #[test]
 fn both_views_draw_at_every_moment_of_a_run() {
-    let mut window = finished(Method::FB, "images");
-    order(&mut window, Command::SelectFeature(Some(0)));
+    let mut window = at_end(Method::FB, "images");
+    send(&mut window, Command::SelectFeature(Some(0)));
     let len = app(&window).run().len();
     // Every moment of FB's story, and some of the long searches.
     let mut cursor = 0;
@@ -283,7 +275,7 @@ fn both_views_draw_at_every_moment_of_a_run() {
 
 #[test]
 fn the_synthetic_view_is_whole_in_a_narrow_window() {
-    let mut window = finished(Method::MI, "synthetic");
+    let mut window = at_end(Method::MI, "synthetic");
     for width in [500.0, 700.0, 1100.0] {
         window.set_size(Vec2::new(width, 600.0));
         window.run_steps(4);

@@ -10,15 +10,12 @@ use posescope::method::Method;
 use posescope::session::{RunMode, Span};
 
 use crate::binary::has;
-use crate::window::{app, finish, run_until_idle, send, setup, wait, window};
+use crate::window::{app, finished, run_until_idle, send, setup, wait};
 
-/// The small world after all of its run.
-fn finished() -> Harness<'static, App> {
-    let mut setup = setup();
-    setup.mode = RunMode::Running;
-    let mut window = window(setup);
-    finish(&mut window);
-    send(&mut window, Command::Maximize(Some("surface")));
+/// The small world after all of its run, with a view in front.
+fn after(view: &'static str) -> Harness<'static, App> {
+    let mut window = finished(setup());
+    send(&mut window, Command::Maximize(Some(view)));
     window
 }
 
@@ -95,7 +92,7 @@ fn words(scored: &PoseScored) -> String {
 
 #[test]
 fn hovering_a_cell_tells_its_recorded_cost_and_sends_its_pose() {
-    let mut window = finished();
+    let mut window = after("surface");
     move_to_end(&mut window, Method::MI);
     let scored = told::<PoseScored>(&window, Method::MI);
     let mut seen = Vec::new();
@@ -126,7 +123,7 @@ fn hovering_a_cell_tells_its_recorded_cost_and_sends_its_pose() {
 
 #[test]
 fn leaving_a_map_is_said_once() {
-    let mut window = finished();
+    let mut window = after("surface");
     move_to_end(&mut window, Method::MI);
     hover(&mut window, "Cost map", 0.5, 0.5).expect("a cell");
     let hovered = app(&window).hovered;
@@ -140,7 +137,7 @@ fn leaving_a_map_is_said_once() {
 
 #[test]
 fn a_click_takes_the_camera_to_the_cell() {
-    let mut window = finished();
+    let mut window = after("surface");
     move_to_end(&mut window, Method::PM);
     hover(&mut window, "Cost map", 0.25, 0.5).expect("a cell");
     let hovered = app(&window).hovered;
@@ -156,8 +153,7 @@ fn a_click_takes_the_camera_to_the_cell() {
 
 #[test]
 fn the_maps_fill_as_the_cursor_goes_and_a_cell_of_half_a_search_is_as_recorded() {
-    let mut window = finished();
-    send(&mut window, Command::Maximize(Some("surface")));
+    let mut window = after("surface");
     let scored = told::<PoseScored>(&window, Method::MI);
     for &(at, ref event) in scored.iter().filter(|(_, event)| !event.phase.is_yaw()).step_by(11) {
         move_to(&mut window, at);
@@ -180,8 +176,7 @@ fn the_maps_fill_as_the_cursor_goes_and_a_cell_of_half_a_search_is_as_recorded()
 
 #[test]
 fn the_nmi_that_is_shown_is_one_less_the_recorded_cost() {
-    let mut window = finished();
-    send(&mut window, Command::Maximize(Some("histogram")));
+    let mut window = after("histogram");
     for (at, view) in told::<ViewRendered>(&window, Method::MI) {
         move_to(&mut window, at);
         let cost = view.comparison.score.cost.expect("textured walls");
@@ -198,8 +193,7 @@ fn the_nmi_that_is_shown_is_one_less_the_recorded_cost() {
 
 #[test]
 fn a_bin_under_the_pointer_tells_its_pairs() {
-    let mut window = finished();
-    send(&mut window, Command::Maximize(Some("histogram")));
+    let mut window = after("histogram");
     let views = told::<ViewRendered>(&window, Method::MI);
     let (at, view) = views.last().expect("the result");
     move_to(&mut window, *at);
@@ -225,8 +219,7 @@ fn a_bin_under_the_pointer_tells_its_pairs() {
 
 #[test]
 fn the_residuals_of_pm_say_what_was_ignored() {
-    let mut window = finished();
-    send(&mut window, Command::Maximize(Some("histogram")));
+    let mut window = after("histogram");
     move_to_end(&mut window, Method::PM);
     let views = told::<ViewRendered>(&window, Method::PM);
     let view = &views.last().expect("the result").1;
@@ -242,8 +235,7 @@ fn the_residuals_of_pm_say_what_was_ignored() {
 
 #[test]
 fn ransac_counts_the_trials_and_a_click_goes_to_one() {
-    let mut window = finished();
-    window.state_mut().send(Command::Maximize(Some("ransac")));
+    let mut window = after("ransac");
     let trials = told::<HypothesisTried>(&window, Method::FB);
     for (made, (at, tried)) in trials.iter().enumerate().step_by(trials.len() / 5 + 1) {
         move_to(&mut window, *at);
@@ -264,8 +256,7 @@ fn ransac_counts_the_trials_and_a_click_goes_to_one() {
 
 #[test]
 fn the_acceptance_test_is_told_in_words() {
-    let mut window = finished();
-    window.state_mut().send(Command::Maximize(Some("ransac")));
+    let mut window = after("ransac");
     let (at, judged) = told::<ConsensusJudged>(&window, Method::FB)[0].clone();
     assert!(judged.accepted);
     move_to(&mut window, at);
@@ -277,7 +268,7 @@ fn the_acceptance_test_is_told_in_words() {
 
 #[test]
 fn every_moment_of_a_run_can_be_drawn() {
-    let mut window = finished();
+    let mut window = after("surface");
     let records = app(&window).run().len();
     // Each view says what is missing, or names what it draws.
     let views: [(&str, &[&str]); 3] = [
@@ -299,13 +290,11 @@ fn every_moment_of_a_run_can_be_drawn() {
 #[test]
 fn the_costs_from_the_result_to_the_truth_end_in_those_of_both() {
     let mut setup = setup();
-    setup.mode = RunMode::Running;
     // A grid that misses the truth.
     for assignment in ["grid.coarse_step=3", "grid.fine_range=0.2"] {
         setup.task.params.assign(assignment).expect("a parameter");
     }
-    let mut window = window(setup);
-    finish(&mut window);
+    let mut window = finished(setup);
     move_to_end(&mut window, Method::MI);
     send(&mut window, Command::Maximize(Some("surface")));
     wait(&mut window, |app| {
@@ -354,12 +343,10 @@ fn the_costs_from_the_result_to_the_truth_end_in_those_of_both() {
 /// The dense map of MI with steps that a test has time for, filled.
 fn filled_densely() -> Harness<'static, App> {
     let mut setup = setup();
-    setup.mode = RunMode::Running;
     for assignment in ["surface.step=0.25", "surface.yaw_step=2.5"] {
         setup.task.params.assign(assignment).expect("a parameter");
     }
-    let mut window = window(setup);
-    finish(&mut window);
+    let mut window = finished(setup);
     move_to_end(&mut window, Method::MI);
     window.state_mut().send(Command::Maximize(Some("surface")));
     window.key_press(egui::Key::F);
@@ -468,7 +455,7 @@ fn the_dense_map_is_the_cheapest_heading_of_each_position_and_takes_the_camera_t
 
 #[test]
 fn a_dense_map_that_nobody_looks_at_stands_still_and_is_gone_on_with() {
-    let mut window = finished();
+    let mut window = after("surface");
     move_to_end(&mut window, Method::MI);
     window.state_mut().send(Command::Maximize(Some("surface")));
     // Many more hypotheses than can be scored between two frames.

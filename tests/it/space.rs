@@ -3,19 +3,18 @@
 
 use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
-use posescope::app::{App, Command};
+use posescope::app::{App, Command, Setup};
 use posescope::event::PhaseSearched;
 use posescope::grid::Phase;
-use posescope::session::RunMode;
+use posescope::method::Method;
+use posescope::session::{Part, RunMode};
 
 use crate::painted::{PaintedWindow, painted};
-use crate::window::{app, run_until_idle, send, setup, window};
+use crate::window::{app, finished, run_until_idle, send, setup};
 
-fn finished() -> Harness<'static, App> {
-    let mut setup = setup();
-    setup.mode = RunMode::Running;
-    let mut window = window(setup);
-    run_until_idle(&mut window);
+/// A window after its run, with the view in front.
+fn after(setup: Setup) -> Harness<'static, App> {
+    let mut window = finished(setup);
     send(&mut window, Command::Maximize(Some("space")));
     window
 }
@@ -58,7 +57,7 @@ fn drag(window: &mut Harness<'_, App>, from: egui::Pos2, by: egui::Vec2, held: e
 
 #[test]
 fn every_moment_of_a_run_is_drawn_and_the_cameras_come_one_by_one() {
-    let mut window = finished();
+    let mut window = after(setup());
     let run = app(&window).run().clone();
     let ends: Vec<usize> = run.spans().iter().map(|span| span.records.end - 1).collect();
     // Every hundredth record, and all around the ends of the estimators.
@@ -75,8 +74,24 @@ fn every_moment_of_a_run_is_drawn_and_the_cameras_come_one_by_one() {
 }
 
 #[test]
+fn the_best_pose_so_far_is_that_of_the_method_at_the_cursor() {
+    let mut setup = setup();
+    let fb2: Method = "fb2".parse().expect("registered");
+    setup.task.protocol.methods = vec![Method::FB, fb2];
+    let mut window = after(setup);
+    let part = app(&window).run().span_of(Part::Reference(fb2, 0)).expect("it ran");
+    let records = part.records.clone();
+    let mut has_best = |cursor| {
+        send(&mut window, Command::MoveCursor(cursor));
+        window.query_by_label_contains("FB2, best so far: ").is_some()
+    };
+    assert!(!has_best(records.start), "FB2 has tried nothing yet");
+    assert!(has_best(records.end - 2));
+}
+
+#[test]
 fn the_truth_hides_with_its_errors() {
-    let mut window = finished();
+    let mut window = after(setup());
     assert!(label(&window, "FB: ").contains("from the truth"));
     assert!(window.query_by_label_contains("Truth: ").is_some());
     send(&mut window, Command::ShowTruth);
@@ -99,7 +114,7 @@ fn choose(window: &mut Harness<'_, App>, name: &str) {
 
 #[test]
 fn one_looks_through_a_camera_and_leaves_it_by_turning() {
-    let mut window = finished();
+    let mut window = after(setup());
     assert!(headline(&window).contains("Drag: turn"));
     choose(&mut window, "Through FB");
     assert!(headline(&window).contains("Through FB"));
@@ -119,7 +134,7 @@ fn one_looks_through_a_camera_and_leaves_it_by_turning() {
 
 #[test]
 fn shifting_takes_the_labels_along() {
-    let mut window = finished();
+    let mut window = after(setup());
     choose(&mut window, "From above");
     let place = |window: &Harness<'_, App>| window.get_by_label_contains("Reference: ").rect().min;
     let before = place(&window);
@@ -142,7 +157,7 @@ fn number_after(text: &str, words: &str) -> f64 {
 
 #[test]
 fn the_cost_under_the_pointer_is_the_recorded_one() {
-    let mut window = finished();
+    let mut window = after(setup());
     // The hybrid took the pose of FB and searched nothing.
     let method = posescope::method::Method::MI;
     send(&mut window, Command::SelectMethod(method));
@@ -188,14 +203,12 @@ fn the_cost_under_the_pointer_is_the_recorded_one() {
 #[test]
 fn the_ground_has_the_colours_of_the_cost_map() {
     let mut setup = setup();
-    setup.mode = RunMode::Running;
     // A coarse grid beside the truth: the fine positions reach lower costs.
     for assignment in ["grid.coarse_step=1.7", "grid.fine_range=1"] {
         setup.task.params.assign(assignment).expect("a parameter");
     }
-    let mut window = window(setup);
-    run_until_idle(&mut window);
-    send(&mut window, Command::SelectMethod(posescope::method::Method::MI));
+    let mut window = finished(setup);
+    send(&mut window, Command::SelectMethod(Method::MI));
     let bar = |window: &mut Harness<'_, App>, view| {
         send(window, Command::Maximize(Some(view)));
         label(window, "Colours of cost")
@@ -223,14 +236,13 @@ fn the_ground_has_the_colours_of_the_cost_map() {
 
 #[test]
 fn without_a_graphics_card_the_view_says_so() {
-    let window = finished();
+    let window = after(setup());
     assert!(window.query_by_label_contains("No graphics card").is_some());
 }
 
 /// The window with its run over, drawn by any adapter there is; `None` without one.
 fn drawn() -> Option<PaintedWindow> {
-    let mut setup = setup();
-    setup.mode = RunMode::Running;
+    let setup = Setup { mode: RunMode::Running, ..setup() };
     let mut painted = painted(setup, [1500.0, 950.0])?;
     run_until_idle(&mut painted.window);
     send(&mut painted.window, Command::Maximize(Some("space")));

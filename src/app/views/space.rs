@@ -131,18 +131,12 @@ impl View for SpaceView {
             ui.weak("The scene appears when the query and its reference are read");
             return;
         };
-        match &self.painter {
-            None => {
-                ui.weak("No graphics card: points, lines and surfaces are not drawn");
-            }
-            Some(painter) => {
-                if let Some(why) = painter.trouble() {
-                    ui.colored_label(
-                        ui.visuals().error_fg_color,
-                        format!("Nothing is drawn in 3-D: {why}"),
-                    );
-                }
-            }
+        let trouble = match &self.painter {
+            None => Some("No graphics card: points, lines and surfaces are not drawn".to_owned()),
+            Some(painter) => painter.trouble().map(|why| format!("Nothing is drawn in 3-D: {why}")),
+        };
+        if let Some(words) = trouble {
+            ui.colored_label(ui.visuals().error_fg_color, words);
         }
         // The marks are made for a dark ground.
         let style = ui.ctx().style_of(egui::Theme::Dark);
