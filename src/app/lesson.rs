@@ -289,7 +289,7 @@ fn outcome(state: &AppState, method: Method, guess: &Pose) -> Vec<String> {
     let mut words: Vec<String> = place(state, guess).into_iter().collect();
     match pose {
         Some(pose) => {
-            words.push(format!("{} puts it {:.2} m from there", method.label(), apart(&pose)))
+            words.push(format!("{} puts it {:.2} m from there", method.label(), apart(&pose)));
         }
         None => words.push(format!("{} is at work", method.label())),
     }

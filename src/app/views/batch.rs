@@ -33,12 +33,15 @@ const WAS: f32 = 40.0;
 /// The least width of the causes, which have the rest of the room \[points\].
 const CAUSE: f32 = 120.0;
 
+/// The chosen results, their order, and the version of what they are compared with.
+type ShownKey = (Rc<[ResultRow]>, Option<Order>, u64);
+
 /// The results of all queries that were run.
 #[derive(Default)]
 pub struct BatchView {
     order: Option<Order>,
-    /// The rows in their order, and a line about them; of the chosen results at a version.
-    shown: Memo<(Rc<[ResultRow]>, Option<Order>, u64), (Vec<ResultRow>, String)>,
+    /// The rows in their order, and a line about them.
+    shown: Memo<ShownKey, (Vec<ResultRow>, String)>,
 }
 
 impl View for BatchView {
