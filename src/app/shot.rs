@@ -123,7 +123,6 @@ impl<'a> Window<'a> {
     }
 
     fn run_to_end(&mut self) -> Result<(), ShotError> {
-        self.app.send(Command::RunToEnd);
         loop {
             self.app.update(&self.ctx);
             match self.app.app_state().run_state() {
@@ -132,9 +131,9 @@ impl<'a> Window<'a> {
                 RunState::Cancelled => {
                     return Err(ShotError::Broken("the run was cancelled".to_owned()));
                 }
-                RunState::Loading | RunState::Running | RunState::Paused { .. } => {
-                    std::thread::sleep(Self::PAUSE);
-                }
+                // A breakpoint stopped it.
+                RunState::Paused { .. } => self.app.send(Command::RunToEnd),
+                RunState::Loading | RunState::Running => std::thread::sleep(Self::PAUSE),
             }
         }
     }
@@ -172,7 +171,10 @@ impl<'a> Window<'a> {
     fn settled(&mut self) -> egui::FullOutput {
         /// Sizes are known one frame late, and pictures are asked for in the frame that wants them.
         const CALM_FRAMES: usize = 6;
+        /// What still moves by then, moves forever.
+        const PATIENCE: usize = 120;
         let mut calm = 0;
+        let mut before = Vec::new();
         loop {
             self.app.update(&self.ctx);
             let mut output = self.frame();
@@ -180,9 +182,11 @@ impl<'a> Window<'a> {
             let state = self.app.app_state();
             // A picture that has just come changes the layout of the frames after it.
             calm = if state.is_working_out() { 0 } else { calm + 1 };
-            if calm >= CALM_FRAMES {
+            let is_still = output.shapes == before || calm >= PATIENCE;
+            if calm >= CALM_FRAMES && is_still {
                 return output;
             }
+            before.clone_from(&output.shapes);
             if calm == 0 {
                 std::thread::sleep(Self::PAUSE);
             }
