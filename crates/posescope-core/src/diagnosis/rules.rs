@@ -14,6 +14,7 @@ use super::case::{Case, FusionCase, RankingCase};
 use super::family::Family;
 use super::{Diagnosis, Proof};
 use crate::event::Stage;
+use crate::method::Method;
 use crate::text::UnknownWord;
 
 macro_rules! verdicts {
@@ -148,6 +149,18 @@ impl Code {
     /// What it means, in one phrase.
     pub fn title(self) -> &'static str {
         self.rule().title
+    }
+
+    /// What to try against it. Another system does not read our parameters.
+    pub fn advice(self, method: Method) -> &'static str {
+        let rule = self.rule();
+        let is_of_a_cost = !rule.applies_to.contains(&Family::Features);
+        match Family::of(method) {
+            Some(Family::Given) if is_of_a_cost && rule.applies_to.contains(&Family::Given) => {
+                "compare it with --method robust, or use another reference"
+            }
+            _ => rule.advice,
+        }
     }
 
     /// Whether it says that something failed: all but [`Code::L1`], which says that the pose is uncertain.
