@@ -7,12 +7,14 @@
 mod basin;
 mod dense;
 mod lattice;
+mod scan;
 mod scored;
 mod settle;
 
 pub use basin::Basin;
 pub use dense::DenseSurface;
 pub use lattice::{Lattice, LatticeTooLarge, MOST_CELLS};
+pub use scan::{Scored, scan};
 pub use scored::ScoredLattice;
 
 use nalgebra::{Translation3, Vector3};
