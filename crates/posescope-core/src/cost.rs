@@ -36,7 +36,7 @@ pub use tallying::{LesserHalf, Tallying};
 
 use crate::describe::{Describe, choice};
 use crate::image::{FloatImage, GrayImage, cubic_interpolated};
-use crate::memo::{Bits, Exact, Key};
+use crate::memo::{Key, key};
 
 /// What the query and the synthetic view show at one covered pixel.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -92,7 +92,7 @@ pub trait Cost: Send + Sync {
     /// What [`Self::reference_channel`] makes: all that it depends on beside the photo. Costs of equal
     /// keys share one coloured cloud.
     fn reference_channel_key(&self) -> Key {
-        Key::new("grey")
+        key("grey")
     }
 
     /// The cost over the pairs; `None` where they decide nothing (no pair, constant image).
@@ -168,7 +168,7 @@ pub enum SmoothCost {
 }
 
 /// Parameters that make a cost.
-pub trait MakesCost: Describe + Bits + Clone + fmt::Debug + Send + Sync + 'static {
+pub trait MakesCost: Describe + Clone + fmt::Debug + Send + Sync + 'static {
     /// The cost with these parameters.
     fn make(&self) -> Box<dyn Cost>;
 }
@@ -178,9 +178,6 @@ pub trait CostParams: Describe + fmt::Debug + Send + Sync {
     /// The cost with these parameters.
     fn cost(&self) -> Box<dyn Cost>;
 
-    /// A key that is equal for equal parameters of the same cost, and only for those.
-    fn key(&self) -> Key;
-
     /// The same parameters.
     fn boxed(&self) -> Box<dyn CostParams>;
 }
@@ -188,10 +185,6 @@ pub trait CostParams: Describe + fmt::Debug + Send + Sync {
 impl<P: MakesCost> CostParams for P {
     fn cost(&self) -> Box<dyn Cost> {
         self.make()
-    }
-
-    fn key(&self) -> Key {
-        Key::new(Exact::of(self))
     }
 
     fn boxed(&self) -> Box<dyn CostParams> {
@@ -261,11 +254,7 @@ impl Clone for CostSettings {
 
 impl PartialEq for CostSettings {
     fn eq(&self, other: &Self) -> bool {
-        let keys = |settings: &Self| -> Vec<Key> {
-            let params = settings.0.iter();
-            params.map(|params| params.key()).collect()
-        };
-        keys(self) == keys(other)
+        key(&self.0) == key(&other.0)
     }
 }
 

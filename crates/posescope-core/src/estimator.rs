@@ -34,7 +34,9 @@ use std::str::FromStr;
 use std::sync::LazyLock;
 
 use crate::cost;
+use crate::event::MinimumAssessed;
 use crate::geometry::Pose;
+use crate::grid::Offset;
 use crate::method::Method;
 use crate::params::Params;
 use crate::problem::Problem;
@@ -77,6 +79,14 @@ pub struct CostSummary {
     pub coverage_reference: f64,
     /// Hypotheses that were scored.
     pub evaluations: u64,
+}
+
+impl CostSummary {
+    /// What is told of a minimum that was found.
+    fn assessed(&self, offset: Offset) -> MinimumAssessed {
+        let &Self { initial, best, shuffled, runner_up, .. } = self;
+        MinimumAssessed { offset, initial, best, shuffled, runner_up }
+    }
 }
 
 /// What an estimator has to say in the end. A query that cannot be localised is an answer too.

@@ -13,7 +13,7 @@ use crate::depth::LiftedMatch;
 use crate::features::{FeatureState, Features, Match, MatchVerdict};
 use crate::fusion::share::Share;
 use crate::geometry::Pose;
-use crate::grid::{Offset, Phase, ScoredLattice};
+use crate::grid::{Offset, Phase, Scored, ScoredLattice};
 use crate::image::Photo;
 use crate::judge::{Freedoms, Refined};
 use crate::method::Method;
@@ -351,6 +351,15 @@ pub struct PoseScored {
     pub coverage: f64,
     /// Whether it is the best of the phase so far.
     pub is_best: bool,
+}
+
+impl PoseScored {
+    /// The event of a hypothesis that was scored, where the reference pose covers so many pixels.
+    pub fn new(phase: Phase, evaluation: u64, scored: Scored, covered_at_reference: u32) -> Self {
+        let Scored { offset, score, is_best } = scored;
+        let coverage = f64::from(score.covered) / f64::from(covered_at_reference.max(1));
+        Self { phase, evaluation, offset, score, coverage, is_best }
+    }
 }
 
 /// One phase of the grid search is complete.

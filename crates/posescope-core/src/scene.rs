@@ -18,7 +18,6 @@ use crate::camera::Intrinsics;
 use crate::cloud::Cloud;
 use crate::geometry::Pose;
 use crate::image::Photo;
-use crate::memo::Memo;
 use crate::problem::{Query, ReferenceTuple};
 
 /// A sequence of frames in one world frame. Frames are addressed by position, `0..frames().len()`.
@@ -65,12 +64,11 @@ pub trait Scene: Send + Sync {
     /// # Errors
     /// The errors of [`Scene::photo`].
     fn query(&self, frame: usize) -> Result<Arc<Query>, SceneError> {
-        Ok(Arc::new(Query {
-            name: self.frames()[frame].clone(),
-            photo: Arc::new(self.photo(frame)?),
-            intrinsics: self.intrinsics(frame),
-            memo: Memo::off(),
-        }))
+        Ok(Arc::new(Query::unchecked(
+            self.frames()[frame].clone(),
+            self.photo(frame)?,
+            self.intrinsics(frame),
+        )))
     }
 
     /// The frame as a reference tuple: the photo of [`Scene::query`], with which it remembers, and

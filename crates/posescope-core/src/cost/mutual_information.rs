@@ -6,7 +6,7 @@ use super::{
 };
 use crate::describe::parameters;
 use crate::image::{FloatImage, GrayImage, gaussian_smoothed};
-use crate::memo::{Exact, Key};
+use crate::memo::{Key, key};
 
 /// MI's cost among all costs.
 pub(super) const ENTRY: Entry = Entry {
@@ -64,7 +64,7 @@ impl Cost for MutualInformation {
     }
 
     fn query_channel_key(&self) -> Key {
-        Key::new(("grey", Exact::of(&self.params.sigma_px)))
+        key(("grey", self.params.sigma_px))
     }
 
     fn evaluate(&self, pairs: &[IntensityPair]) -> Option<f64> {

@@ -15,7 +15,7 @@ use super::{
 };
 use crate::describe::parameters;
 use crate::image::{FloatImage, GrayImage, gaussian_smoothed};
-use crate::memo::{Exact, Key};
+use crate::memo::{Key, key};
 
 /// NID among all costs.
 pub(super) const ENTRY: Entry = Entry {
@@ -110,7 +110,7 @@ impl Cost for Orientation {
     }
 
     fn reference_channel_key(&self) -> Key {
-        Key::new(Exact::of(&self.params))
+        key(&self.params)
     }
 
     fn evaluate(&self, pairs: &[IntensityPair]) -> Option<f64> {

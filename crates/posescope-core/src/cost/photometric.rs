@@ -10,7 +10,7 @@ use super::{
 };
 use crate::describe::parameters;
 use crate::image::{FloatImage, GrayImage, gaussian_smoothed};
-use crate::memo::{Exact, Key};
+use crate::memo::{Key, key};
 
 /// PM's cost among all costs.
 pub(super) const ENTRY: Entry = Entry {
@@ -111,7 +111,7 @@ impl Cost for Photometric {
     }
 
     fn query_channel_key(&self) -> Key {
-        Key::new(("grey", Exact::of(&self.params.sigma_px)))
+        key(("grey", self.params.sigma_px))
     }
 
     fn evaluate(&self, pairs: &[IntensityPair]) -> Option<f64> {

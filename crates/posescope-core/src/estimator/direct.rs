@@ -9,12 +9,11 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use super::{CostSummary, Estimator, Failure, Halt, Outcome, separate_failure};
 use crate::cost::{self, Cost, shuffled};
 use crate::descent::DescentParams;
-use crate::event::{
-    CloudColored, MinimumAssessed, Moment, PhaseSearched, PoseScored, Stage, ViewRendered,
-};
+use crate::event::{CloudColored, Moment, PhaseSearched, PoseScored, Stage, ViewRendered};
 use crate::geometry::Pose;
-use crate::grid::{GridParams, Lattice, Offset, Phase, ScoredLattice, least_covered};
-use crate::memo::{Exact, Key, MemoId, Recalled, Remembered};
+use crate::grid::{GridParams, Lattice, Offset, Phase, Scored, ScoredLattice, least_covered, scan};
+use crate::image::FloatImage;
+use crate::memo::{Key, Recalled, key};
 use crate::method::Method;
 use crate::params::Params;
 use crate::problem::Problem;
@@ -43,7 +42,7 @@ impl Direct {
             render: params.render.clone(),
             grid: params.grid.clone(),
             descent: params.descent.clone(),
-            cost_key: Key::new((entry.name, cost.key())),
+            cost_key: key((entry.name, cost)),
         }
     }
 
@@ -60,7 +59,7 @@ impl Direct {
             render: params.render.clone(),
             grid: params.grid.clone(),
             descent: params.descent.clone(),
-            cost_key: Key::new(("unregistered", MADE.fetch_add(1, Ordering::Relaxed))),
+            cost_key: key(("unregistered", MADE.fetch_add(1, Ordering::Relaxed))),
         }
     }
 }
@@ -100,10 +99,7 @@ impl Direct {
         trace: &mut Trace<'_>,
     ) -> Result<(Pose, CostSummary), Halt> {
         let radius = problem.uncertainty_radius_m;
-        // How large a lattice is depends on no centre, so none is refused after the others were scored.
-        for phase in Phase::ALL {
-            Lattice::new(phase, Offset::default(), radius, &self.grid).map_err(Failure::from)?;
-        }
+        check_size(&self.grid, radius)?;
         if self.cost.tallying().is_none() {
             leave_out(self.method, "has a cost that whole numbers do not decide");
         }
@@ -116,61 +112,45 @@ impl Direct {
         let start = Offset::default();
         let initial = scorer.score(&[start.reference_from_camera()])[0];
         let mut search = Search {
+            direct: self,
+            problem,
             scorer: &scorer,
-            memory: Memory { direct: self, problem },
             covered_at_reference: initial.covered,
             least_covered: least_covered(self.grid.coverage_floor, initial.covered),
             evaluations: 1,
-            best: start,
-            best_score: initial,
-            is_later_round: false,
         };
         trace.emit(|| search.render(Moment::Start, start))?;
-
-        let mut coarse_positions = None;
-        for round in 0..self.grid.rounds {
-            search.is_later_round = round > 0;
-            for phase in Phase::ALL {
-                let lattice =
-                    Lattice::new(phase, search.best, radius, &self.grid).map_err(Failure::from)?;
-                let surface =
-                    trace.stage(Stage::Search(phase), |trace| search.phase(lattice, trace))?;
-                if phase == Phase::PositionCoarse {
-                    if let Some((cost, hypotheses)) = surface.flat_cost() {
-                        return Err(Halt::from(Failure::FlatCost { cost, hypotheses }));
-                    }
-                    coarse_positions.get_or_insert(surface);
-                }
-            }
-        }
+        let best = Best { offset: start, score: Some(initial) };
+        let (best, coarse) = coarse_to_fine(&self.grid, radius, best, trace, |lattice, trace| {
+            search.phase(lattice, trace)
+        })?;
 
         trace.stage(Stage::Assess, |trace| {
-            let Search { best, best_score, evaluations, .. } = search;
-            let Some(best_cost) = best_score.cost else {
+            let evaluations = search.evaluations;
+            let Some((score, best_cost)) = best.score.and_then(|score| Some((score, score.cost?)))
+            else {
                 let hypotheses = evaluations as usize;
                 return Err(Halt::from(Failure::NothingComparable { hypotheses }));
             };
-            trace.emit(|| search.render(Moment::End, best))?;
+            trace.emit(|| search.render(Moment::End, best.offset))?;
             trace.checkpoint()?;
             let area = problem.query.intrinsics.area();
             let summary = CostSummary {
                 initial: initial.cost,
                 best: best_cost,
-                shuffled: search.shuffled_cost(problem.random_seed("shuffled pixels")),
-                runner_up: coarse_positions
+                shuffled: self.shuffled_cost(
+                    problem,
+                    &scorer,
+                    &best.offset.reference_from_camera(),
+                ),
+                runner_up: coarse
                     .and_then(|surface| surface.local_minima().get(1).map(|minimum| minimum.1)),
-                coverage_best: f64::from(best_score.covered) / area,
+                coverage_best: f64::from(score.covered) / area,
                 coverage_reference: f64::from(initial.covered) / area,
                 evaluations,
             };
-            trace.emit(|| MinimumAssessed {
-                offset: best,
-                initial: summary.initial,
-                best: summary.best,
-                shuffled: summary.shuffled,
-                runner_up: summary.runner_up,
-            })?;
-            Ok((problem.world_from_query(&best.reference_from_camera()), summary))
+            trace.emit(|| summary.assessed(best.offset))?;
+            Ok((problem.world_from_query(&best.offset.reference_from_camera()), summary))
         })
     }
 
@@ -193,11 +173,9 @@ impl Direct {
 
     pub(super) fn colored(&self, problem: &Problem) -> Recalled<ColoredCloud> {
         let reference = &problem.reference;
-        let key = ColoringKey {
-            render: Exact::of(&self.render),
-            channel: self.cost.reference_channel_key(),
-        };
-        reference.memo.recall(key, || {
+        let bytes = |cloud: &ColoredCloud| size_of_val(cloud.points.as_slice());
+        let inputs = (&self.render, self.cost.reference_channel_key());
+        reference.memo.recall(inputs, bytes, || {
             let value = self.cost.reference_channel(&reference.photo.gray);
             reference.visible_cloud(&self.render).colored_by(value)
         })
@@ -205,9 +183,10 @@ impl Direct {
 
     pub(super) fn scorer<'a>(&'a self, problem: &Problem, cloud: &'a ColoredCloud) -> Scorer<'a> {
         let query = &problem.query;
-        let channel = query
-            .memo
-            .recall(self.cost.query_channel_key(), || self.cost.query_channel(&query.photo.gray));
+        let bytes = |image: &FloatImage| size_of_val(image.as_raw().as_slice());
+        let channel = query.memo.recall(self.cost.query_channel_key(), bytes, || {
+            self.cost.query_channel(&query.photo.gray)
+        });
         Scorer::new(
             &cloud.points,
             channel.value,
@@ -218,171 +197,145 @@ impl Direct {
     }
 }
 
-/// What a coloured cloud depends on beside the reference.
-#[derive(PartialEq, Eq, Hash)]
-struct ColoringKey {
-    render: Exact<RenderParams>,
-    channel: Key,
+impl Direct {
+    /// Scores a lattice, or recalls its scores from the query, and tells each in scan order.
+    fn scored(
+        &self,
+        problem: &Problem,
+        scorer: &Scorer<'_>,
+        lattice: Lattice,
+        least_covered: u32,
+        trace: &mut Trace<'_>,
+        mut tell: impl FnMut(Scored, &mut Trace<'_>) -> Result<(), Cancelled>,
+    ) -> Result<ScoredLattice, Cancelled> {
+        let batch = scorer.at_a_time_of(lattice.cells());
+        let mut surface = None;
+        let bytes = |scores: &Vec<Score>| size_of_val(scores.as_slice());
+        let inputs = (self.cost_key, &self.render, &lattice);
+        let found = problem.try_recall(inputs, bytes, || {
+            let score = |poses: &[Pose]| scorer.score(poses);
+            let each = |one| tell(one, trace);
+            let mut scored = scan(lattice.clone(), least_covered, batch, score, each)?;
+            // Settled scores are cached: a later scorer asks no device, so it would correct nothing.
+            scored.settle(scorer);
+            let scores = scored.scores.iter().flatten().copied().collect();
+            surface = Some(scored);
+            Ok(scores)
+        })?;
+        trace.note_reuse(found.reused);
+        if let Some(surface) = surface {
+            return Ok(surface);
+        }
+        let mut known = found.value.iter().copied();
+        let score = |poses: &[Pose]| known.by_ref().take(poses.len()).collect();
+        scan(lattice, least_covered, batch, score, |one| tell(one, trace))
+    }
+
+    /// The cost at a pose if the view's pixels had nothing to do with the query's: what a minimum must beat to
+    /// mean anything.
+    fn shuffled_cost(&self, problem: &Problem, scorer: &Scorer<'_>, pose: &Pose) -> Option<f64> {
+        let seed = problem.random_seed("shuffled pixels");
+        self.cost.evaluate(&shuffled(&scorer.pairs(pose), seed))
+    }
 }
 
-/// Where the scores of a lattice are remembered: with the query, under all that they depend on.
+/// The best hypothesis of a search so far.
 #[derive(Clone, Copy)]
-struct Memory<'a> {
+pub(super) struct Best {
+    pub(super) offset: Offset,
+    /// `None` before anything was scored.
+    pub(super) score: Option<Score>,
+}
+
+impl Best {
+    /// Whether a score is worse. A later round is centred on the best pose, but its coarse disc is the
+    /// reference's, so its lattice need not contain that pose.
+    fn beats(&self, score: &Score, least_covered: u32) -> bool {
+        let best = self.score.and_then(|best| best.eligible_cost(least_covered));
+        let cost = score.eligible_cost(least_covered);
+        best.zip(cost).is_some_and(|(best, cost)| best < cost)
+    }
+}
+
+/// The search of appendix B: scores coarse and fine positions, then coarse and fine yaws, each around the best
+/// hypothesis so far, in one or more rounds. Returns the best and the first coarse positions.
+///
+/// A lattice where nothing has a cost leaves the search where it is.
+pub(super) fn coarse_to_fine(
+    grid: &GridParams,
+    radius_m: f64,
+    mut best: Best,
+    trace: &mut Trace<'_>,
+    mut score: impl FnMut(Lattice, &mut Trace<'_>) -> Result<Arc<ScoredLattice>, Cancelled>,
+) -> Result<(Best, Option<Arc<ScoredLattice>>), Halt> {
+    let mut coarse = None;
+    for round in 0..grid.rounds {
+        for phase in Phase::ALL {
+            let lattice =
+                Lattice::new(phase, best.offset, radius_m, grid).map_err(Failure::from)?;
+            let surface = trace.stage(Stage::Search(phase), |trace| score(lattice, trace))?;
+            if let Some(cell) = surface.minimum()
+                && let (Some(offset), Some(score)) =
+                    (surface.lattice.offset(cell), surface.scores[cell])
+                && (round == 0 || !best.beats(&score, surface.least_covered))
+            {
+                best = Best { offset, score: Some(score) };
+            }
+            if phase == Phase::PositionCoarse {
+                if let Some((cost, hypotheses)) = surface.flat_cost() {
+                    return Err(Halt::from(Failure::FlatCost { cost, hypotheses }));
+                }
+                coarse.get_or_insert(surface);
+            }
+        }
+    }
+    Ok((best, coarse))
+}
+
+/// Fails where a lattice of the search is too large. Its size does not depend on its centre: nothing need be
+/// scored before.
+pub(super) fn check_size(grid: &GridParams, radius_m: f64) -> Result<(), Failure> {
+    for phase in Phase::ALL {
+        Lattice::new(phase, Offset::default(), radius_m, grid)?;
+    }
+    Ok(())
+}
+
+/// The state of a search over the grid.
+struct Search<'a, 'cost> {
     direct: &'a Direct,
     problem: &'a Problem,
-}
-
-/// What scores depend on beside the query.
-#[derive(PartialEq, Eq, Hash)]
-struct ScoresKey {
-    reference: MemoId,
-    cost: Key,
-    render: Exact<RenderParams>,
-    lattice: Exact<Lattice>,
-}
-
-/// Remembered scores.
-struct LatticeScores(Vec<Score>);
-
-impl Remembered for LatticeScores {
-    fn heap_bytes(&self) -> usize {
-        size_of_val(self.0.as_slice())
-    }
-}
-
-impl Memory<'_> {
-    fn scores(
-        self,
-        lattice: &Lattice,
-        score: impl FnOnce() -> Result<Vec<Score>, Cancelled>,
-    ) -> Result<Recalled<LatticeScores>, Cancelled> {
-        let Self { direct, problem } = self;
-        let Some(id) = problem.reference.memo.id() else {
-            return Ok(Recalled::made(Arc::new(LatticeScores(score()?))));
-        };
-        let key = ScoresKey {
-            reference: id,
-            cost: direct.cost_key.clone(),
-            render: Exact::of(&direct.render),
-            lattice: Exact::of(lattice),
-        };
-        let memo = &problem.query.memo;
-        memo.try_recall(key, || Ok(LatticeScores(score()?)))
-    }
-}
-
-/// The state of a search: where it stands and what it has seen.
-struct Search<'a, 'cost> {
     scorer: &'a Scorer<'cost>,
-    memory: Memory<'a>,
     covered_at_reference: u32,
     least_covered: u32,
     evaluations: u64,
-    best: Offset,
-    best_score: Score,
-    is_later_round: bool,
 }
 
 impl Search<'_, '_> {
-    /// Scores a lattice, some hypotheses at a time, tells the scores in scan order, and moves to its
-    /// minimum.
-    ///
-    /// A lattice where nothing has a cost leaves the search where it is.
+    /// Scores a lattice and tells its hypotheses, and the view of each that is the best so far.
     fn phase(
         &mut self,
         lattice: Lattice,
         trace: &mut Trace<'_>,
     ) -> Result<Arc<ScoredLattice>, Cancelled> {
-        let mut surface = ScoredLattice {
-            scores: vec![None; lattice.cells()],
-            lattice: lattice.clone(),
-            least_covered: self.least_covered,
+        let &mut Self { direct, problem, scorer, covered_at_reference, least_covered, .. } = self;
+        let phase = lattice.phase;
+        let tell = |one: Scored, trace: &mut Trace<'_>| {
+            let evaluation = self.evaluations;
+            self.evaluations += 1;
+            trace.emit(|| PoseScored::new(phase, evaluation, one, covered_at_reference))?;
+            if one.is_best {
+                trace.emit(|| self.render(Moment::NewBest, one.offset))?;
+            }
+            Ok(())
         };
-        let mut least = None;
-        let (memory, scorer) = (self.memory, self.scorer);
-        let at_a_time = scorer.at_a_time_of(lattice.cells());
-        let found = memory.scores(&lattice, || {
-            let mut hypotheses = lattice.hypotheses();
-            loop {
-                trace.checkpoint()?;
-                let some: Vec<_> = hypotheses.by_ref().take(at_a_time).collect();
-                if some.is_empty() {
-                    break;
-                }
-                let poses: Vec<Pose> =
-                    some.iter().map(|(_, offset)| offset.reference_from_camera()).collect();
-                for ((cell, offset), score) in some.into_iter().zip(scorer.score(&poses)) {
-                    surface.scores[cell] = Some(score);
-                    self.tell(lattice.phase, offset, score, &mut least, trace)?;
-                }
-            }
-            // Settled scores are cached: a later scorer asks no device, so it would correct nothing.
-            surface.settle(scorer);
-            Ok(surface.scores.iter().flatten().copied().collect())
-        })?;
-        trace.note_reuse(found.reused);
-        if found.reused {
-            for ((cell, offset), &score) in lattice.hypotheses().zip(&found.value.0) {
-                surface.scores[cell] = Some(score);
-                self.tell(lattice.phase, offset, score, &mut least, trace)?;
-            }
-        }
+        let surface = direct.scored(problem, scorer, lattice, least_covered, trace, tell)?;
         let surface = Arc::new(surface);
-        let minimum = surface.minimum();
-        if let Some(cell) = minimum
-            && let (Some(offset), Some(score)) =
-                (surface.lattice.offset(cell), surface.scores[cell])
-            && !self.is_worse(&score)
-        {
-            (self.best, self.best_score) = (offset, score);
-        }
         trace.emit(|| PhaseSearched {
             surface: Arc::clone(&surface),
-            best: minimum.and_then(|cell| surface.lattice.offset(cell)),
+            best: surface.minimum().and_then(|cell| surface.lattice.offset(cell)),
         })?;
         Ok(surface)
-    }
-
-    /// Whether a score is worse than the best so far. A later round is centred on the best pose, but its
-    /// coarse disc is the reference's, so its lattice need not contain that pose.
-    fn is_worse(&self, score: &Score) -> bool {
-        self.is_later_round && {
-            let eligible = |score: &Score| score.eligible_cost(self.least_covered);
-            match (eligible(score), eligible(&self.best_score)) {
-                (Some(cost), Some(best)) => cost > best,
-                _ => false,
-            }
-        }
-    }
-
-    /// Tells the score of a hypothesis, and the view where it is the `least` of its lattice so far.
-    fn tell(
-        &mut self,
-        phase: Phase,
-        offset: Offset,
-        score: Score,
-        least: &mut Option<f64>,
-        trace: &mut Trace<'_>,
-    ) -> Result<(), Cancelled> {
-        let cost = score.eligible_cost(self.least_covered);
-        let is_best = cost.is_some_and(|cost| least.is_none_or(|least| cost < least));
-        if is_best {
-            *least = cost;
-        }
-        let evaluation = self.evaluations;
-        self.evaluations += 1;
-        trace.emit(|| PoseScored {
-            phase,
-            evaluation,
-            offset,
-            score,
-            coverage: f64::from(score.covered) / f64::from(self.covered_at_reference.max(1)),
-            is_best,
-        })?;
-        if is_best {
-            trace.emit(|| self.render(Moment::NewBest, offset))?;
-        }
-        Ok(())
     }
 
     fn render(&self, moment: Moment, offset: Offset) -> ViewRendered {
@@ -392,13 +345,5 @@ impl Search<'_, '_> {
             offset,
             comparison: Arc::new(self.scorer.compare(&offset.reference_from_camera())),
         }
-    }
-
-    /// The cost at the minimum if the view's pixels had nothing to do with the query's: what a
-    /// minimum must beat to mean anything.
-    fn shuffled_cost(&self, seed: u64) -> Option<f64> {
-        let best = self.best.reference_from_camera();
-        let pairs = shuffled(&self.scorer.compare(&best).pairs, seed);
-        self.memory.direct.cost.evaluate(&pairs)
     }
 }

@@ -21,9 +21,9 @@ pub use params::SixParams;
 
 use super::own::{self, View};
 use super::{CostSummary, Estimator, Failure, Halt, Outcome, separate_failure};
-use crate::event::{MinimumAssessed, Moment, PhaseSearched, PoseScored, Stage, StartsRefined};
+use crate::event::{Moment, PhaseSearched, PoseScored, Stage, StartsRefined};
 use crate::geometry::{Pose, PoseError};
-use crate::grid::{GridParams, Lattice, Offset, Phase, ScoredLattice, least_covered};
+use crate::grid::{GridParams, Lattice, Offset, Phase, ScoredLattice, least_covered, scan};
 use crate::judge::{Freedoms, Judge, JudgeParams, Refined, Shrinking, Start, shrink};
 use crate::method::Method;
 use crate::params::Params;
@@ -246,13 +246,7 @@ impl SixFreedoms {
             trace.emit(|| {
                 self.view.render(problem, Moment::End, search.evaluations - 1, &best.pose, score)
             })?;
-            trace.emit(|| MinimumAssessed {
-                offset: Offset::of(&best.pose),
-                initial: summary.initial,
-                best: summary.best,
-                shuffled: summary.shuffled,
-                runner_up: summary.runner_up,
-            })?;
+            trace.emit(|| summary.assessed(Offset::of(&best.pose)))?;
             Ok(Found { refined, summary, spread })
         })
     }
@@ -282,17 +276,10 @@ impl SixFreedoms {
         let least_covered = self.least_covered(judge.score(&[Pose::identity()])[0]);
         let mut surfaces = Vec::new();
         for lattice in self.lattices(problem, self.params.coarse_yaws)? {
-            let hypotheses: Vec<(usize, Offset)> = lattice.hypotheses().collect();
-            let mut scores = vec![None; lattice.cells()];
-            for some in hypotheses.chunks(judge.at_a_time()) {
-                trace.checkpoint()?;
-                let poses: Vec<Pose> =
-                    some.iter().map(|(_, offset)| offset.reference_from_camera()).collect();
-                for (&(cell, _), score) in some.iter().zip(judge.score(&poses)) {
-                    scores[cell] = Some(score);
-                }
-            }
-            surfaces.push(Arc::new(ScoredLattice { lattice, scores, least_covered }));
+            let score = |poses: &[Pose]| judge.score(poses);
+            let each = |_| trace.checkpoint();
+            let surface = scan(lattice, least_covered, judge.at_a_time(), score, each)?;
+            surfaces.push(Arc::new(surface));
         }
         let mut costs = |poses: &[Pose]| {
             trace.checkpoint()?;
@@ -370,35 +357,15 @@ impl Search<'_> {
         lattice: Lattice,
         trace: &mut Trace<'_>,
     ) -> Result<Arc<ScoredLattice>, Cancelled> {
-        let mut scores = vec![None; lattice.cells()];
-        let mut least: Option<f64> = None;
-        let hypotheses: Vec<_> = lattice.hypotheses().collect();
-        for some in hypotheses.chunks(self.judge.at_a_time()) {
-            trace.checkpoint()?;
-            let poses: Vec<Pose> =
-                some.iter().map(|(_, offset)| offset.reference_from_camera()).collect();
-            for ((cell, offset), score) in some.iter().copied().zip(self.judge.score(&poses)) {
-                scores[cell] = Some(score);
-                let cost = score.eligible_cost(self.least_covered);
-                let is_best = cost.is_some_and(|cost| least.is_none_or(|least| cost < least));
-                if is_best {
-                    least = cost;
-                }
-                let evaluation = self.evaluations;
-                self.evaluations += 1;
-                trace.emit(|| PoseScored {
-                    phase: lattice.phase,
-                    evaluation,
-                    offset,
-                    score,
-                    coverage: f64::from(score.covered)
-                        / f64::from(self.covered_at_reference.max(1)),
-                    is_best,
-                })?;
-            }
-        }
-        let surface =
-            Arc::new(ScoredLattice { lattice, scores, least_covered: self.least_covered });
+        let &mut Self { judge, covered_at_reference, least_covered, .. } = self;
+        let phase = lattice.phase;
+        let score = |poses: &[Pose]| judge.score(poses);
+        let each = |one| {
+            let evaluation = self.evaluations;
+            self.evaluations += 1;
+            trace.emit(|| PoseScored::new(phase, evaluation, one, covered_at_reference))
+        };
+        let surface = Arc::new(scan(lattice, least_covered, judge.at_a_time(), score, each)?);
         trace.emit(|| PhaseSearched {
             best: surface.minimum().and_then(|cell| surface.lattice.offset(cell)),
             surface: Arc::clone(&surface),

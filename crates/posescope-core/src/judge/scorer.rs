@@ -15,7 +15,6 @@ use crate::camera::Intrinsics;
 use crate::cost::{Pair, byte_bin};
 use crate::geometry::Pose;
 use crate::image::{GrayImage, cubic_interpolated};
-use crate::memo::{Exact, Remembered};
 use crate::problem::Problem;
 use crate::render::{
     Canvas, DepthCanvas, MOST_AT_A_TIME, PointArrays, RenderParams, Score, Values,
@@ -30,7 +29,7 @@ type Bins = [u8; 3];
 /// Scores query poses against one reference by the mean cost of three channels.
 pub struct Judge {
     reference: Arc<ReferencePoints>,
-    query: Arc<QueryBins>,
+    query: Arc<Vec<Bins>>,
     intrinsics: Intrinsics,
     splat_px: usize,
     params: JudgeParams,
@@ -38,37 +37,16 @@ pub struct Judge {
     idle: Mutex<Vec<Worker>>,
 }
 
-struct QueryBins(Vec<Bins>);
-
 /// The coloured points of a reference, as they are drawn.
 struct ReferencePoints {
     positions: PointArrays,
     bins: Vec<Bins>,
 }
 
-impl Remembered for QueryBins {
-    fn heap_bytes(&self) -> usize {
-        size_of_val(self.0.as_slice())
-    }
-}
-
-impl Remembered for ReferencePoints {
+impl ReferencePoints {
     fn heap_bytes(&self) -> usize {
         self.bins.len() * (size_of::<Bins>() + 3 * size_of::<f32>())
     }
-}
-
-#[derive(PartialEq, Eq, Hash)]
-struct QueryKey {
-    params: Exact<JudgeParams>,
-    shrink: u32,
-}
-
-#[derive(PartialEq, Eq, Hash)]
-struct ReferenceKey {
-    params: Exact<JudgeParams>,
-    render: Exact<RenderParams>,
-    shrink: u32,
 }
 
 impl Judge {
@@ -81,14 +59,15 @@ impl Judge {
         shrink: u32,
     ) -> Self {
         let query = &problem.query;
-        let bins = query.memo.recall(QueryKey { params: Exact::of(params), shrink }, || {
-            query_bins(&query.photo.gray, params, shrink)
-        });
+        let bytes = |bins: &Vec<Bins>| size_of_val(bins.as_slice());
+        let bins = query
+            .memo
+            .recall((params, shrink), bytes, || query_bins(&query.photo.gray, params, shrink));
         let reference = &problem.reference;
-        let points = reference.memo.recall(
-            ReferenceKey { params: Exact::of(params), render: Exact::of(render), shrink },
-            || reference_points(problem, render, params, shrink),
-        );
+        let points =
+            reference.memo.recall((params, render, shrink), ReferencePoints::heap_bytes, || {
+                reference_points(problem, render, params, shrink)
+            });
         Self {
             reference: points.value,
             query: bins.value,
@@ -147,7 +126,7 @@ impl Judge {
     }
 
     fn values(&self) -> Values<'_, Bins> {
-        Values { query: &self.query.0, points: &self.reference.bins }
+        Values { query: &self.query, points: &self.reference.bins }
     }
 
     /// How many poses to score at a time, so that a run can be stopped soon: at most
@@ -231,19 +210,15 @@ fn binned(values: [f32; 3], bins: usize) -> Bins {
     values.map(|value| byte_bin(value, bins))
 }
 
-fn query_bins(photo: &GrayImage, params: &JudgeParams, shrink: u32) -> QueryBins {
+fn query_bins(photo: &GrayImage, params: &JudgeParams, shrink: u32) -> Vec<Bins> {
     let (photo, params) = shrunk(photo, params, shrink);
     let ChannelImages([intensity, contrast, edges]) =
         ChannelImages::of(&photo, params.sigma_px, &params);
     let values = intensity.as_raw().iter().zip(contrast.as_raw());
     let values = values.zip(edges.as_raw());
-    QueryBins(
-        values
-            .map(|((&intensity, &contrast), &edges)| {
-                binned([intensity, contrast, edges], params.bins)
-            })
-            .collect(),
-    )
+    let bins = values
+        .map(|((&intensity, &contrast), &edges)| binned([intensity, contrast, edges], params.bins));
+    bins.collect()
 }
 
 fn reference_points(

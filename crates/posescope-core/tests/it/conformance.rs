@@ -20,7 +20,7 @@ use posescope_core::features::FeatureState;
 use posescope_core::geometry::Pose;
 use posescope_core::history::History;
 use posescope_core::image::{FloatImage, gaussian_smoothed};
-use posescope_core::memo::{Key, Memo};
+use posescope_core::memo::{Key, key};
 use posescope_core::method::Method;
 use posescope_core::params::Params;
 use posescope_core::problem::Problem;
@@ -271,7 +271,7 @@ impl Cost for Counting {
         gaussian_smoothed(photo, 0.0)
     }
     fn query_channel_key(&self) -> Key {
-        Key::new("grey")
+        key("grey")
     }
     fn evaluate(&self, pairs: &[IntensityPair]) -> Option<f64> {
         self.0.fetch_add(1, Ordering::Relaxed);
@@ -312,7 +312,7 @@ impl Cost for ManyBins {
         gaussian_smoothed(photo, 1.0)
     }
     fn query_channel_key(&self) -> Key {
-        Key::new("smooth")
+        key("smooth")
     }
     fn evaluate(&self, pairs: &[IntensityPair]) -> Option<f64> {
         let histogram = JointHistogram::of(pairs, self.0);
@@ -373,8 +373,7 @@ fn trials_that_are_not_remembered_are_told_again_all_the_same() {
     let (mut problem, mut params) = (remembering(), Params::default());
     // No photo shows the other: no sample is ever good enough, and all trials are drawn.
     let other = problem_of_strangers();
-    problem.query =
-        Arc::new(posescope_core::problem::Query { memo: Memo::of(64), ..(*other.query).clone() });
+    problem.query = Arc::new((*other.query).clone().remembering());
     let changes = [
         "fb.max_trials=30000",
         "fb.confidence=0.999999",
@@ -558,12 +557,8 @@ fn problem_of_strangers() -> Problem {
 
 pub fn remembering() -> Problem {
     let mut problem = solvable();
-    let mut query = (*problem.query).clone();
-    query.memo = Memo::of(64);
-    problem.query = Arc::new(query);
-    let mut reference = (*problem.reference).clone();
-    reference.memo = Memo::of(64);
-    problem.reference = Arc::new(reference);
+    problem.query = Arc::new((*problem.query).clone().remembering());
+    problem.reference = Arc::new((*problem.reference).clone().remembering());
     problem
 }
 

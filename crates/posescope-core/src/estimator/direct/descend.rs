@@ -5,13 +5,13 @@ use std::sync::Arc;
 use image::GrayImage;
 use nalgebra::Point3;
 
-use super::{Direct, Memory};
-use crate::cost::{SmoothCost, shuffled};
+use super::Direct;
+use crate::cost::SmoothCost;
 use crate::descent::{Step, View, information, photometric};
 use crate::estimator::{CostSummary, Failure, Halt};
-use crate::event::{DescentStepped, MinimumAssessed, Moment, PhaseSearched, Stage, ViewRendered};
+use crate::event::{DescentStepped, Moment, PhaseSearched, Stage, ViewRendered};
 use crate::geometry::Pose;
-use crate::grid::{Lattice, Offset, Phase, ScoredLattice, least_covered};
+use crate::grid::{Lattice, Offset, Phase, least_covered};
 use crate::image::{FloatImage, gaussian_smoothed};
 use crate::problem::Problem;
 use crate::render::{ColoredCloud, Score, Scorer};
@@ -101,24 +101,16 @@ impl Direct {
                 return Err(Halt::from(Failure::OutsideRadius { distance_m, radius_m }));
             }
             let area = problem.query.intrinsics.area();
-            let seed = problem.random_seed("shuffled pixels");
-            let pairs = shuffled(&scorer.compare(&pose).pairs, seed);
             let summary = CostSummary {
                 initial: initial.cost,
                 best,
-                shuffled: self.cost.evaluate(&pairs),
+                shuffled: self.shuffled_cost(problem, &scorer, &pose),
                 runner_up: None,
                 coverage_best: f64::from(score.covered) / area,
                 coverage_reference: f64::from(initial.covered) / area,
                 evaluations,
             };
-            trace.emit(|| MinimumAssessed {
-                offset: Offset::of(&pose),
-                initial: summary.initial,
-                best: summary.best,
-                shuffled: summary.shuffled,
-                runner_up: summary.runner_up,
-            })?;
+            trace.emit(|| summary.assessed(Offset::of(&pose)))?;
             Ok((problem.world_from_query(&pose), summary))
         })
     }
@@ -135,28 +127,11 @@ impl Direct {
         let lattice = Lattice::new(phase, start, problem.uncertainty_radius_m, &self.grid);
         let lattice = lattice.map_err(Failure::from)?;
         trace.stage(Stage::Search(phase), |trace| {
-            let memory = Memory { direct: self, problem };
-            let (cells, offsets): (Vec<usize>, Vec<Offset>) = lattice.hypotheses().unzip();
-            let found = memory.scores(&lattice, || {
-                let mut found = Vec::new();
-                for some in offsets.chunks(scorer.at_a_time()) {
-                    trace.checkpoint()?;
-                    let poses: Vec<Pose> = some.iter().map(Offset::reference_from_camera).collect();
-                    found.extend(scorer.score(&poses));
-                }
-                Ok(found)
-            })?;
-            trace.note_reuse(found.reused);
-            let mut scores = vec![None; lattice.cells()];
-            for (cell, &score) in cells.into_iter().zip(&found.value.0) {
-                scores[cell] = Some(score);
-            }
-            let least_covered = least_covered(self.grid.coverage_floor, initial.covered);
-            trace.emit(|| PhaseSearched {
-                surface: Arc::new(ScoredLattice { lattice, scores, least_covered }),
-                // It leads nowhere: the descent begins at the reference.
-                best: None,
-            })?;
+            let least = least_covered(self.grid.coverage_floor, initial.covered);
+            let silently = |_, trace: &mut Trace<'_>| trace.checkpoint();
+            let surface = self.scored(problem, scorer, lattice, least, trace, silently)?;
+            // It leads nowhere: the descent begins at the reference.
+            trace.emit(|| PhaseSearched { surface: Arc::new(surface), best: None })?;
             Ok(())
         })
     }

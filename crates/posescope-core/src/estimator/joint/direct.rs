@@ -1,13 +1,14 @@
 //! A direct method of several references: their costs added up over one grid.
 
+use std::sync::Arc;
+
 use super::{JointEstimator, JointOutcome, JointReference, between, lead};
 use crate::cost;
-use crate::estimator::direct::Direct;
+use crate::estimator::direct::{Best, Direct, check_size, coarse_to_fine};
 use crate::estimator::{Failure, Halt, separate_failure};
-use crate::event::Stage;
 use crate::fusion::share::Support;
 use crate::geometry::Pose;
-use crate::grid::{Lattice, Offset, Phase, ScoredLattice, least_covered};
+use crate::grid::{Lattice, Offset, ScoredLattice, least_covered, scan};
 use crate::judge::{Freedoms, Shrinking, Start, shrink};
 use crate::params::Params;
 use crate::problem::Problem;
@@ -76,9 +77,7 @@ impl JointDirect {
     ) -> Result<(Pose, Vec<Option<Support>>), Halt> {
         let lead = references[lead(references)].problem;
         let (grid, radius_m) = (&self.direct.grid, lead.uncertainty_radius_m);
-        for phase in Phase::ALL {
-            Lattice::new(phase, Offset::default(), radius_m, grid).map_err(Failure::from)?;
-        }
+        check_size(grid, radius_m)?;
         let mut clouds = Vec::new();
         for reference in references {
             trace.checkpoint()?;
@@ -99,28 +98,16 @@ impl JointDirect {
         }
 
         let joint = Joint { members };
-        let (mut best, mut found) = (Offset::default(), None);
+        let start = Best { offset: Offset::default(), score: None };
         let mut hypotheses = 0;
-        for _ in 0..grid.rounds {
-            for phase in Phase::ALL {
-                let lattice = Lattice::new(phase, best, radius_m, grid).map_err(Failure::from)?;
-                let surface = trace.stage(Stage::Search(phase), |trace| {
-                    joint.scored(lattice, &mut hypotheses, trace)
-                })?;
-                if phase == Phase::PositionCoarse
-                    && let Some((cost, hypotheses)) = surface.flat_cost()
-                {
-                    return Err(Halt::from(Failure::FlatCost { cost, hypotheses }));
-                }
-                if let Some(cell) = surface.minimum()
-                    && let Some(offset) = surface.lattice.offset(cell)
-                {
-                    (best, found) = (offset, Some(offset));
-                }
-            }
+        let (best, _) = coarse_to_fine(grid, radius_m, start, trace, |lattice, trace| {
+            hypotheses += lattice.hypotheses().count();
+            joint.scored(lattice, trace).map(Arc::new)
+        })?;
+        if best.score.is_none() {
+            return Err(Halt::from(Failure::NothingComparable { hypotheses }));
         }
-        let best = found.ok_or(Failure::NothingComparable { hypotheses })?;
-        let on_grid = best.reference_from_camera();
+        let on_grid = best.offset.reference_from_camera();
         let alone = references.iter().filter_map(|reference| reference.alone);
         let lead_from_world = lead.reference.world_from_camera.inverse();
         let starts = std::iter::once(on_grid).chain(alone.map(|pose| lead_from_world * pose));
@@ -173,35 +160,18 @@ struct Joint<'a> {
 }
 
 impl Joint<'_> {
-    fn scored(
-        &self,
-        lattice: Lattice,
-        count: &mut usize,
-        trace: &mut Trace<'_>,
-    ) -> Result<ScoredLattice, Cancelled> {
-        let mut scores = vec![None; lattice.cells()];
-        let at_a_time = self.members[0].scorer.at_a_time();
-        let mut hypotheses = lattice.hypotheses();
-        loop {
-            let some: Vec<_> = hypotheses.by_ref().take(at_a_time).collect();
-            if some.is_empty() {
-                break;
-            }
-            *count += some.len();
-            let poses: Vec<Pose> =
-                some.iter().map(|(_, offset)| offset.reference_from_camera()).collect();
-            let mut own = Vec::new();
-            for member in &self.members {
-                trace.checkpoint()?;
-                own.push(member.scores(&poses));
-            }
-            for (place, (cell, _)) in some.into_iter().enumerate() {
-                let own = own.iter().map(|scores| scores[place]);
-                scores[cell] = Some(self.together(own));
-            }
-        }
-        drop(hypotheses);
-        Ok(ScoredLattice { lattice, scores, least_covered: 0 })
+    /// The joint scores of many cameras in the frame of the lead.
+    fn score(&self, lead_from_camera: &[Pose]) -> Vec<Score> {
+        let own: Vec<Vec<Score>> =
+            self.members.iter().map(|member| member.scores(lead_from_camera)).collect();
+        let at = |place: usize| self.together(own.iter().map(|scores| scores[place]));
+        (0..lead_from_camera.len()).map(at).collect()
+    }
+
+    /// Those that abstain have been left out, so any coverage will do.
+    fn scored(&self, lattice: Lattice, trace: &mut Trace<'_>) -> Result<ScoredLattice, Cancelled> {
+        let batch = self.members[0].scorer.at_a_time() / self.members.len();
+        scan(lattice, 0, batch, |poses| self.score(poses), |_| trace.checkpoint())
     }
 
     /// The cheapest pose within the disc that steps which shrink lead to from any of these,
@@ -214,14 +184,11 @@ impl Joint<'_> {
     ) -> Result<Option<Pose>, Cancelled> {
         let mut costs = |poses: &[Pose]| {
             trace.checkpoint()?;
-            let own = self.members.iter().map(|member| member.scores(poses));
-            let own: Vec<Vec<Score>> = own.collect();
-            let cost = |(place, pose): (usize, &Pose)| {
+            let cost = |(pose, score): (&Pose, Score)| {
                 let shift = &pose.translation;
-                let score = self.together(own.iter().map(|scores| scores[place]));
                 score.cost.filter(|_| shift.x.hypot(shift.z) <= radius_m)
             };
-            Ok::<_, Cancelled>(poses.iter().enumerate().map(cost).collect::<Vec<_>>())
+            Ok::<_, Cancelled>(poses.iter().zip(self.score(poses)).map(cost).collect::<Vec<_>>())
         };
         let poses: Vec<Pose> = starts.collect();
         let starts: Vec<Start> = poses
