@@ -32,6 +32,7 @@ pub const KINDS: KindSet = KindSet::of(&[
     Kind::MatchesDecided,
     Kind::DepthsLifted,
     Kind::MatchesGuided,
+    Kind::PoseRefined,
     Kind::FeaturesClassified,
     Kind::PhaseSearched,
     Kind::ReferencesFused,

@@ -57,6 +57,11 @@ pub(super) fn cost_map(case: &ProofCase<'_>, overlay: MapOverlay) -> Option<Proo
     if beside.is_empty() {
         beside.push(Panel::new("Query", picture::photo(&case.problem.query.photo).into_rgb8()));
     }
+    if overlay == MapOverlay::Light {
+        let reference = &case.problem.reference;
+        let title = format!("Reference {}", reference.name);
+        beside.push(Panel::new(title, picture::photo(&reference.photo).into_rgb8()));
+    }
     for seen in result.iter().chain(&truth) {
         beside.push(view_panel(query, seen));
     }
@@ -200,7 +205,7 @@ fn map(
                 panel.line(palette::TRUTH, 2.5, heading(truth, truth.yaw_rad));
             }
         }
-        MapOverlay::Preference | MapOverlay::Coverage | MapOverlay::Flat => {}
+        MapOverlay::Preference | MapOverlay::Light | MapOverlay::Coverage | MapOverlay::Flat => {}
     }
     let label = |seen: &Seen| match overlay {
         MapOverlay::Coverage => {
@@ -223,7 +228,14 @@ fn map(
         if is_same {
             label += ", at the reference";
         }
-        panel.mark(Thing::Truth, at, label);
+        // Beyond the map, the mark is at the edge that is nearest to the truth.
+        let (right, bottom) = (lattice.columns as f32, lattice.rows as f32);
+        let edge = [at[0].clamp(0.0, right), at[1].clamp(0.0, bottom)];
+        let beyond = (at[0] - edge[0]).hypot(at[1] - edge[1]);
+        if beyond > 0.0 {
+            label += &format!(", {:.1} m beyond this edge", f64::from(beyond) * lattice.step);
+        }
+        panel.mark(Thing::Truth, edge, label);
     }
     panel
 }

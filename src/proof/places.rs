@@ -3,7 +3,7 @@
 use nalgebra::Point3;
 
 use super::{Panel, ProofCase, ProofPicture, Thing, is_near};
-use crate::event::{ReferencesFused, ReferencesRanked};
+use crate::event::{PoseRefined, ReferencesFused, ReferencesRanked};
 use crate::geometry::Pose;
 use crate::palette;
 use crate::picture;
@@ -96,7 +96,8 @@ impl Map {
         self.camera(Thing::Reference, &Pose::identity(), of_reference);
         let grade = palette::grade(case.result.grade);
         if let Some(pose) = result {
-            self.camera(Thing::Result(grade), pose, "result");
+            let label = if case.result.pose.is_some() { "result" } else { "refused pose" };
+            self.camera(Thing::Result(grade), pose, label);
         }
         if let Some(pose) = truth {
             self.camera(Thing::Truth, pose, of_truth);
@@ -119,12 +120,13 @@ fn ground(reference_from_camera: &Pose) -> [f64; 2] {
     [place.x, place.z]
 }
 
-/// Reference, truth and result, and what each reference of a fusion gave alone.
+/// Reference, truth and result, or the pose that was refused, and what each reference of a fusion gave alone.
 pub(super) fn pose_map(case: &ProofCase<'_>) -> ProofPicture {
     let problem = case.problem;
     let in_reference = |pose: &Pose| problem.reference_from_query(pose);
     let truth = case.truth.map(in_reference);
-    let result = case.pose().as_ref().map(in_reference);
+    let refused = || Some(case.latest::<PoseRefined>()?.reference_from_query);
+    let result = case.pose().as_ref().map(in_reference).or_else(refused);
     let fused = case.latest::<ReferencesFused>();
     let shares = fused.map_or(&[][..], |fused| &fused.shares);
     let each = shares.iter().filter_map(|share| Some((share, in_reference(share.pose.as_ref()?))));

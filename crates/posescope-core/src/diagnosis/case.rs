@@ -95,6 +95,17 @@ impl<'a, 'cost> Case<'a, 'cost> {
         }
     }
 
+    /// The parameter that limits the number of keypoints, with its value, where the query has so many.
+    pub(super) fn keypoint_limit(&self) -> Option<String> {
+        let params = self.subject.params;
+        let (key, limit) = match self.family {
+            Family::Guided => ("fb2.max_keypoints", params.fb2.sift.max_keypoints),
+            _ => ("surf.max_keypoints", params.surf.max_keypoints),
+        };
+        let found = self.subject.outcome.counts?.query_keypoints;
+        (limit > 0 && found >= limit).then(|| format!("{key}={limit}"))
+    }
+
     /// Whether the method would accept a pose that these correspondences agree on.
     pub(super) fn would_accept(&self, matches: &TrueMatches, inliers: &[usize]) -> bool {
         let (params, camera) = (self.subject.params, &self.subject.problem.query.intrinsics);

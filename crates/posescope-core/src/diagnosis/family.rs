@@ -39,6 +39,17 @@ impl Family {
         }
     }
 
+    /// The groups of parameters that a method of this family reads.
+    pub(super) fn groups(self, method: Method) -> Vec<&'static str> {
+        match self {
+            Self::Features => vec!["fb", "surf"],
+            Self::Guided => vec!["fb2", "render"],
+            Self::Grid => vec!["grid", "render", method.name()],
+            Self::Starts => vec!["mi6", "grid", "render", "judge"],
+            Self::Given => Vec::new(),
+        }
+    }
+
     /// The family of a method that is no hybrid; `None` where nothing is known of it but its pose.
     pub(super) fn of(method: Method) -> Option<Self> {
         Some(match estimator::find(method).map(|entry| &entry.parts) {

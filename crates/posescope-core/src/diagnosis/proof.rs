@@ -32,6 +32,8 @@ pub enum MapOverlay {
     Ranks,
     /// The parts of the query that speak for each pose.
     Preference,
+    /// The photos of query and reference, whose light differs.
+    Light,
     /// How much each pose covers.
     Coverage,
     /// The area that is searched.

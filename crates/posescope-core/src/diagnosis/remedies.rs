@@ -30,7 +30,11 @@ pub fn remedies(
     };
     let mut tried = match Family::of(responsible).filter(is_of) {
         None | Some(Family::Given) => Vec::new(),
-        Some(family) => (rule.remedies)(&Ask { family, params, radius_m }),
+        Some(family) => {
+            let of_rule = (rule.remedies)(&Ask { family, params, radius_m });
+            // What was changed by hand is the first suspect.
+            reset(&family.groups(responsible), params).into_iter().chain(of_rule).collect()
+        }
     };
     // Whatever it is, another method or another reference may do better; a search from many starts first.
     let others = [Method::named("mi6")].into_iter().chain(Method::PAPER);
@@ -51,20 +55,40 @@ pub fn remedies(
     tried
 }
 
+/// The parameters of these groups that differ from their defaults, back at them.
+fn reset(groups: &[&str], params: &Params) -> Option<Remedy> {
+    let changed = params.list().into_iter().zip(Params::default().list());
+    let changed = changed.filter(|(now, default)| {
+        let group = now.key.split('.').next().unwrap_or_default();
+        groups.contains(&group) && now.value != default.value
+    });
+    let back: Remedy = changed
+        .map(|(now, default)| Change::Set(format!("{}={}", now.key, default.value)))
+        .collect();
+    (!back.is_empty()).then_some(back)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::diagnosis::RULES;
 
-    /// The groups of parameters that a method of a family reads.
-    fn groups(family: Family) -> &'static [&'static str] {
-        match family {
-            Family::Features => &["fb", "surf"],
-            Family::Guided => &["fb2", "render"],
-            Family::Grid => &["grid", "render", "pm", "mi", "nid"],
-            Family::Starts => &["mi6", "grid", "render", "judge"],
-            Family::Given => &[],
+    #[test]
+    fn what_was_changed_by_hand_is_set_back_first() {
+        let mut params = Params::default();
+        for assignment in ["surf.max_keypoints=30", "fb.ratio=0.3", "mi.bins=8"] {
+            params.assign(assignment).expect("a parameter");
         }
+        let default = Params::default();
+        let set = |text: String| Change::Set(text);
+        let back = vec![
+            set(format!("fb.ratio={}", default.fb.ratio)),
+            set("surf.max_keypoints=0".to_owned()),
+        ];
+        let first = |method| remedies(Code::R3, method, false, &params, 10.0).swap_remove(0);
+        let mut found = first(Method::FB);
+        found.sort_by_key(|change| format!("{change:?}"));
+        assert_eq!(found, back);
     }
 
     #[test]
@@ -93,7 +117,7 @@ mod tests {
                     let key = assignment.split('=').next().unwrap_or_default();
                     let group = key.split('.').next().unwrap_or_default();
                     assert!(
-                        groups(family).contains(&group),
+                        family.groups(method).contains(&group),
                         "{} of {method}: {assignment}",
                         rule.code
                     );

@@ -11,7 +11,7 @@ pub(super) const RULE: Rule = Rule {
     is_conclusive: false,
     test: Test::Method(test),
     decided_at: DecidedAt::Stage(Stage::Assess),
-    proof: Proof::CostMap(MapOverlay::Preference),
+    proof: Proof::CostMap(MapOverlay::Light),
     remedies: d2::remedies,
 };
 

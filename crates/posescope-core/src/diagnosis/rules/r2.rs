@@ -22,12 +22,26 @@ fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
     case.matches()?;
     let counts = case.subject.outcome.counts?;
     let (query, reference) = (counts.query_keypoints, counts.reference_keypoints);
-    (query.min(reference) < FEW_KEYPOINTS).then(|| RULE.found(&Keypoints { query, reference }))
+    let limit = case.keypoint_limit();
+    (query.min(reference) < FEW_KEYPOINTS)
+        .then(|| RULE.found(&Keypoints { query, reference, limit }))
 }
 
-evidence!(Keypoints { query: usize, reference: usize } =>
-    "Too few keypoints: {query} in the query, {reference} in the reference."
-);
+#[derive(Serialize)]
+struct Keypoints {
+    query: usize,
+    reference: usize,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    limit: Option<String>,
+}
+
+impl fmt::Display for Keypoints {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { query, reference, limit } = self;
+        write!(f, "Too few keypoints: {query} in the query, {reference} in the reference.")?;
+        limit.iter().try_for_each(|limit| write!(f, " The limit is {limit}."))
+    }
+}
 
 fn remedies(ask: &Ask<'_>) -> Vec<Remedy> {
     vec![vec![ask.more_keypoints(0.2)], vec![ask.more_keypoints(0.05)]]

@@ -37,6 +37,7 @@ fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
         lost_at,
         before,
         after,
+        limit: case.keypoint_limit().filter(|_| lost_at == Step::Detect),
         true_matches: funnel,
     }))
 }
@@ -47,6 +48,8 @@ struct Matches {
     lost_at: Step,
     before: usize,
     after: usize,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    limit: Option<String>,
     true_matches: Funnel,
 }
 
@@ -58,6 +61,9 @@ impl fmt::Display for Matches {
             "Too few true matches: {} of {}. {lost} of {before} ",
             self.true_matches.unique, self.unique
         )?;
+        if let Some(limit) = &self.limit {
+            return write!(f, "visible reference keypoints were not detected in the query: {limit}.");
+        }
         f.write_str(match self.lost_at {
             Step::View => "reference keypoints with a depth are out of the query's view.",
             Step::Detect => "visible reference keypoints were not detected in the query.",

@@ -5,7 +5,7 @@ use super::*;
 pub(super) const RULE: Rule = Rule {
     code: Code::R8,
     title: "a wrong pose was accepted",
-    advice: "lower fb.ratio; something moved, or the place looks like another",
+    advice: "lower fb.ratio; does the cloud belong to the photo?",
     applies_to: Family::MATCHING,
     needs_truth: true,
     is_conclusive: false,
@@ -22,21 +22,34 @@ fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
         inliers: matches.inliers(),
         true_inliers: matches.funnel.inliers,
         supports_truth: matches.funnel.lifted,
+        wrong_depth: matches.wrong_depth,
         true_matches: matches.funnel,
     }))
 }
 
-evidence!(Accepted {
+#[derive(Serialize)]
+struct Accepted {
     error: PoseError,
     inliers: usize,
     true_inliers: usize,
     supports_truth: usize,
+    wrong_depth: usize,
     true_matches: Funnel,
-} =>
-    "A wrong pose was accepted: {inliers} matches agree on it, {} off, {true_inliers} of them \
-     true. The truth explains {supports_truth}.",
-    metres(error.translation_m)
-);
+}
+
+impl fmt::Display for Accepted {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { inliers, true_inliers, supports_truth, wrong_depth, .. } = self;
+        let off = metres(self.error.translation_m);
+        write!(f, "A wrong pose was accepted: {inliers} matches agree on it, {off} off, {true_inliers} of them true. ")?;
+        // True matches point at the cloud, false ones at the photos.
+        if wrong_depth > supports_truth {
+            write!(f, "Of the true matches, {wrong_depth} have a wrong depth, {supports_truth} the right one.")
+        } else {
+            write!(f, "Something moved or looks alike; the truth explains {supports_truth}.")
+        }
+    }
+}
 
 fn remedies(ask: &Ask<'_>) -> Vec<Remedy> {
     let mut tried = vec![vec![ask.ratio(-0.1)], vec![ask.ratio(-0.2)]];

@@ -48,7 +48,7 @@ impl fmt::Display for Outside {
         match &self.error {
             Some(error) => write!(
                 f,
-                "The pose was refused for its distance: {distance} from the reference, {radius} allowed. It is {} off.",
+                "The pose was refused for its distance: {distance} from the reference, {radius} allowed. The refused pose is {} off.",
                 metres(error.translation_m)
             ),
             None => write!(
