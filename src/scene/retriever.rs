@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use xxhash_rust::xxh3::xxh3_64;
 
 use super::{Scene, SceneError};
-use crate::features::{SurfParams, remembered, surf};
+use crate::features::{SurfParams, surf};
 use crate::localize::{ChoiceError, Ranking};
 use crate::params::Params;
 use crate::problem::Query;
@@ -160,9 +160,9 @@ impl Retriever {
     /// Ranks the allowed frames by similarity to the query.
     pub fn retrieve(&self, query: &Query, allowed: impl Fn(usize) -> bool) -> Retrieval {
         // The same features as for FB, so they are cached.
-        let features = remembered(&query.photo.gray, &query.memo, &self.surf);
+        let features = query.features(&self.surf);
         let indexed = self.params.surf(&self.surf).max_keypoints;
-        let features = features.value.strongest(indexed);
+        let features = features.strongest(indexed);
         self.index.query(&features, &self.params, allowed)
     }
 }

@@ -6,15 +6,11 @@ use std::sync::Arc;
 
 use posescope::geometry::{Pose, PoseError};
 use posescope::localize::frames_within;
-use posescope::memo::Memo;
 use posescope::problem::{Problem, Query, ReferenceTuple};
 use posescope::scene::{Scene, SceneError};
 use xxhash_rust::xxh3::xxh3_64;
 
 use crate::Failure;
-
-/// Values that a frame remembers: each is used several times, and then not again.
-const REMEMBERED: usize = 40;
 
 /// Cameras on one street look along it; those turned by more against each other share no view \[°\].
 const UNRELATED_DEG: f64 = 60.0;
@@ -184,9 +180,8 @@ impl Remembered {
         Ok(match self.queries.entry((scene.name().to_owned(), frame)) {
             Entry::Occupied(known) => Arc::clone(known.get()),
             Entry::Vacant(place) => {
-                let mut query = scene.query(frame)?;
-                Arc::make_mut(&mut query).memo = Memo::of(REMEMBERED);
-                Arc::clone(place.insert(query))
+                let query = Arc::unwrap_or_clone(scene.query(frame)?).remembering();
+                Arc::clone(place.insert(Arc::new(query)))
             }
         })
     }
@@ -199,9 +194,8 @@ impl Remembered {
         Ok(match self.references.entry((scene.name().to_owned(), frame)) {
             Entry::Occupied(known) => Arc::clone(known.get()),
             Entry::Vacant(place) => {
-                let mut reference = scene.reference(frame)?;
-                Arc::make_mut(&mut reference).memo = Memo::of(REMEMBERED);
-                Arc::clone(place.insert(reference))
+                let reference = Arc::unwrap_or_clone(scene.reference(frame)?).remembering();
+                Arc::clone(place.insert(Arc::new(reference)))
             }
         })
     }

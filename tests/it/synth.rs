@@ -8,7 +8,6 @@ use posescope::cloud::Cloud;
 use posescope::estimator;
 use posescope::geometry::PoseError;
 use posescope::image::Photo;
-use posescope::memo::Memo;
 use posescope::method::Method;
 use posescope::params::Params;
 use posescope::problem::{Problem, Query, ReferenceTuple};
@@ -27,29 +26,14 @@ const FEW: &str = "synth . --size half --every 300 --condition overcast";
 /// The pair as it is made, past any cache.
 fn in_memory(street: &Street, query: usize, reference: usize) -> Problem {
     let drive = street.traversal();
-    let photo = |frame| Arc::new(Photo::from_color(drive.image(frame)));
+    let photo = |frame| Photo::from_color(drive.image(frame));
     let intrinsics = drive.intrinsics();
-    let scan = drive.cloud(reference);
-    Problem {
-        query: Arc::new(Query {
-            name: format!("{query:06}"),
-            photo: photo(query),
-            intrinsics,
-            memo: Memo::off(),
-        }),
-        reference: Arc::new(ReferenceTuple {
-            name: format!("{reference:06}"),
-            photo: photo(reference),
-            intrinsics,
-            world_from_camera: drive.world_from_camera(reference),
-            cloud: Cloud { points: scan.iter().map(|point| point.position).collect() },
-            memo: Memo::off(),
-        }),
-        uncertainty_radius_m: 15.0,
-        prior_m: None,
-        seed: 0,
-        matches: None,
-    }
+    let points = drive.cloud(reference).iter().map(|point| point.position).collect();
+    let pose = drive.world_from_camera(reference);
+    let (name, tuple_photo) = (format!("{reference:06}"), photo(reference));
+    let reference = ReferenceTuple::new(name, tuple_photo, intrinsics, pose, Cloud { points });
+    let query = Query::new(format!("{query:06}"), photo(query), intrinsics).expect("fits");
+    Problem::new(query, reference.expect("fits"), 15.0).expect("a radius")
 }
 
 #[test]

@@ -8,7 +8,7 @@ use std::error::Error;
 use posescope_core::cost::Statistic;
 use posescope_core::geometry::PoseError;
 use posescope_core::image::{FloatImage, GrayImage, gaussian_smoothed};
-use posescope_core::memo::Key;
+use posescope_core::memo::{Key, key};
 use posescope_core::{
     Cloud, Cost, Direct, IntensityPair, Params, Photo, Pose, Problem, Query, ReferenceTuple, Trace,
     localize_by,
@@ -26,7 +26,7 @@ impl Cost for CrossCorrelation {
     }
 
     fn query_channel_key(&self) -> Key {
-        Key::new("smoothed by 1 px")
+        key("smoothed by 1 px")
     }
 
     /// It looks at each pair.

@@ -2,8 +2,6 @@
 
 use nalgebra::{Point2, Point3, Unit, Vector3};
 
-use crate::memo::bits_of_fields;
-
 /// Intrinsics of a rectified pinhole camera.
 ///
 /// Pixel (0, 0) is the *centre* of the top-left pixel, so the image covers −0.5 … width − 0.5.
@@ -22,8 +20,6 @@ pub struct Intrinsics {
     /// Image height \[px\].
     pub height: u32,
 }
-
-bits_of_fields!(Intrinsics { fx, fy, cx, cy, width, height });
 
 impl Intrinsics {
     /// The pixel at which a point of the camera frame \[m\] is seen, or `None` where it is not in

@@ -33,7 +33,7 @@ pub use statistic::{CostOfPairs, Explanation, ExplanationKind, PhotometricWeight
 
 use crate::describe::{About, Describe, ParamVisitor, choice};
 use crate::image::{FloatImage, GrayImage, cubic_interpolated};
-use crate::memo::{Bits, Exact, Key};
+use crate::memo::{Key, key};
 
 /// What the query and the synthetic view show at one covered pixel.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -89,7 +89,7 @@ pub trait Cost: Send + Sync {
     /// What [`Self::reference_channel`] makes: all that it depends on beside the photo. Costs of equal
     /// keys share one coloured cloud.
     fn reference_channel_key(&self) -> Key {
-        Key::new("grey")
+        key("grey")
     }
 
     /// What decides the cost of the covered pixels, and how. The threads, a
@@ -112,18 +112,11 @@ choice!(SearchRule: Grid = "grid", Descent = "descent");
 
 /// A cost whose parameters describe themselves.
 pub trait RegisteredCost: Cost + Describe + fmt::Debug {
-    /// A key that is equal for equal parameters of the same cost, and only for those.
-    fn key(&self) -> Key;
-
     /// The same cost once more.
     fn boxed(&self) -> Box<dyn RegisteredCost>;
 }
 
-impl<C: Cost + Describe + Bits + Clone + fmt::Debug + 'static> RegisteredCost for C {
-    fn key(&self) -> Key {
-        Key::new(Exact::of(self))
-    }
-
+impl<C: Cost + Describe + Clone + fmt::Debug + 'static> RegisteredCost for C {
     fn boxed(&self) -> Box<dyn RegisteredCost> {
         Box::new(self.clone())
     }
@@ -181,10 +174,6 @@ impl CostSetting {
         let search = SearchRule::default();
         Self { cost: (entry.make)(), search, is_smooth: entry.is_smooth }
     }
-
-    fn key(&self) -> (Key, SearchRule) {
-        (self.cost.key(), self.search)
-    }
 }
 
 impl Describe for CostSetting {
@@ -229,7 +218,7 @@ impl Default for CostSettings {
 
 impl PartialEq for CostSettings {
     fn eq(&self, other: &Self) -> bool {
-        self.0.iter().map(CostSetting::key).eq(other.0.iter().map(CostSetting::key))
+        key(&self.0) == key(&other.0)
     }
 }
 

@@ -5,19 +5,11 @@ use nalgebra::{Point2, Point3};
 
 use crate::camera::Intrinsics;
 use crate::cloud::Cloud;
-use crate::memo::Remembered;
 
 /// The cloud projected into its own camera, searchable by pixel.
 pub struct ProjectedCloudIndex {
     tree: Option<ImmutableKdTree<f64, 2>>,
     depths: Vec<f64>,
-}
-
-impl Remembered for ProjectedCloudIndex {
-    /// The tree holds each pixel position and its number, in leaves that are not all full.
-    fn heap_bytes(&self) -> usize {
-        self.depths.len() * (size_of::<f64>() + 2 * size_of::<[f64; 2]>())
-    }
 }
 
 /// What the projected cloud says about one pixel.
@@ -62,6 +54,12 @@ impl ProjectedCloudIndex {
         // The tree refuses only an empty set of points, which then has no depth anywhere.
         let tree = ImmutableKdTree::new_from_slice(&pixels).ok().filter(|_| !pixels.is_empty());
         Self { tree, depths }
+    }
+
+    /// Memory that it takes \[bytes\]. The tree holds each pixel position and its number, in leaves that are
+    /// not all full.
+    pub(crate) fn heap_bytes(&self) -> usize {
+        self.depths.len() * (size_of::<f64>() + 2 * size_of::<[f64; 2]>())
     }
 
     /// Number of points in view.

@@ -267,8 +267,7 @@ impl ParamVisitor for SetVisitor<'_> {
 /// }
 /// ```
 ///
-/// A field without a description does not compile, so that none can be lost. What is remembered under
-/// the parameters is told apart by all of them ([`crate::memo::Bits`]).
+/// A field without a description does not compile, so that none can be lost.
 macro_rules! parameters {
     (
         $(#[$attribute:meta])*
@@ -295,12 +294,6 @@ macro_rules! parameters {
                         @show $kind $arguments, visitor, &mut self.$field, concat!($($doc, "\n"),*)
                     );
                 )*
-            }
-        }
-
-        impl $crate::memo::Bits for $name {
-            fn write(&self, words: &mut Vec<u64>) {
-                $($crate::memo::Bits::write(&self.$field, words);)*
             }
         }
     };
@@ -346,12 +339,6 @@ macro_rules! choice {
             }
             fn choose(&mut self, index: usize) {
                 *self = [$(Self::$variant),+][index];
-            }
-        }
-
-        impl $crate::memo::Bits for $type {
-            fn write(&self, words: &mut Vec<u64>) {
-                words.push($crate::describe::Choice::index(self) as u64);
             }
         }
     };

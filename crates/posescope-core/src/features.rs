@@ -33,7 +33,6 @@ mod nearest;
 mod octave;
 mod orientation;
 mod params;
-mod remembered;
 mod responses;
 mod sift;
 mod state;
@@ -45,9 +44,9 @@ pub use found::{FoundMatches, PairMatches};
 pub use matching::{Match, MatchVerdict, best_matches_interruptible, classify};
 pub use nearest::{Neighbours, nearest_neighbours, nearest_neighbours_interruptible};
 pub use params::SurfParams;
-pub use remembered::{remembered, remembered_interruptible};
 pub use sift::{SiftDescriptor, SiftFeatures, SiftParams, sift, sift_interruptible};
 pub use state::FeatureState;
+pub(crate) use surf::kept_surf;
 pub use surf::{surf, surf_interruptible};
 
 /// A blob: the place in an image that a descriptor describes.

@@ -22,7 +22,6 @@ use serde::{Serialize, Serializer};
 
 use crate::describe::parameters;
 use crate::geometry::{Pose, yaw};
-use crate::memo::{Bits, bits_of_fields};
 
 parameters! {
     /// Steps and ranges of the search. The range of positions is the problem's uncertainty radius.
@@ -120,8 +119,6 @@ fn in_degrees<S: Serializer>(angle_rad: &f64, serializer: S) -> Result<S::Ok, S:
     serializer.serialize_f64(angle_rad.to_degrees())
 }
 
-bits_of_fields!(Offset { right_m, forward_m, yaw_rad });
-
 impl Offset {
     /// The offset of a camera `reference_from_camera`. What no offset has is left out: height, pitch
     /// and roll.
@@ -157,12 +154,6 @@ pub enum Phase {
     YawCoarse,
     /// Yaw angles around the coarse yaw.
     YawFine,
-}
-
-impl Bits for Phase {
-    fn write(&self, words: &mut Vec<u64>) {
-        words.push(*self as u64);
-    }
 }
 
 impl Phase {

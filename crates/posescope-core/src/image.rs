@@ -11,16 +11,9 @@ use image::{ImageBuffer, Luma};
 use rayon::prelude::*;
 
 use crate::input::InputError;
-use crate::memo::Remembered;
 
 /// A grey image of real values in 0 … 255.
 pub type FloatImage = ImageBuffer<Luma<f32>, Vec<f32>>;
-
-impl Remembered for FloatImage {
-    fn heap_bytes(&self) -> usize {
-        size_of_val(self.as_raw().as_slice())
-    }
-}
 
 /// A photograph: the grey values that the estimators work on, and its colours where it has any.
 #[derive(Clone, Debug)]

@@ -1,14 +1,16 @@
 //! What an estimator is asked: one query photo, one reference tuple. No ground truth in here.
 
+use std::convert::Infallible;
+use std::fmt;
 use std::sync::Arc;
 
 use crate::camera::Intrinsics;
 use crate::cloud::Cloud;
-use crate::features::PairMatches;
+use crate::features::{Features, PairMatches, SurfParams, kept_surf};
 use crate::geometry::Pose;
 use crate::image::Photo;
 use crate::input::InputError;
-use crate::memo::{Exact, Memo};
+use crate::memo::{Memo, Recalled};
 use crate::render::{RenderParams, VisibleCloud};
 
 /// The photo whose pose is sought.
@@ -20,8 +22,8 @@ pub struct Query {
     pub photo: Arc<Photo>,
     /// The query camera.
     pub intrinsics: Intrinsics,
-    /// What estimators worked out about this frame.
-    pub memo: Memo,
+    /// What estimators computed of this frame.
+    pub(crate) memo: Memo,
 }
 
 impl Query {
@@ -31,12 +33,31 @@ impl Query {
     /// [`InputError`] when the photo is not of the camera's size, or no camera is like that.
     pub fn new(
         name: impl Into<String>,
-        photo: Photo,
+        photo: impl Into<Arc<Photo>>,
         intrinsics: Intrinsics,
     ) -> Result<Self, InputError> {
-        let name = name.into();
-        check_camera(&name, &photo, &intrinsics)?;
-        Ok(Self { name, photo: Arc::new(photo), intrinsics, memo: Memo::off() })
+        let query = Self::unchecked(name, photo, intrinsics);
+        check_camera(&query.name, &query.photo, &intrinsics)?;
+        Ok(query)
+    }
+
+    pub(crate) fn unchecked(
+        name: impl Into<String>,
+        photo: impl Into<Arc<Photo>>,
+        intrinsics: Intrinsics,
+    ) -> Self {
+        Self { name: name.into(), photo: photo.into(), intrinsics, memo: Memo::off() }
+    }
+
+    /// The same query, with which estimators keep what they compute of it, so that the next run is faster.
+    #[must_use]
+    pub fn remembering(self) -> Self {
+        Self { memo: Memo::new(), ..self }
+    }
+
+    /// The SURF features of the photo.
+    pub fn features(&self, params: &SurfParams) -> Arc<Features> {
+        features_of(&self.photo, &self.memo, params)
     }
 }
 
@@ -53,8 +74,8 @@ pub struct ReferenceTuple {
     pub world_from_camera: Pose,
     /// The cloud P_R, in the reference camera's frame.
     pub cloud: Cloud,
-    /// What estimators worked out about this frame.
-    pub memo: Memo,
+    /// What estimators computed of this frame.
+    pub(crate) memo: Memo,
 }
 
 impl ReferenceTuple {
@@ -65,31 +86,40 @@ impl ReferenceTuple {
     /// is not finite. An empty cloud is no error: every method says that nothing is in view.
     pub fn new(
         name: impl Into<String>,
-        photo: Photo,
+        photo: impl Into<Arc<Photo>>,
         intrinsics: Intrinsics,
         world_from_camera: Pose,
         cloud: Cloud,
     ) -> Result<Self, InputError> {
-        let name = name.into();
+        let (name, photo) = (name.into(), photo.into());
         check_camera(&name, &photo, &intrinsics)?;
         if !world_from_camera.to_homogeneous().iter().all(|x| x.is_finite()) {
             return Err(InputError::Pose { frame: name });
         }
-        Ok(Self {
-            name,
-            photo: Arc::new(photo),
-            intrinsics,
-            world_from_camera,
-            cloud,
-            memo: Memo::off(),
-        })
+        Ok(Self { name, photo, intrinsics, world_from_camera, cloud, memo: Memo::off() })
+    }
+
+    /// The same reference, with which estimators keep what they compute of it, so that the next run is faster.
+    #[must_use]
+    pub fn remembering(self) -> Self {
+        Self { memo: Memo::new(), ..self }
+    }
+
+    /// The SURF features of the photo.
+    pub fn features(&self, params: &SurfParams) -> Arc<Features> {
+        features_of(&self.photo, &self.memo, params)
     }
 
     /// What the reference camera sees of the cloud, remembered: all methods ask for it.
     pub fn visible_cloud(&self, render: &RenderParams) -> Arc<VisibleCloud> {
         let visible = || VisibleCloud::new(&self.cloud, &self.intrinsics, render);
-        self.memo.recall(Exact::of(render), visible).value
+        self.memo.recall(render, VisibleCloud::heap_bytes, visible).value
     }
+}
+
+fn features_of(photo: &Photo, memo: &Memo, params: &SurfParams) -> Arc<Features> {
+    let Ok(found) = kept_surf(&photo.gray, memo, params, || Ok::<_, Infallible>(()));
+    found.value
 }
 
 fn check_camera(name: &str, photo: &Photo, intrinsics: &Intrinsics) -> Result<(), InputError> {
@@ -125,13 +155,12 @@ pub struct Problem {
     pub reference: Arc<ReferenceTuple>,
     /// How far from the reference the direct methods search \[m\].
     pub uncertainty_radius_m: f64,
-    /// How far from the reference the query may be as far as anybody knows \[m\]: the feature-based
-    /// method, which searches no disc, rejects a pose outside. `None` where that is the radius of the
-    /// search.
+    /// Prior on the query's distance from the reference \[m\]. FB rejects poses beyond it. `None`: the search
+    /// radius.
     pub prior_m: Option<f64>,
     /// Every random choice of an estimator derives from this.
     pub seed: u64,
-    /// Matches that somebody brought; without them, features are found and matched.
+    /// Matches of another system; without them, features are detected and matched.
     pub matches: Option<Arc<PairMatches>>,
 }
 
@@ -173,6 +202,20 @@ impl Problem {
         let Self { query, reference, .. } = self;
         let text = format!("{}/{}/{}/{purpose}", self.seed, query.name, reference.name);
         xxhash_rust::xxh3::xxh3_64(text.as_bytes())
+    }
+
+    /// A value that depends on these inputs, the query and the reference, kept with the query where both keep
+    /// what is computed of them; else made now.
+    pub(crate) fn try_recall<T: Send + Sync + 'static, E>(
+        &self,
+        inputs: impl fmt::Debug,
+        heap_bytes: fn(&T) -> usize,
+        make: impl FnOnce() -> Result<T, E>,
+    ) -> Result<Recalled<T>, E> {
+        match self.reference.memo.id() {
+            Some(id) => self.query.memo.try_recall((id, inputs), heap_bytes, make),
+            None => Ok(Recalled::made(Arc::new(make()?))),
+        }
     }
 
     /// The inverse of [`Self::world_from_query`].

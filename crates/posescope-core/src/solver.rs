@@ -18,8 +18,6 @@ pub use refine::{Refinement, pose_covariance, refine};
 
 use nalgebra::{Point2, Point3};
 
-use crate::memo::bits_of_fields;
-
 /// A pixel and the 3-D point that is believed to be seen there.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Correspondence {
@@ -28,8 +26,6 @@ pub struct Correspondence {
     /// The point \[m\], in the frame that the pose maps to the camera.
     pub point: Point3<f64>,
 }
-
-bits_of_fields!(Correspondence { pixel, point });
 
 /// A camera for tests, with focal lengths that differ.
 #[cfg(test)]

@@ -12,7 +12,6 @@ use posescope_core::geometry::Pose;
 use posescope_core::grid::{Phase, ScoredLattice};
 use posescope_core::image::{GrayImage, Photo};
 use posescope_core::localize_traced;
-use posescope_core::memo::Memo;
 use posescope_core::method::Method;
 use posescope_core::params::Params;
 use posescope_core::problem::{Problem, Query, ReferenceTuple};
@@ -115,7 +114,7 @@ fn texture(x: f32, y: f32) -> u8 {
 }
 
 /// A wall 16 m ahead, seen by both cameras, the query 2 m nearer to it.
-fn problem(memo: fn() -> Memo) -> Problem {
+fn problem(is_remembering: bool) -> Problem {
     let photo = |ahead: f32| {
         let mut image = GrayImage::new(CAMERA.width, CAMERA.height);
         for (x, y, pixel) in image.enumerate_pixels_mut() {
@@ -128,26 +127,15 @@ fn problem(memo: fn() -> Memo) -> Problem {
     };
     let across = (-60_i8..=60).flat_map(|x| (-20_i8..=20).map(move |y| (x, y)));
     let points = across.map(|(x, y)| Point3::new(f32::from(x) * 0.2, f32::from(y) * 0.2, 16.0));
-    Problem {
-        query: Arc::new(Query {
-            name: "query".to_owned(),
-            photo: photo(2.0).into(),
-            intrinsics: CAMERA,
-            memo: memo(),
-        }),
-        reference: Arc::new(ReferenceTuple {
-            name: "reference".to_owned(),
-            photo: photo(0.0).into(),
-            intrinsics: CAMERA,
-            world_from_camera: Pose::identity(),
-            cloud: Cloud { points: points.collect() },
-            memo: memo(),
-        }),
-        matches: None,
-        uncertainty_radius_m: 6.0,
-        prior_m: None,
-        seed: 0,
+    let cloud = Cloud { points: points.collect() };
+    let mut query = Query::new("query", photo(2.0), CAMERA).expect("fits");
+    let mut reference =
+        ReferenceTuple::new("reference", photo(0.0), CAMERA, Pose::identity(), cloud)
+            .expect("fits");
+    if is_remembering {
+        (query, reference) = (query.remembering(), reference.remembering());
     }
+    Problem::new(query, reference, 6.0).expect("a radius")
 }
 
 fn coarse(problem: &Problem) -> ScoredLattice {
@@ -159,7 +147,7 @@ fn coarse(problem: &Problem) -> ScoredLattice {
 
 #[test]
 fn a_score_that_was_corrected_stays_corrected_in_the_next_run() {
-    let on_threads = coarse(&problem(Memo::off));
+    let on_threads = coarse(&problem(false));
     let cells: Vec<usize> = (on_threads.lattice.hypotheses()).map(|(cell, _)| cell).collect();
     assert_eq!(cells.len(), COARSE);
     // A minimum, which is reported, and not one of those that each batch is checked by.
@@ -175,7 +163,7 @@ fn a_score_that_was_corrected_stays_corrected_in_the_next_run() {
     sly.lies_at.set(lies_at).expect("for the first time");
     assert!(use_device(Arc::clone(&sly) as Arc<dyn Device>));
 
-    let problem = problem(|| Memo::of(256));
+    let problem = problem(true);
     let (first, again) = (coarse(&problem), coarse(&problem));
     assert!(sly.loaded.load(Ordering::Relaxed) > 0, "the device was asked");
     assert_eq!(first.scores, on_threads.scores);

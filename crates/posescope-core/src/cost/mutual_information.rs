@@ -3,7 +3,7 @@
 use super::{Cost, Entropies, Entry, Similarity, Statistic};
 use crate::describe::parameters;
 use crate::image::{FloatImage, GrayImage, gaussian_smoothed};
-use crate::memo::{Exact, Key};
+use crate::memo::{Key, key};
 
 /// MI's cost among all costs.
 pub(super) const ENTRY: Entry = Entry {
@@ -40,7 +40,7 @@ impl Cost for MutualInformation {
     }
 
     fn query_channel_key(&self) -> Key {
-        Key::new(("grey", Exact::of(&self.sigma_px)))
+        key(("grey", self.sigma_px))
     }
 
     fn statistic(&self) -> Statistic<'_> {

@@ -12,7 +12,7 @@ use image::Luma;
 use super::{Cost, Entropies, Entry, LEAST_ENTROPY, Similarity, Statistic};
 use crate::describe::parameters;
 use crate::image::{FloatImage, GrayImage, gaussian_smoothed};
-use crate::memo::{Exact, Key};
+use crate::memo::{Key, key};
 
 /// NID among all costs.
 pub(super) const ENTRY: Entry = Entry {
@@ -90,7 +90,7 @@ impl Cost for Orientation {
     }
 
     fn reference_channel_key(&self) -> Key {
-        Key::new(Exact::of(self))
+        key(self)
     }
 
     fn statistic(&self) -> Statistic<'_> {

@@ -3,7 +3,7 @@
 use super::{Cost, Entry, Statistic};
 use crate::describe::parameters;
 use crate::image::{FloatImage, GrayImage, gaussian_smoothed};
-use crate::memo::{Exact, Key};
+use crate::memo::{Key, key};
 
 /// PM's cost among all costs.
 pub(super) const ENTRY: Entry = Entry {
@@ -39,7 +39,7 @@ impl Cost for Photometric {
     }
 
     fn query_channel_key(&self) -> Key {
-        Key::new(("grey", Exact::of(&self.sigma_px)))
+        key(("grey", self.sigma_px))
     }
 
     fn statistic(&self) -> Statistic<'_> {

@@ -3,18 +3,44 @@
 //! A new verdict is a file with its `RULE` and a line of `verdicts!`. Rules are tried in the order of the
 //! table; the first that fires is the primary verdict, the others are listed behind it.
 
+// The files in `rules/` take what most of them need from here.
 use std::cmp::Ordering;
 use std::fmt;
 use std::str::FromStr;
 
 use serde::Serialize;
 
-use super::ask::{Ask, Remedy};
-use super::case::{Case, FusionCase, RankingCase};
+use super::ask::{Ask, Change, Remedy};
+use super::case::{Case, FusionCase, Member, RankingCase};
 use super::family::Family;
-use super::{Diagnosis, Proof};
+use super::matches::Funnel;
+use super::numbers::{metres, ordinal, pair};
+use super::search::Search;
+use super::starts::Starts;
+use super::{Diagnosis, MapOverlay, Proof};
 use crate::event::Stage;
+use crate::geometry::{Pose, PoseError};
+use crate::grid::{Offset, Phase};
+use crate::method::Method;
 use crate::text::UnknownWord;
+
+/// The evidence of a verdict: a struct whose fields go into a file, and the sentence that is made of them.
+macro_rules! evidence {
+    ($name:ident { $($field:ident: $type:ty),+ $(,)? } => $($words:tt)+) => {
+        #[derive(Serialize)]
+        struct $name {
+            $($field: $type),+
+        }
+
+        impl fmt::Display for $name {
+            fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                #[allow(unused_variables, reason = "not every field is in the sentence")]
+                let Self { $($field),+ } = self;
+                write!(f, $($words)+)
+            }
+        }
+    };
+}
 
 macro_rules! verdicts {
     ($($code:ident in $file:ident),+ $(,)?) => {
@@ -148,6 +174,18 @@ impl Code {
     /// What it means, in one phrase.
     pub fn title(self) -> &'static str {
         self.rule().title
+    }
+
+    /// What to try against it. Another system does not read our parameters.
+    pub fn advice(self, method: Method) -> &'static str {
+        let rule = self.rule();
+        let is_of_a_cost = !rule.applies_to.contains(&Family::Features);
+        match Family::of(method) {
+            Some(Family::Given) if is_of_a_cost && rule.applies_to.contains(&Family::Given) => {
+                "compare it with --method robust, or use another reference"
+            }
+            _ => rule.advice,
+        }
     }
 
     /// Whether it says that something failed: all but [`Code::L1`], which says that the pose is uncertain.

@@ -12,7 +12,8 @@ use crate::descent::DescentParams;
 use crate::event::{CloudColored, Moment, PhaseSearched, PoseScored, Stage, ViewRendered};
 use crate::geometry::Pose;
 use crate::grid::{GridParams, Lattice, Offset, Phase, Scored, ScoredLattice, least_covered, scan};
-use crate::memo::{Exact, Key, MemoId, Recalled, Remembered};
+use crate::image::FloatImage;
+use crate::memo::{Key, Recalled, key};
 use crate::method::Method;
 use crate::params::Params;
 use crate::problem::Problem;
@@ -36,7 +37,7 @@ impl Direct {
     pub fn new(entry: &cost::Entry, params: &Params) -> Self {
         let setting = params.costs.of(entry).cloned();
         let CostSetting { cost, search, .. } = setting.unwrap_or_else(|| CostSetting::new(entry));
-        let cost_key = Key::new((entry.name, cost.key()));
+        let cost_key = key((entry.name, &cost));
         Self {
             method: Method::named(entry.name),
             cost,
@@ -62,7 +63,7 @@ impl Direct {
             render: params.render.clone(),
             grid: params.grid.clone(),
             descent: params.descent.clone(),
-            cost_key: Key::new(("unregistered", MADE.fetch_add(1, Ordering::Relaxed))),
+            cost_key: key(("unregistered", MADE.fetch_add(1, Ordering::Relaxed))),
         }
     }
 }
@@ -168,11 +169,9 @@ impl Direct {
 
     pub(super) fn colored(&self, problem: &Problem) -> Recalled<ColoredCloud> {
         let reference = &problem.reference;
-        let key = ColoringKey {
-            render: Exact::of(&self.render),
-            channel: self.cost.reference_channel_key(),
-        };
-        reference.memo.recall(key, || {
+        let bytes = |cloud: &ColoredCloud| size_of_val(cloud.points.as_slice());
+        let inputs = (&self.render, self.cost.reference_channel_key());
+        reference.memo.recall(inputs, bytes, || {
             let value = self.cost.reference_channel(&reference.photo.gray);
             reference.visible_cloud(&self.render).colored_by(value)
         })
@@ -180,9 +179,10 @@ impl Direct {
 
     pub(super) fn scorer_of(&self, problem: &Problem) -> Scorer<'_> {
         let query = &problem.query;
-        let channel = query
-            .memo
-            .recall(self.cost.query_channel_key(), || self.cost.query_channel(&query.photo.gray));
+        let bytes = |image: &FloatImage| size_of_val(image.as_raw().as_slice());
+        let channel = query.memo.recall(self.cost.query_channel_key(), bytes, || {
+            self.cost.query_channel(&query.photo.gray)
+        });
         Scorer::new(
             self.colored(problem).value,
             channel.value,
@@ -190,31 +190,6 @@ impl Direct {
             self.render.splat_px,
             self.cost.as_ref(),
         )
-    }
-}
-
-/// What a coloured cloud depends on beside the reference.
-#[derive(PartialEq, Eq, Hash)]
-struct ColoringKey {
-    render: Exact<RenderParams>,
-    channel: Key,
-}
-
-/// What scores depend on beside the query.
-#[derive(PartialEq, Eq, Hash)]
-struct ScoresKey {
-    reference: MemoId,
-    cost: Key,
-    render: Exact<RenderParams>,
-    lattice: Exact<Lattice>,
-}
-
-/// Remembered scores.
-struct LatticeScores(Vec<Score>);
-
-impl Remembered for LatticeScores {
-    fn heap_bytes(&self) -> usize {
-        size_of_val(self.0.as_slice())
     }
 }
 
@@ -231,7 +206,9 @@ impl Direct {
     ) -> Result<ScoredLattice, Cancelled> {
         let batch = scorer.at_a_time_of(lattice.cells());
         let mut surface = None;
-        let mut score = || {
+        let bytes = |scores: &Vec<Score>| size_of_val(scores.as_slice());
+        let inputs = (self.cost_key, &self.render, &lattice);
+        let found = problem.try_recall(inputs, bytes, || {
             let score = |poses: &[Pose]| scorer.score(poses);
             let tell = |some: &[Scored]| tell(some, trace);
             let mut scored = scan(lattice.clone(), least_covered, batch, score, tell)?;
@@ -239,25 +216,13 @@ impl Direct {
             scored.settle(scorer);
             let scores = scored.scores.iter().flatten().copied().collect();
             surface = Some(scored);
-            Ok(LatticeScores(scores))
-        };
-        let found = match problem.reference.memo.id() {
-            None => Recalled::made(Arc::new(score()?)),
-            Some(reference) => {
-                let key = ScoresKey {
-                    reference,
-                    cost: self.cost_key.clone(),
-                    render: Exact::of(&self.render),
-                    lattice: Exact::of(&lattice),
-                };
-                problem.query.memo.try_recall(key, score)?
-            }
-        };
+            Ok(scores)
+        })?;
         trace.note_reuse(found.reused);
         if let Some(surface) = surface {
             return Ok(surface);
         }
-        let mut known = found.value.0.iter().copied();
+        let mut known = found.value.iter().copied();
         let score = |poses: &[Pose]| known.by_ref().take(poses.len()).collect();
         scan(lattice, least_covered, batch, score, |some| tell(some, trace))
     }

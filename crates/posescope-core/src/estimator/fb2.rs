@@ -31,12 +31,11 @@ use crate::event::{
     MatchesGuided, PoseRefined, ProjectedCloud, Side, Stage,
 };
 use crate::features::{
-    Features, Keypoint, Match, SiftFeatures, SiftParams, best_matches_interruptible,
-    sift_interruptible,
+    Features, Keypoint, Match, SiftFeatures, best_matches_interruptible, sift_interruptible,
 };
 use crate::geometry::Pose;
 use crate::image::Photo;
-use crate::memo::{Exact, Memo, Remembered};
+use crate::memo::Memo;
 use crate::method::Method;
 use crate::params::Params;
 use crate::problem::{Problem, ReferenceTuple};
@@ -77,25 +76,7 @@ pub(super) struct Detected {
     query: Arc<SiftFeatures>,
     reference: Arc<SiftFeatures>,
     /// The 3-D point of each reference feature, where it has one.
-    lifted: Arc<ReferencePoints>,
-}
-
-/// The depth of each feature of a reference.
-struct ReferencePoints(Vec<LiftedMatch>);
-
-impl Remembered for ReferencePoints {
-    fn heap_bytes(&self) -> usize {
-        size_of_val(self.0.as_slice())
-    }
-}
-
-/// Under what the depths are remembered.
-#[derive(PartialEq, Eq, Hash)]
-struct PointsKey {
-    sift: Exact<SiftParams>,
-    render: Exact<RenderParams>,
-    radius: Exact<f64>,
-    spread: Exact<f64>,
+    lifted: Arc<Vec<LiftedMatch>>,
 }
 
 /// What is known of a run, up to where it stops.
@@ -197,7 +178,7 @@ impl Guided {
         trace.stage(Stage::Detect, |trace| {
             let mut of = |side, photo: &Photo, memo: &Memo| -> Result<_, Cancelled> {
                 let sift = &self.params.sift;
-                let found = memo.try_recall(Exact::of(sift), || {
+                let found = memo.try_recall(sift, SiftFeatures::heap_bytes, || {
                     sift_interruptible(&photo.gray, sift, || trace.checkpoint())
                 })?;
                 trace.emit(|| FeaturesDetected {
@@ -230,15 +211,11 @@ impl Guided {
     }
 
     /// The point of each reference feature, by the visible points alone.
-    fn lifted(&self, tuple: &ReferenceTuple, features: &SiftFeatures) -> Arc<ReferencePoints> {
+    fn lifted(&self, tuple: &ReferenceTuple, features: &SiftFeatures) -> Arc<Vec<LiftedMatch>> {
         let GuidedParams { sift, depth_radius_px, depth_spread, .. } = &self.params;
-        let key = PointsKey {
-            sift: Exact::of(sift),
-            render: Exact::of(&self.render),
-            radius: Exact::of(depth_radius_px),
-            spread: Exact::of(depth_spread),
-        };
-        let lifted = tuple.memo.recall(key, || {
+        let bytes = |lifted: &Vec<LiftedMatch>| size_of_val(lifted.as_slice());
+        let inputs = (sift, &self.render, depth_radius_px, depth_spread);
+        let lifted = tuple.memo.recall(inputs, bytes, || {
             let visible = Cloud { points: tuple.visible_cloud(&self.render).positions().collect() };
             let index = ProjectedCloudIndex::new(&visible, &tuple.intrinsics);
             let lift = |(number, keypoint): (usize, &Keypoint)| {
@@ -254,7 +231,7 @@ impl Guided {
                     point: even.map(|depths| tuple.intrinsics.unproject(&pixel, depths.nearest)),
                 }
             };
-            ReferencePoints(features.keypoints.iter().enumerate().map(lift).collect())
+            features.keypoints.iter().enumerate().map(lift).collect()
         });
         lifted.value
     }
@@ -293,7 +270,7 @@ impl Guided {
             })?;
             let lifted: Arc<[LiftedMatch]> = unique
                 .iter()
-                .map(|&(query, reference)| LiftedMatch { query, ..detected.lifted.0[reference] })
+                .map(|&(query, reference)| LiftedMatch { query, ..detected.lifted[reference] })
                 .collect();
             trace.emit(|| DepthsLifted { matches: Arc::clone(&lifted) })?;
             states.after_depth_lift(&lifted);
@@ -469,7 +446,7 @@ impl Guided {
         pose: &Pose,
         number: usize,
     ) -> Option<(usize, f32)> {
-        let point = detected.lifted.0[number].point?;
+        let point = detected.lifted[number].point?;
         let seen = pose * point;
         let pixel = camera.project(&seen)?;
         let keypoint = detected.reference.keypoints[number];
@@ -560,7 +537,7 @@ impl Detected {
             reference,
             correspondence: Correspondence {
                 pixel: self.query.keypoints[query].pixel(),
-                point: self.lifted.0[reference].point?,
+                point: self.lifted[reference].point?,
             },
         })
     }
@@ -573,7 +550,7 @@ impl Detected {
         let mut matches = by_query(free);
         matches.extend(by_query(last));
         let lifted =
-            |(query, reference): (usize, usize)| LiftedMatch { query, ..self.lifted.0[reference] };
+            |(query, reference): (usize, usize)| LiftedMatch { query, ..self.lifted[reference] };
         matches.into_iter().map(lifted).collect()
     }
 }

@@ -1,7 +1,6 @@
 //! FB, the indirect feature-based method (paper, section 2.1 and appendix A).
 
 mod params;
-mod remembered;
 mod several;
 pub(super) mod states;
 
@@ -11,7 +10,6 @@ use std::sync::Arc;
 use nalgebra::Point2;
 
 pub use self::params::{DepthRule, FeatureParams};
-use self::remembered::{ConsensusKey, Decisions, MatchesKey, Solved};
 pub(super) use self::several::Gathered;
 use self::states::FeatureStates;
 use super::consensus::FoundConsensus;
@@ -25,10 +23,10 @@ use crate::event::{
 };
 use crate::features::{
     Features, FoundMatches, Match, MatchVerdict, PairMatches, SurfParams,
-    best_matches_interruptible, remembered_interruptible,
+    best_matches_interruptible, kept_surf,
 };
 use crate::geometry::Pose;
-use crate::memo::{Exact, Recalled};
+use crate::memo::Recalled;
 use crate::method::Method;
 use crate::params::Params;
 use crate::problem::{Problem, ReferenceTuple};
@@ -43,6 +41,9 @@ pub(super) const MINIMUM: usize = 4;
 /// Trials that are remembered at most, 5 MB: all that the parameters ask for by default. Where there
 /// were more, they are drawn again when somebody wants to hear them.
 const REMEMBERED_TRIALS: usize = 20_000;
+
+/// What matching decided about each query feature.
+type Decided = Arc<[Option<Match>]>;
 
 /// Matches lifted between two checkpoints.
 const LIFTED_AT_A_TIME: usize = 256;
@@ -79,6 +80,23 @@ pub(super) struct Agreed {
 struct Found<'a> {
     counts: &'a mut FeatureCounts,
     agreed: &'a mut Option<Agreed>,
+}
+
+/// What MLESAC found.
+struct Solved {
+    outcome: Result<Consensus, Failure>,
+    /// All it tried on the way, if a sink wants it and it is not too much.
+    trials: Option<Vec<Trial>>,
+}
+
+impl Solved {
+    fn heap_bytes(&self) -> usize {
+        let found = self.outcome.as_ref().map_or(0, |consensus| {
+            size_of_val(consensus.inliers.as_slice())
+                + size_of_val(consensus.residuals_px.as_slice())
+        });
+        self.trials.as_deref().map_or(0, size_of_val) + found
+    }
 }
 
 impl FeatureBased {
@@ -155,9 +173,9 @@ impl FeatureBased {
         let matches = trace.stage(Stage::Match, |trace| {
             let decisions = self.best_matches(problem, query, reference, trace)?;
             trace.note_reuse(decisions.reused);
-            let Decisions(decisions) = &*decisions.value;
-            trace.emit(|| MatchesDecided { decisions: Arc::clone(decisions) })?;
-            Ok::<_, Halt>(states.after_matching(decisions))
+            let decisions = Arc::clone(&decisions.value);
+            trace.emit(|| MatchesDecided { decisions: Arc::clone(&decisions) })?;
+            Ok::<_, Halt>(states.after_matching(&decisions))
         })?;
         counts.ratio_passed = states.passed_ratio_test();
         counts.unique = matches.len();
@@ -225,7 +243,7 @@ impl FeatureBased {
             })),
             None => {
                 let checkpoint = || trace.checkpoint();
-                remembered_interruptible(&photo.gray, memo, &self.surf, checkpoint)?
+                kept_surf(&photo.gray, memo, &self.surf, checkpoint)?
             }
         };
         trace.emit(|| FeaturesDetected { side, features: Arc::clone(&features.value) })?;
@@ -238,25 +256,16 @@ impl FeatureBased {
         query: &Features,
         reference: &Features,
         trace: &mut Trace<'_>,
-    ) -> Result<Recalled<Decisions>, Halt> {
+    ) -> Result<Recalled<Decided>, Halt> {
         if let Some(found) = found_elsewhere(problem)? {
-            let decisions = Decisions(Arc::clone(&found.decisions));
-            return Ok(Recalled::made(Arc::new(decisions)));
+            return Ok(Recalled::made(Arc::new(Arc::clone(&found.decisions))));
         }
-        let mut find = || {
-            let checkpoint = || trace.checkpoint();
-            best_matches(query, reference, &self.params, checkpoint).map(Decisions)
-        };
-        let Some(id) = problem.reference.memo.id() else {
-            return Ok(Recalled::made(Arc::new(find()?)));
-        };
-        let key = MatchesKey {
-            reference: id,
-            surf: Exact::of(&self.surf),
-            ratio: Exact::of(&self.params.ratio),
-            unique: self.params.unique,
-        };
-        Ok(problem.query.memo.try_recall(key, find)?)
+        let FeatureParams { ratio, unique, .. } = self.params;
+        let bytes = |decided: &Decided| size_of_val(&**decided);
+        let found = problem.try_recall((self.surf, ratio, unique), bytes, || {
+            best_matches(query, reference, &self.params, || trace.checkpoint())
+        });
+        Ok(found?)
     }
 
     /// P = K⁻¹ p_R z: the keypoint's own pixel at the depth of the nearest projected point.
@@ -306,14 +315,8 @@ impl FeatureBased {
         let seed = problem.random_seed("mlesac");
         // Whoever does not listen has no use for the trials.
         let is_heard = trace.wants::<HypothesisTried>();
-        let key = ConsensusKey {
-            camera: Exact::of(intrinsics),
-            params: Exact::of(params),
-            seed,
-            correspondences: Exact::of(correspondences),
-            is_heard,
-        };
-        let solved = problem.query.memo.try_recall(key, || {
+        let inputs = (intrinsics, params, seed, correspondences, is_heard);
+        let solved = problem.query.memo.try_recall(inputs, Solved::heap_bytes, || {
             let trials = is_heard.then(Vec::new);
             self.solve(problem, correspondences, trials, trace)
         })?;
@@ -400,7 +403,7 @@ fn best_matches<E>(
     reference: &Features,
     params: &FeatureParams,
     checkpoint: impl FnMut() -> Result<(), E>,
-) -> Result<Arc<[Option<Match>]>, E> {
+) -> Result<Decided, E> {
     let (query, reference) = (&query.descriptors, &reference.descriptors);
     let ratio = params.ratio as f32;
     let mut matches = best_matches_interruptible(query, reference, ratio, checkpoint)?;
@@ -422,8 +425,7 @@ pub fn projected_cloud(
     visible: Option<&RenderParams>,
 ) -> Arc<ProjectedCloudIndex> {
     let visible = visible.map(|render| RenderParams { visibility: true, ..render.clone() });
-    let key = visible.as_ref().map(Exact::of);
-    let cloud = tuple.memo.recall(key, || match &visible {
+    let cloud = tuple.memo.recall(&visible, ProjectedCloudIndex::heap_bytes, || match &visible {
         None => ProjectedCloudIndex::new(&tuple.cloud, &tuple.intrinsics),
         Some(render) => {
             let points = tuple.visible_cloud(render).positions().collect();

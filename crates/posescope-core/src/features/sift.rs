@@ -14,7 +14,6 @@ use rayon::prelude::*;
 use super::Keypoint;
 use crate::describe::parameters;
 use crate::image::FloatImage;
-use crate::memo::Remembered;
 use octave::{BASE_SIGMA, Extremum, Octave, blurred, halved};
 
 parameters! {
@@ -63,8 +62,9 @@ pub struct SiftFeatures {
     pub descriptors: Vec<SiftDescriptor>,
 }
 
-impl Remembered for SiftFeatures {
-    fn heap_bytes(&self) -> usize {
+impl SiftFeatures {
+    /// Memory that they take \[bytes\].
+    pub(crate) fn heap_bytes(&self) -> usize {
         size_of_val(self.keypoints.as_slice()) + size_of_val(self.descriptors.as_slice())
     }
 }

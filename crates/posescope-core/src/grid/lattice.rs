@@ -1,7 +1,6 @@
 //! The hypotheses of one phase of the search.
 
 use super::{GridParams, Offset, Phase};
-use crate::memo::bits_of_fields;
 
 /// Cells of a lattice at most: 1,024 × 1,024, which is a radius of 511 m in steps of 1 m, or of 50 m
 /// in steps of 0.1 m.
@@ -42,8 +41,6 @@ pub struct Lattice {
     /// Positions farther from the reference than this are left out \[m\].
     reach_m: f64,
 }
-
-bits_of_fields!(Lattice { phase, columns, rows, step, centre, reach_m });
 
 impl Lattice {
     /// The hypotheses of `phase` around `centre`, for an uncertainty radius \[m\].

@@ -14,7 +14,6 @@ use crate::camera::Intrinsics;
 use crate::cost::{Pair, byte_bin};
 use crate::geometry::Pose;
 use crate::image::{GrayImage, cubic_interpolated};
-use crate::memo::{Exact, Remembered};
 use crate::problem::Problem;
 use crate::render::{
     ColoredPoint, DepthCanvas, PointArrays, Pool, Rasterizer, RenderParams, Score, ShownPoints,
@@ -27,32 +26,11 @@ type Bins = [u8; 3];
 /// Scores query poses against one reference by the mean cost of three channels.
 pub struct Judge {
     reference: Arc<ShownPoints<Bins>>,
-    query: Arc<QueryBins>,
+    query: Arc<Vec<Bins>>,
     intrinsics: Intrinsics,
     splat_px: usize,
     params: JudgeParams,
     pool: Pool<(DepthCanvas<Pair<Bins>>, Vec<u32>)>,
-}
-
-struct QueryBins(Vec<Bins>);
-
-impl Remembered for QueryBins {
-    fn heap_bytes(&self) -> usize {
-        size_of_val(self.0.as_slice())
-    }
-}
-
-#[derive(PartialEq, Eq, Hash)]
-struct QueryKey {
-    params: Exact<JudgeParams>,
-    shrink: u32,
-}
-
-#[derive(PartialEq, Eq, Hash)]
-struct ReferenceKey {
-    params: Exact<JudgeParams>,
-    render: Exact<RenderParams>,
-    shrink: u32,
 }
 
 impl Judge {
@@ -65,14 +43,15 @@ impl Judge {
         shrink: u32,
     ) -> Self {
         let query = &problem.query;
-        let bins = query.memo.recall(QueryKey { params: Exact::of(params), shrink }, || {
-            query_bins(&query.photo.gray, params, shrink)
-        });
+        let bytes = |bins: &Vec<Bins>| size_of_val(bins.as_slice());
+        let bins = query
+            .memo
+            .recall((params, shrink), bytes, || query_bins(&query.photo.gray, params, shrink));
         let reference = &problem.reference;
-        let points = reference.memo.recall(
-            ReferenceKey { params: Exact::of(params), render: Exact::of(render), shrink },
-            || reference_points(problem, render, params, shrink),
-        );
+        let points =
+            reference.memo.recall((params, render, shrink), ShownPoints::heap_bytes, || {
+                reference_points(problem, render, params, shrink)
+            });
         Self {
             reference: points.value,
             query: bins.value,
@@ -92,11 +71,11 @@ impl Judge {
     /// the cost where no pixel is covered or all channels are constant, and for images of more than 16
     /// million pixels, which cannot be drawn.
     pub fn score(&self, reference_from_camera: &[Pose]) -> Vec<Score> {
-        if !DepthCanvas::<u8>::is_large_enough(&self.intrinsics, self.splat_px) {
+        if !DepthCanvas::<u8>::can_draw(&self.intrinsics, self.splat_px) {
             return vec![Score { cost: None, covered: 0 }; reference_from_camera.len()];
         }
         let positions = &self.reference.positions;
-        let values = Values { query: &self.query.0, points: &self.reference.values };
+        let values = Values { query: &self.query, points: &self.reference.values };
         let pair = |query, synthetic| Pair { query, synthetic };
         let worker = || (DepthCanvas::new(&self.intrinsics, self.splat_px), Vec::new());
         self.pool.score(reference_from_camera, worker, |(canvas, counts), pose| {
@@ -125,7 +104,7 @@ impl Judge {
             pixels.iter().map(|pixel| self.reference.values[pixel.intensity as usize]).collect();
         dealt.shuffle(&mut Pcg64::seed_from_u64(seed));
         let pair = |(pixel, synthetic): (&SplattedPixel, Bins)| Pair {
-            query: self.query.0[pixel.index as usize],
+            query: self.query[pixel.index as usize],
             synthetic,
         };
         let pairs: Vec<Pair<Bins>> = pixels.iter().zip(dealt).map(pair).collect();
@@ -188,19 +167,15 @@ fn binned(values: [f32; 3], bins: usize) -> Bins {
     values.map(|value| byte_bin(value, bins))
 }
 
-fn query_bins(photo: &GrayImage, params: &JudgeParams, shrink: u32) -> QueryBins {
+fn query_bins(photo: &GrayImage, params: &JudgeParams, shrink: u32) -> Vec<Bins> {
     let (photo, params) = shrunk(photo, params, shrink);
     let ChannelImages([intensity, contrast, edges]) =
         ChannelImages::of(&photo, params.sigma_px, &params);
     let values = intensity.as_raw().iter().zip(contrast.as_raw());
     let values = values.zip(edges.as_raw());
-    QueryBins(
-        values
-            .map(|((&intensity, &contrast), &edges)| {
-                binned([intensity, contrast, edges], params.bins)
-            })
-            .collect(),
-    )
+    let bins = values
+        .map(|((&intensity, &contrast), &edges)| binned([intensity, contrast, edges], params.bins));
+    bins.collect()
 }
 
 fn reference_points(

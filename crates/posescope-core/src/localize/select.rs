@@ -12,7 +12,6 @@ use rayon::prelude::*;
 
 use crate::estimator::count_matches;
 use crate::event::{ReferencesRanked, Stage};
-use crate::features::remembered;
 use crate::params::Params;
 use crate::problem::Query;
 use crate::retrieval::{Criterion, Geometry, Ranked, RankedReference, ReferenceRanking};
@@ -239,13 +238,12 @@ impl Ranking for ByMatches<'_> {
         checkpoint: &mut dyn FnMut() -> Result<(), Cancelled>,
     ) -> Result<Vec<Ranked>, ChoiceError> {
         let surf = &self.params.surf;
-        let of_query = remembered(&query.photo.gray, &query.memo, surf).value;
+        let of_query = query.features(surf);
         let mut ranked = Vec::new();
         // Neither their poses nor their clouds are needed.
         let matches = |&candidate: &usize| -> Result<(usize, usize), SceneError> {
             let frame = self.scene.query(candidate)?;
-            let features = remembered(&frame.photo.gray, &frame.memo, surf).value;
-            let count = count_matches(&of_query, &features, &self.params.fb);
+            let count = count_matches(&of_query, &frame.features(surf), &self.params.fb);
             Ok((count, candidate))
         };
         for together in candidates.chunks(AT_ONCE) {

@@ -7,7 +7,6 @@ use super::RenderParams;
 use crate::camera::Intrinsics;
 use crate::cloud::Cloud;
 use crate::image::{GrayImage, cubic_interpolated};
-use crate::memo::Remembered;
 
 /// A point of the cloud with the grey value that the reference photo gives it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -38,12 +37,6 @@ pub struct ColoredCloud {
     pub counts: ColoringCounts,
 }
 
-impl Remembered for ColoredCloud {
-    fn heap_bytes(&self) -> usize {
-        size_of_val(self.points.as_slice())
-    }
-}
-
 /// Gives each point that the reference camera sees the photo's grey value at its projection, by
 /// cubic convolution. The others get none, so they are not part of the result.
 ///
@@ -66,12 +59,6 @@ pub struct VisibleCloud {
     counts: ColoringCounts,
 }
 
-impl Remembered for VisibleCloud {
-    fn heap_bytes(&self) -> usize {
-        size_of_val(self.points.as_slice())
-    }
-}
-
 impl VisibleCloud {
     /// What the camera sees of the cloud, which is in its frame.
     pub fn new(cloud: &Cloud, intrinsics: &Intrinsics, params: &RenderParams) -> Self {
@@ -92,6 +79,11 @@ impl VisibleCloud {
         let counts =
             ColoringCounts { colored: points.len(), outside, occluded: projected - points.len() };
         Self { points, counts }
+    }
+
+    /// Memory that it takes \[bytes\].
+    pub(crate) fn heap_bytes(&self) -> usize {
+        size_of_val(self.points.as_slice())
     }
 
     /// The points alone \[m\], in the order of the scan.

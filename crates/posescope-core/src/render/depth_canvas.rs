@@ -38,8 +38,8 @@ pub struct DepthCanvas<K> {
 }
 
 impl<K: Copy + Default> DepthCanvas<K> {
-    /// Whether there is a canvas for a camera: not for an image of more than 16 million pixels, or 65,000 in a row.
-    pub fn is_large_enough(intrinsics: &Intrinsics, splat_px: usize) -> bool {
+    /// Whether there is a canvas for a camera: not for more than 16 million pixels, or 65,000 in a row.
+    pub fn can_draw(intrinsics: &Intrinsics, splat_px: usize) -> bool {
         let sides = Self::sides(intrinsics, splat_px / 2);
         sides[0] * sides[1] <= MOST_PIXELS && sides[0].max(sides[1]) < MOST_ROWS
     }
@@ -47,9 +47,9 @@ impl<K: Copy + Default> DepthCanvas<K> {
     /// An empty canvas for a camera; each point covers a square of `splat_px` (odd) pixels.
     ///
     /// # Panics
-    /// Where the image is too large ([`Self::is_large_enough`]).
+    /// Where the image is too large ([`Self::can_draw`]).
     pub fn new(intrinsics: &Intrinsics, splat_px: usize) -> Self {
-        assert!(Self::is_large_enough(intrinsics, splat_px), "no canvas is so large");
+        assert!(Self::can_draw(intrinsics, splat_px), "no canvas is so large");
         let reach = splat_px / 2;
         let sides = Self::sides(intrinsics, reach);
         Self {
@@ -328,7 +328,7 @@ mod tests {
     #[test]
     fn a_huge_image_has_no_canvas() {
         let huge = Intrinsics { width: 1 << 13, height: (1 << 11) + 1, ..small_camera() };
-        assert!(!DepthCanvas::<u8>::is_large_enough(&huge, 1));
-        assert!(DepthCanvas::<u8>::is_large_enough(&small_camera(), 1));
+        assert!(!DepthCanvas::<u8>::can_draw(&huge, 1));
+        assert!(DepthCanvas::<u8>::can_draw(&small_camera(), 1));
     }
 }

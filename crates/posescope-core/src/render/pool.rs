@@ -6,7 +6,6 @@ use rayon::prelude::*;
 
 use super::{PointArrays, Score};
 use crate::geometry::Pose;
-use crate::memo::Remembered;
 
 /// Hypotheses that are scored between two checkpoints, at most: enough to keep eight threads busy.
 pub const MOST_AT_A_TIME: usize = 256;
@@ -31,8 +30,9 @@ pub(crate) struct ShownPoints<T> {
     pub values: Vec<T>,
 }
 
-impl<T: Send + Sync + 'static> Remembered for ShownPoints<T> {
-    fn heap_bytes(&self) -> usize {
+impl<T> ShownPoints<T> {
+    /// What a memo counts them as.
+    pub fn heap_bytes(&self) -> usize {
         self.values.len() * (size_of::<T>() + 3 * size_of::<f32>())
     }
 }

@@ -154,7 +154,7 @@ impl<'a> Scorer<'a> {
         self.threads.get_or_init(|| {
             let positions = || PointArrays::new(self.cloud.points.iter().map(|p| p.position));
             let values = self.cloud.points.iter().map(|point| point.intensity);
-            let is_large = !DepthCanvas::<u8>::is_large_enough(&self.intrinsics, self.splat_px);
+            let is_large = !DepthCanvas::<u8>::can_draw(&self.intrinsics, self.splat_px);
             match self.statistic {
                 _ if is_large => Threads::Plain(Pool::default()),
                 Statistic::LesserHalf { power: 1 } => Threads::LesserHalf {

@@ -4,7 +4,6 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use super::{Scene, SceneError, pose_of, reference_of};
-use crate::memo::Memo;
 use crate::problem::{Query, ReferenceTuple};
 use crate::recent::{Limit, Recent};
 
@@ -15,9 +14,6 @@ const FRAMES: usize = 64;
 /// within 15 m of a query on the street, each with its features. A frame with its cloud and all
 /// that the four estimators remember takes three times as much.
 const BYTES: usize = 96 << 20;
-/// Values that one frame's memo keeps: some settings of each stage with several references, so that
-/// going back to the last setting costs nothing either.
-const VALUES: usize = 256;
 
 /// Frames with all that was worked out about them, within a limit. The frame that was not asked for
 /// the longest makes room; one that somebody holds stays, as letting it go would free nothing.
@@ -148,8 +144,7 @@ impl<'a> CachedScene<'a> {
             frames.trim();
             return Ok(known);
         }
-        let query =
-            Query { memo: Memo::of(VALUES), ..Arc::unwrap_or_clone(self.scene.query(frame)?) };
+        let query = Arc::unwrap_or_clone(self.scene.query(frame)?).remembering();
         let made = Frame { query: Arc::new(query), reference: OnceLock::new() };
         Ok(frames.insert(key, Arc::new(made)))
     }

@@ -18,7 +18,7 @@ use posescope_core::features::FeatureState;
 use posescope_core::geometry::Pose;
 use posescope_core::history::History;
 use posescope_core::image::{FloatImage, gaussian_smoothed};
-use posescope_core::memo::{Key, Memo};
+use posescope_core::memo::{Key, key};
 use posescope_core::method::Method;
 use posescope_core::params::Params;
 use posescope_core::problem::Problem;
@@ -269,7 +269,7 @@ impl<F: Fn(&[IntensityPair]) -> Option<f64> + Send + Sync> Cost for Own<F> {
         gaussian_smoothed(photo, 0.0)
     }
     fn query_channel_key(&self) -> Key {
-        Key::new("grey")
+        key("grey")
     }
     fn statistic(&self) -> Statistic<'_> {
         Statistic::of_pairs(&self.0)
@@ -310,7 +310,7 @@ impl Cost for ManyBins {
         gaussian_smoothed(photo, 1.0)
     }
     fn query_channel_key(&self) -> Key {
-        Key::new("smooth")
+        key("smooth")
     }
     fn statistic(&self) -> Statistic<'_> {
         let cost = Entropies::normalized_mutual_information;
@@ -378,8 +378,7 @@ fn trials_that_are_not_remembered_are_told_again_all_the_same() {
     let (mut problem, mut params) = (remembering(), Params::default());
     // No photo shows the other: no sample is ever good enough, and all trials are drawn.
     let other = problem_of_strangers();
-    problem.query =
-        Arc::new(posescope_core::problem::Query { memo: Memo::of(64), ..(*other.query).clone() });
+    problem.query = Arc::new((*other.query).clone().remembering());
     let changes = [
         "fb.max_trials=30000",
         "fb.confidence=0.999999",
@@ -563,12 +562,8 @@ fn problem_of_strangers() -> Problem {
 
 pub fn remembering() -> Problem {
     let mut problem = solvable();
-    let mut query = (*problem.query).clone();
-    query.memo = Memo::of(64);
-    problem.query = Arc::new(query);
-    let mut reference = (*problem.reference).clone();
-    reference.memo = Memo::of(64);
-    problem.reference = Arc::new(reference);
+    problem.query = Arc::new((*problem.query).clone().remembering());
+    problem.reference = Arc::new((*problem.reference).clone().remembering());
     problem
 }
 

@@ -12,7 +12,6 @@ use posescope_core::localize::{
     LocalizeError, LocalizeObserver, Localizer, NoObserver, QueryResult, Request, StageTimes,
     localize_traced,
 };
-use posescope_core::memo::Memo;
 use posescope_core::method::Method;
 use posescope_core::params::Params;
 use posescope_core::problem::{Problem, Query};
@@ -138,8 +137,8 @@ fn a_truth_beyond_the_disc_is_outside_the_grid() {
 fn what_is_remembered_of_a_search_is_said_of_no_other() {
     let problem = solvable();
     let mut remembering = problem.clone();
-    Arc::make_mut(&mut remembering.query).memo = Memo::of(256);
-    Arc::make_mut(&mut remembering.reference).memo = Memo::of(256);
+    remembering.query = Arc::new((*problem.query).clone().remembering());
+    remembering.reference = Arc::new((*problem.reference).clone().remembering());
     let at =
         |right, ahead| problem.reference.world_from_camera * Pose::translation(right, 0.0, ahead);
     let truths = [None, Some(at(0.0, 1.0)), Some(at(2.0, 1.0)), Some(at(0.0, 9.0))];
@@ -169,8 +168,8 @@ fn what_is_remembered_of_a_search_is_said_of_no_other() {
 fn the_look_of_one_pose_is_not_taken_for_that_of_another() {
     let problem = solvable();
     let mut remembering = problem.clone();
-    Arc::make_mut(&mut remembering.query).memo = Memo::of(256);
-    Arc::make_mut(&mut remembering.reference).memo = Memo::of(256);
+    remembering.query = Arc::new((*problem.query).clone().remembering());
+    remembering.reference = Arc::new((*problem.reference).clone().remembering());
     let believed = |problem: &Problem, params: &Params| {
         let mut evidence = Evidence::default();
         let mut trace = Trace::to(&mut evidence);

@@ -309,12 +309,10 @@ impl Scene for UnusualScene {
     }
 
     fn query(&self, frame: usize) -> Result<Arc<Query>, SceneError> {
-        let query = Arc::unwrap_or_clone(self.0.query(frame)?);
-        Ok(Arc::new(Query {
-            name: format!("query {frame}"),
-            intrinsics: self.intrinsics(frame),
-            ..query
-        }))
+        let mut query = Arc::unwrap_or_clone(self.0.query(frame)?);
+        query.name = format!("query {frame}");
+        query.intrinsics = self.intrinsics(frame);
+        Ok(Arc::new(query))
     }
 
     fn fingerprint(&self) -> u64 {
@@ -327,11 +325,11 @@ impl Scene for UnusualScene {
 fn said(scene: &dyn Scene, frame: usize) -> Vec<String> {
     let error = |error: SceneError| error.to_string();
     let query = scene.query(frame).map_err(error).map(|query| {
-        let Query { name, photo, intrinsics, memo: _ } = &*query;
+        let Query { name, photo, intrinsics, .. } = &*query;
         (name.clone(), photo.gray.clone(), *intrinsics)
     });
     let reference = scene.reference(frame).map_err(error).map(|tuple| {
-        let ReferenceTuple { name, photo, intrinsics, world_from_camera, cloud, memo: _ } = &*tuple;
+        let ReferenceTuple { name, photo, intrinsics, world_from_camera, cloud, .. } = &*tuple;
         let pixels = photo.gray.clone();
         (name.clone(), pixels, *intrinsics, *world_from_camera, cloud.points.clone())
     });

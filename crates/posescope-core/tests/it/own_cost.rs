@@ -3,7 +3,7 @@
 use posescope_core::cost::Statistic;
 use posescope_core::event::{Stage, StageEnded, ViewRendered};
 use posescope_core::image::{FloatImage, GrayImage, gaussian_smoothed};
-use posescope_core::memo::Key;
+use posescope_core::memo::{Key, key};
 use posescope_core::{
     Cost, Direct, Failure, History, IntensityPair, Method, Params, Problem, Trace, estimator,
     localize, localize_by, localize_traced,
@@ -21,7 +21,7 @@ impl Cost for Mean {
     }
 
     fn query_channel_key(&self) -> Key {
-        Key::new("grey")
+        key("grey")
     }
 
     fn statistic(&self) -> Statistic<'_> {

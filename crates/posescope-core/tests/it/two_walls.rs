@@ -1,13 +1,10 @@
 //! A small world: two textured walls, seen by two cameras one behind the other.
 
-use std::sync::Arc;
-
 use image::{GrayImage, Luma};
 use posescope_core::camera::Intrinsics;
 use posescope_core::cloud::Cloud;
 use posescope_core::geometry::Pose;
 use posescope_core::image::Photo;
-use posescope_core::memo::Memo;
 use posescope_core::problem::{Problem, Query, ReferenceTuple};
 
 pub const CAMERA: Intrinsics =
@@ -37,26 +34,12 @@ fn depth_at(x: f64) -> f64 {
 
 /// A problem with the reference somewhere in the world.
 pub fn problem(query: GrayImage, reference: GrayImage, cloud: Cloud) -> Problem {
-    Problem {
-        query: Arc::new(Query {
-            name: "query".to_owned(),
-            photo: Photo::from_gray(query).into(),
-            intrinsics: CAMERA,
-            memo: Memo::off(),
-        }),
-        reference: Arc::new(ReferenceTuple {
-            name: "reference".to_owned(),
-            photo: Photo::from_gray(reference).into(),
-            intrinsics: CAMERA,
-            world_from_camera: Pose::translation(100.0, -2.0, 30.0),
-            cloud,
-            memo: Memo::off(),
-        }),
-        uncertainty_radius_m: 3.0,
-        prior_m: None,
-        seed: 7,
-        matches: None,
-    }
+    let pose = Pose::translation(100.0, -2.0, 30.0);
+    let query = Query::new("query", Photo::from_gray(query), CAMERA).expect("fits");
+    let reference =
+        ReferenceTuple::new("reference", Photo::from_gray(reference), CAMERA, pose, cloud);
+    let problem = Problem::new(query, reference.expect("fits"), 3.0).expect("a radius");
+    Problem { seed: 7, ..problem }
 }
 
 /// A point in every other pixel of the reference.

@@ -248,7 +248,6 @@ mod tests {
     use crate::cloud::Cloud;
     use crate::geometry::Pose;
     use crate::image::{GrayImage, Photo};
-    use crate::memo::Memo;
 
     #[test]
     fn only_points_near_the_pixel_and_in_front_are_seen_the_nearest_first() {
@@ -257,14 +256,10 @@ mod tests {
         let at = |x: f64, y: f64, z: f64| intrinsics.unproject(&Point2::new(x, y), z).cast();
         let mut points = vec![at(20.0, 20.0, 10.0), at(22.0, 20.0, 30.0), at(60.0, 60.0, 5.0)];
         points.push(-points[0]);
-        let tuple = ReferenceTuple {
-            name: "reference".to_owned(),
-            photo: Photo::from_gray(GrayImage::new(101, 81)).into(),
-            intrinsics,
-            world_from_camera: Pose::identity(),
-            cloud: Cloud { points },
-            memo: Memo::off(),
-        };
+        let photo = Photo::from_gray(GrayImage::new(101, 81));
+        let (pose, cloud) = (Pose::identity(), Cloud { points });
+        let tuple = ReferenceTuple::new("reference", photo, intrinsics, pose, cloud);
+        let tuple = tuple.expect("fits");
         let seen = lidar_around(&tuple, &Point2::new(22.5, 20.0), 15.0);
         let depths: Vec<f64> = seen.iter().map(|(_, depth_m)| depth_m.round()).collect();
         assert_eq!(depths, [30.0, 10.0]);

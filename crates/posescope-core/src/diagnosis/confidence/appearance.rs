@@ -5,16 +5,17 @@
 //! far better than at poses beside it, or elsewhere around the reference. The cost is that of the
 //! [judge](crate::judge), on smaller photos.
 
+use std::convert::Infallible;
+
 use super::{centre_and_deviation, tamed};
 use crate::geometry::{Pose, yaw};
-use crate::judge::{Judge, JudgeParams, moved};
-use crate::memo::{Exact, MemoId, Remembered};
+use crate::judge::{Judge, moved};
 use crate::params::Params;
 use crate::problem::Problem;
-use crate::render::{RenderParams, Score};
+use crate::render::Score;
 
 /// How closely one looks. A method's coefficients belong to its look.
-#[derive(Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug)]
 pub(super) struct Look {
     /// How many times smaller the photos are.
     shrink: u32,
@@ -61,22 +62,6 @@ pub(super) struct Appearance {
     gain: f64,
 }
 
-impl Remembered for Appearance {
-    fn heap_bytes(&self) -> usize {
-        0
-    }
-}
-
-/// What the appearance of a pose depends on beside the query.
-#[derive(PartialEq, Eq, Hash)]
-struct AppearanceKey {
-    reference: MemoId,
-    judge: Exact<JudgeParams>,
-    render: Exact<RenderParams>,
-    look: Look,
-    pose: Exact<Pose>,
-}
-
 impl Appearance {
     /// What is seen at a pose of the query's camera in the reference camera's frame, remembered with the
     /// query: a method and the hybrid that keeps its pose ask the same. Where nothing can be compared,
@@ -87,18 +72,10 @@ impl Appearance {
         reference_from_query: &Pose,
         look: Look,
     ) -> Self {
-        let seen = || Self::seen(problem, params, reference_from_query, look);
-        let Some(reference) = problem.reference.memo.id() else {
-            return seen();
-        };
-        let key = AppearanceKey {
-            reference,
-            judge: Exact::of(&params.judge),
-            render: Exact::of(&params.render),
-            look,
-            pose: Exact::of(reference_from_query),
-        };
-        *problem.query.memo.recall(key, seen).value
+        let inputs = (&params.judge, &params.render, look, reference_from_query);
+        let seen = || Ok(Self::seen(problem, params, reference_from_query, look));
+        let Ok::<_, Infallible>(seen) = problem.try_recall(inputs, |_| 0, seen);
+        *seen.value
     }
 
     fn seen(problem: &Problem, params: &Params, reference_from_query: &Pose, look: Look) -> Self {

@@ -1,17 +1,7 @@
 //! D1: the lowest cost covers too little.
 
-use std::fmt;
-
-use serde::Serialize;
-
-use super::{Code, DecidedAt, Rule, Test};
-use crate::diagnosis::ask::{Ask, Remedy};
-use crate::diagnosis::case::Case;
-use crate::diagnosis::family::Family;
-use crate::diagnosis::search::{Search, TELLING_PIXELS};
-use crate::diagnosis::{Diagnosis, MapOverlay, Proof};
-use crate::event::Stage;
-use crate::grid::Phase;
+use super::*;
+use crate::diagnosis::search::TELLING_PIXELS;
 
 /// A minimum that covers less than this share of what the truth covers is hardly covered.
 const HARDLY_COVERED: f64 = 0.5;
@@ -53,22 +43,10 @@ fn out_of_view(search: &Search<'_, '_>) -> Diagnosis {
     })
 }
 
-#[derive(Serialize)]
-struct OutOfView {
-    judge: Option<&'static str>,
-    covered: usize,
-    covered_at_reference: usize,
-}
-
-impl fmt::Display for OutOfView {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            f,
-            "Almost nothing of the reference's cloud is in view at this pose: {} px. The reference itself sees {} px.",
-            self.covered, self.covered_at_reference
-        )
-    }
-}
+evidence!(OutOfView { judge: Option<&'static str>, covered: usize, covered_at_reference: usize } =>
+    "Almost nothing of the reference's cloud is in view at this pose: {covered} px. The reference \
+     itself sees {covered_at_reference} px."
+);
 
 /// So few pixels match by chance.
 fn too_few_pixels(search: &Search<'_, '_>) -> Option<Diagnosis> {
@@ -97,24 +75,16 @@ fn is_hardly_covered(at_result: usize, at_truth: usize) -> bool {
     (at_result as f64) < HARDLY_COVERED * at_truth as f64 && at_truth >= TELLING_PIXELS
 }
 
-#[derive(Serialize)]
-struct TooFewPixels {
+evidence!(TooFewPixels {
     judge: Option<&'static str>,
     covered_at_result: usize,
     covered_at_truth: usize,
     gain_at_result: f64,
     gain_at_truth: f64,
-}
-
-impl fmt::Display for TooFewPixels {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            f,
-            "The pose of lowest cost covers too little: {} px, where one near the truth covers {} px. With so few, a low cost can be chance.",
-            self.covered_at_result, self.covered_at_truth
-        )
-    }
-}
+} =>
+    "The pose of lowest cost covers too little: {covered_at_result} px, where one near the truth \
+     covers {covered_at_truth} px. With so few, a low cost can be chance."
+);
 
 /// Of a pose that is more likely wrong than right, what speaks against it without the truth.
 fn next_to_nothing(case: &Case<'_, '_>) -> Option<Diagnosis> {
@@ -133,23 +103,11 @@ fn next_to_nothing(case: &Case<'_, '_>) -> Option<Diagnosis> {
     })
 }
 
-#[derive(Serialize)]
-struct Uncovered {
-    coverage: f64,
-    share_of_reference: f64,
-    chance_level: Option<f64>,
-}
-
-impl fmt::Display for Uncovered {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            f,
-            "The pose of lowest cost covers too little: {:.2} % of the photo. The reference pose covers {:.1} times as much.",
-            100.0 * self.coverage,
-            1.0 / self.share_of_reference
-        )
-    }
-}
+evidence!(Uncovered { coverage: f64, share_of_reference: f64, chance_level: Option<f64> } =>
+    "The pose of lowest cost covers too little: {:.2} % of the photo. The reference pose covers \
+     {:.1} times as much.",
+    100.0 * coverage, 1.0 / share_of_reference
+);
 
 pub(super) fn remedies(ask: &Ask<'_>) -> Vec<Remedy> {
     let mut tried = vec![

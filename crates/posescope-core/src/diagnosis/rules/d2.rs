@@ -1,20 +1,6 @@
 //! D2: the cost prefers another place.
 
-use std::fmt;
-
-use serde::Serialize;
-
-use super::{Code, DecidedAt, Rule, Test};
-use crate::diagnosis::ask::{Ask, Remedy};
-use crate::diagnosis::case::Case;
-use crate::diagnosis::family::Family;
-use crate::diagnosis::numbers::{metres, pair};
-use crate::diagnosis::search::Search;
-use crate::diagnosis::starts::Starts;
-use crate::diagnosis::{Diagnosis, MapOverlay, Proof};
-use crate::event::Stage;
-use crate::geometry::PoseError;
-use crate::grid::{Offset, Phase};
+use super::*;
 
 pub(super) const RULE: Rule = Rule {
     code: Code::D2,

@@ -1,21 +1,9 @@
 //! D3: the search missed a lower cost near the truth.
 
-use std::fmt;
-
-use serde::Serialize;
-
 use super::d2::At;
-use super::{Code, DecidedAt, Rule, Test};
-use crate::diagnosis::ask::{Ask, Remedy};
-use crate::diagnosis::case::Case;
-use crate::diagnosis::family::Family;
-use crate::diagnosis::numbers::{ordinal, pair};
-use crate::diagnosis::search::{Place, Search};
-use crate::diagnosis::starts::Starts;
-use crate::diagnosis::{Diagnosis, MapOverlay, Proof};
-use crate::event::Stage;
-use crate::geometry::PoseError;
-use crate::grid::{Offset, Phase, ScoredLattice};
+use super::*;
+use crate::diagnosis::search::Place;
+use crate::grid::ScoredLattice;
 
 pub(super) const RULE: Rule = Rule {
     code: Code::D3,

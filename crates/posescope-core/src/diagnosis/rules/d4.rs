@@ -1,19 +1,6 @@
 //! D4: the truth is outside of what is searched.
 
-use std::fmt;
-
-use serde::Serialize;
-
-use super::{Code, DecidedAt, Rule, Test};
-use crate::diagnosis::ask::{Ask, Remedy};
-use crate::diagnosis::case::Case;
-use crate::diagnosis::family::Family;
-use crate::diagnosis::numbers::metres;
-use crate::diagnosis::search::Search;
-use crate::diagnosis::starts::Starts;
-use crate::diagnosis::{Diagnosis, MapOverlay, Proof};
-use crate::event::Stage;
-use crate::grid::Phase;
+use super::*;
 
 pub(super) const RULE: Rule = Rule {
     code: Code::D4,
@@ -87,21 +74,10 @@ impl fmt::Display for Outside {
     }
 }
 
-#[derive(Serialize)]
-struct Uncovered {
-    covered: usize,
-    least_covered: u32,
-}
-
-impl fmt::Display for Uncovered {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            f,
-            "Too little of the cloud is in view near the truth: {} px, grid.coverage_floor needs {}.",
-            self.covered, self.least_covered
-        )
-    }
-}
+evidence!(Uncovered { covered: usize, least_covered: u32 } =>
+    "Too little of the cloud is in view near the truth: {covered} px, grid.coverage_floor needs \
+     {least_covered}."
+);
 
 fn by_starts(starts: &Starts, radius_m: f64) -> Option<Diagnosis> {
     starts

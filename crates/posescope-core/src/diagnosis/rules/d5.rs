@@ -1,14 +1,6 @@
 //! D5: nothing makes one hypothesis stand out.
 
-use std::fmt;
-
-use serde::Serialize;
-
-use super::{Code, DecidedAt, Rule, Test, no_remedy};
-use crate::diagnosis::case::Case;
-use crate::diagnosis::family::Family;
-use crate::diagnosis::{Diagnosis, MapOverlay, Proof};
-use crate::event::Stage;
+use super::*;
 
 /// Standard deviation of grey values below which a photo shows nothing.
 const TEXTURELESS: f64 = 2.0;
@@ -37,17 +29,7 @@ fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
     is_textureless(case).then(|| RULE.found(&Textureless { deviation: case.contrast() }))
 }
 
-#[derive(Serialize)]
-struct Textureless {
-    deviation: f64,
-}
-
-impl fmt::Display for Textureless {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            f,
-            "The query has no texture: its grey values vary by {:.1} only. No pose can stand out.",
-            self.deviation
-        )
-    }
-}
+evidence!(Textureless { deviation: f64 } =>
+    "The query has no texture: its grey values vary by {deviation:.1} only. No pose can stand \
+     out."
+);

@@ -1,15 +1,6 @@
 //! D6: the images look too different.
 
-use std::fmt;
-
-use serde::Serialize;
-
-use super::{Code, DecidedAt, Rule, Test, d2};
-use crate::diagnosis::case::Case;
-use crate::diagnosis::family::Family;
-use crate::diagnosis::numbers::pair;
-use crate::diagnosis::{Diagnosis, MapOverlay, Proof};
-use crate::event::Stage;
+use super::*;
 
 pub(super) const RULE: Rule = Rule {
     code: Code::D6,

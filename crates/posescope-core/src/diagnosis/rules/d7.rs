@@ -1,16 +1,7 @@
 //! D7: height, pitch or roll, which are not searched, are off.
 
-use std::fmt;
-
-use serde::Serialize;
-
-use super::{Code, DecidedAt, Rule, Test, d2};
-use crate::diagnosis::case::Case;
-use crate::diagnosis::family::Family;
-use crate::diagnosis::numbers::{metres, pair};
-use crate::diagnosis::search::{Place, Search};
-use crate::diagnosis::{Diagnosis, Proof};
-use crate::geometry::PoseError;
+use super::*;
+use crate::diagnosis::search::Place;
 
 /// How far the truth must be off the plane of the search for that to be a cause.
 const OFF_PLANE_M: f64 = 0.1;

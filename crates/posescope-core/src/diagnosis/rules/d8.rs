@@ -1,16 +1,6 @@
 //! D8: the minimum lies where the grid ends.
 
-use std::fmt;
-
-use serde::Serialize;
-
-use super::{Code, DecidedAt, Rule, Test, d1};
-use crate::diagnosis::case::Case;
-use crate::diagnosis::family::Family;
-use crate::diagnosis::numbers::metres;
-use crate::diagnosis::{Diagnosis, MapOverlay, Proof};
-use crate::event::Stage;
-use crate::grid::Phase;
+use super::*;
 
 pub(super) const RULE: Rule = Rule {
     code: Code::D8,

@@ -1,7 +1,6 @@
 //! D9: a grid of more cells than can be scored and kept.
 
-use super::{Code, DecidedAt, Rule, Test, no_remedy};
-use crate::diagnosis::{MapOverlay, Proof};
+use super::*;
 
 pub(super) const RULE: Rule = Rule {
     code: Code::D9,

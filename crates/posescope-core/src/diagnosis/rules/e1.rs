@@ -1,7 +1,6 @@
 //! E1: another system has no answer for this query.
 
-use super::{Code, DecidedAt, Rule, Test, no_remedy};
-use crate::diagnosis::Proof;
+use super::*;
 
 pub(super) const RULE: Rule = Rule {
     code: Code::E1,

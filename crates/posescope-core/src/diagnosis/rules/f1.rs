@@ -1,16 +1,8 @@
 //! F1: one reference dragged the fusion.
 
-use std::fmt;
-
-use serde::Serialize;
-
-use super::{Code, DecidedAt, Rule, Test, no_remedy};
-use crate::diagnosis::case::{FusionCase, Member, heaviest};
-use crate::diagnosis::numbers::metres;
-use crate::diagnosis::{Diagnosis, Proof};
-use crate::event::Stage;
+use super::*;
+use crate::diagnosis::case::heaviest;
 use crate::fusion::{ShareOutcome, average_pose};
-use crate::geometry::{Pose, PoseError};
 
 pub(super) const RULE: Rule = Rule {
     code: Code::F1,

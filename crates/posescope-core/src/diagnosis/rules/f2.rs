@@ -1,8 +1,6 @@
 //! F2: a method that has no joint pose of several references.
 
-use super::{Code, DecidedAt, Rule, Test, no_remedy};
-use crate::diagnosis::Proof;
-use crate::event::Stage;
+use super::*;
 
 pub(super) const RULE: Rule = Rule {
     code: Code::F2,

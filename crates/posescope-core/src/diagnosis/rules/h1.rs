@@ -1,15 +1,6 @@
 //! H1: a method that chooses between poses kept a wrong one.
 
-use std::fmt;
-
-use serde::Serialize;
-
-use super::{Code, DecidedAt, Rule, Test, no_remedy};
-use crate::diagnosis::case::Case;
-use crate::diagnosis::family::Family;
-use crate::diagnosis::numbers::{metres, pair};
-use crate::diagnosis::{Diagnosis, Proof};
-use crate::geometry::{Pose, PoseError};
+use super::*;
 use crate::method::Method;
 
 pub(super) const RULE: Rule = Rule {
@@ -46,26 +37,11 @@ fn kept_by_hybrid(case: &Case<'_, '_>) -> Option<Diagnosis> {
     })
 }
 
-#[derive(Serialize)]
-struct Kept {
-    hybrid: Method,
-    kept: Method,
-    not_asked: Method,
-    error: PoseError,
-}
-
-impl fmt::Display for Kept {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            f,
-            "{} kept the wrong pose of {}, {} off, because that method accepted it. Its fallback {} was not asked.",
-            self.hybrid.label(),
-            self.kept,
-            metres(self.error.translation_m),
-            self.not_asked
-        )
-    }
-}
+evidence!(Kept { hybrid: Method, kept: Method, not_asked: Method, error: PoseError } =>
+    "{} kept the wrong pose of {kept}, {} off, because that method accepted it. Its fallback \
+     {not_asked} was not asked.",
+    hybrid.label(), metres(error.translation_m)
+);
 
 /// A candidate was right, and another one was taken.
 fn passed_over(case: &Case<'_, '_>) -> Option<Diagnosis> {

@@ -1,14 +1,7 @@
 //! L1: low confidence.
 
-use std::fmt;
-
-use serde::Serialize;
-
-use super::{Code, DecidedAt, Rule, Test, no_remedy};
-use crate::diagnosis::case::Case;
+use super::*;
 use crate::diagnosis::confidence::{self, Confidence, PoseConfidence};
-use crate::diagnosis::family::Family;
-use crate::diagnosis::{Diagnosis, Proof};
 
 pub(super) const RULE: Rule = Rule {
     code: Code::L1,
@@ -39,20 +32,7 @@ pub(in crate::diagnosis) fn low(confidence: Option<&PoseConfidence>) -> Option<D
     })
 }
 
-#[derive(Serialize)]
-struct Low {
-    probability: f64,
-    runner_up_margin: Option<f64>,
-    inlier_spread: Option<f64>,
-}
-
-impl fmt::Display for Low {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            f,
-            "Low confidence: {} likely within {} m.",
-            confidence::percent(self.probability),
-            confidence::WITHIN_M
-        )
-    }
-}
+evidence!(Low { probability: f64, runner_up_margin: Option<f64>, inlier_spread: Option<f64> } =>
+    "Low confidence: {} likely within {} m.",
+    confidence::percent(*probability), confidence::WITHIN_M
+);

@@ -1,16 +1,9 @@
 //! R1: the reference does not see the query's scene.
 
-use std::fmt;
-
 use nalgebra::Point3;
-use serde::Serialize;
 
-use super::{Code, DecidedAt, Rule, Test, no_remedy};
+use super::*;
 use crate::camera::Intrinsics;
-use crate::diagnosis::case::Case;
-use crate::diagnosis::family::Family;
-use crate::diagnosis::{Diagnosis, Proof};
-use crate::event::Stage;
 
 /// Share of the reference's points that the query must show.
 const LEAST_OVERLAP: f64 = 0.05;
@@ -49,17 +42,8 @@ fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
     (seen > 0 && overlap < LEAST_OVERLAP).then(|| RULE.found(&Overlap { overlap }))
 }
 
-#[derive(Serialize)]
-struct Overlap {
-    overlap: f64,
-}
-
-impl fmt::Display for Overlap {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            f,
-            "The reference does not see what the query sees: {:.1} % of its cloud is in the query's true view.",
-            100.0 * self.overlap
-        )
-    }
-}
+evidence!(Overlap { overlap: f64 } =>
+    "The reference does not see what the query sees: {:.1} % of its cloud is in the query's true \
+     view.",
+    100.0 * overlap
+);

@@ -1,15 +1,6 @@
 //! R2: too few keypoints.
 
-use std::fmt;
-
-use serde::Serialize;
-
-use super::{Code, DecidedAt, Rule, Test};
-use crate::diagnosis::ask::{Ask, Remedy};
-use crate::diagnosis::case::Case;
-use crate::diagnosis::family::Family;
-use crate::diagnosis::{Diagnosis, Proof};
-use crate::event::Stage;
+use super::*;
 
 /// Fewer keypoints leave nothing to match.
 const FEW_KEYPOINTS: usize = 20;
@@ -34,21 +25,9 @@ fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
     (query.min(reference) < FEW_KEYPOINTS).then(|| RULE.found(&Keypoints { query, reference }))
 }
 
-#[derive(Serialize)]
-struct Keypoints {
-    query: usize,
-    reference: usize,
-}
-
-impl fmt::Display for Keypoints {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            f,
-            "Too few keypoints: {} in the query, {} in the reference.",
-            self.query, self.reference
-        )
-    }
-}
+evidence!(Keypoints { query: usize, reference: usize } =>
+    "Too few keypoints: {query} in the query, {reference} in the reference."
+);
 
 fn remedies(ask: &Ask<'_>) -> Vec<Remedy> {
     vec![vec![ask.more_keypoints(0.2)], vec![ask.more_keypoints(0.05)]]

@@ -1,16 +1,7 @@
 //! R3: too few true matches.
 
-use std::fmt;
-
-use serde::Serialize;
-
-use super::{Code, DecidedAt, Rule, Test};
-use crate::diagnosis::ask::{Ask, Remedy};
-use crate::diagnosis::case::Case;
-use crate::diagnosis::family::Family;
-use crate::diagnosis::matches::{Funnel, Step};
-use crate::diagnosis::{Diagnosis, Proof};
-use crate::event::Stage;
+use super::*;
+use crate::diagnosis::matches::Step;
 
 /// Fewer true matches stand out from no crowd of false ones.
 pub(super) const FEW_MATCHES: usize = 8;

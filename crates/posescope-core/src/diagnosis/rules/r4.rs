@@ -1,17 +1,7 @@
 //! R4: depths are missing or wrong.
 
-use std::fmt;
-
-use serde::Serialize;
-
 use super::r3::FEW_MATCHES;
-use super::{Code, DecidedAt, Rule, Test};
-use crate::diagnosis::ask::{Ask, Remedy};
-use crate::diagnosis::case::Case;
-use crate::diagnosis::family::Family;
-use crate::diagnosis::matches::Funnel;
-use crate::diagnosis::{Diagnosis, Proof};
-use crate::event::Stage;
+use super::*;
 
 pub(super) const RULE: Rule = Rule {
     code: Code::R4,
@@ -40,23 +30,10 @@ fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
         .then(|| RULE.found(&Depths { right, wrong, missing, true_matches: matches.funnel }))
 }
 
-#[derive(Serialize)]
-struct Depths {
-    right: usize,
-    wrong: usize,
-    missing: usize,
-    true_matches: Funnel,
-}
-
-impl fmt::Display for Depths {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            f,
-            "Too few depths are right: of the true matches, {} have the right depth, {} a wrong one, {} none.",
-            self.right, self.wrong, self.missing
-        )
-    }
-}
+evidence!(Depths { right: usize, wrong: usize, missing: usize, true_matches: Funnel } =>
+    "Too few depths are right: of the true matches, {right} have the right depth, {wrong} a wrong \
+     one, {missing} none."
+);
 
 pub(super) fn remedies(ask: &Ask<'_>) -> Vec<Remedy> {
     let mut tried = vec![vec![

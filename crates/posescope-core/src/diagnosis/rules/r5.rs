@@ -1,14 +1,6 @@
 //! R5: the inliers do not fix the pose.
 
-use std::fmt;
-
-use serde::Serialize;
-
-use super::{Code, DecidedAt, Rule, Test, r4};
-use crate::diagnosis::case::Case;
-use crate::diagnosis::family::Family;
-use crate::diagnosis::matches::Funnel;
-use crate::diagnosis::{Diagnosis, Proof};
+use super::*;
 
 /// A pose is fixed if it is off by less than this, by the covariance of its inliers \[m\].
 pub(super) const FIXED_M: f64 = 0.3;

@@ -1,16 +1,6 @@
 //! R6: MLESAC missed a pose that the truth supports.
 
-use std::fmt;
-
-use serde::Serialize;
-
-use super::{Code, DecidedAt, Rule, Test};
-use crate::diagnosis::ask::{Ask, Change, Remedy};
-use crate::diagnosis::case::Case;
-use crate::diagnosis::family::Family;
-use crate::diagnosis::matches::Funnel;
-use crate::diagnosis::{Diagnosis, Proof};
-use crate::geometry::PoseError;
+use super::*;
 use crate::solver::{Correspondence, refine};
 
 pub(super) const RULE: Rule = Rule {

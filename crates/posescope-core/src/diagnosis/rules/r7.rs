@@ -1,15 +1,6 @@
 //! R7: the pose was right and refused.
 
-use std::fmt;
-
-use serde::Serialize;
-
-use super::{Code, DecidedAt, Rule, Test, r3};
-use crate::diagnosis::case::Case;
-use crate::diagnosis::family::Family;
-use crate::diagnosis::numbers::metres;
-use crate::diagnosis::{Diagnosis, Proof};
-use crate::geometry::PoseError;
+use super::*;
 
 pub(super) const RULE: Rule = Rule {
     code: Code::R7,
@@ -34,19 +25,7 @@ fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
         .then(|| RULE.found(&Refused { error, because: failure.to_string() }))
 }
 
-#[derive(Serialize)]
-struct Refused {
-    error: PoseError,
-    because: String,
-}
-
-impl fmt::Display for Refused {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            f,
-            "The right pose was found, {} from the truth, but not accepted. {}",
-            metres(self.error.translation_m),
-            self.because
-        )
-    }
-}
+evidence!(Refused { error: PoseError, because: String } =>
+    "The right pose was found, {} from the truth, but not accepted. {because}",
+    metres(error.translation_m)
+);

@@ -1,17 +1,6 @@
 //! R8: the pose was accepted and is wrong.
 
-use std::fmt;
-
-use serde::Serialize;
-
-use super::{Code, DecidedAt, Rule, Test};
-use crate::diagnosis::ask::{Ask, Remedy};
-use crate::diagnosis::case::Case;
-use crate::diagnosis::family::Family;
-use crate::diagnosis::matches::Funnel;
-use crate::diagnosis::numbers::metres;
-use crate::diagnosis::{Diagnosis, Proof};
-use crate::geometry::PoseError;
+use super::*;
 
 pub(super) const RULE: Rule = Rule {
     code: Code::R8,
@@ -37,27 +26,17 @@ fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
     }))
 }
 
-#[derive(Serialize)]
-struct Accepted {
+evidence!(Accepted {
     error: PoseError,
     inliers: usize,
     true_inliers: usize,
     supports_truth: usize,
     true_matches: Funnel,
-}
-
-impl fmt::Display for Accepted {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            f,
-            "A wrong pose was accepted: {} matches agree on it, {} off, {} of them true. The truth explains {}.",
-            self.inliers,
-            metres(self.error.translation_m),
-            self.true_inliers,
-            self.supports_truth
-        )
-    }
-}
+} =>
+    "A wrong pose was accepted: {inliers} matches agree on it, {} off, {true_inliers} of them \
+     true. The truth explains {supports_truth}.",
+    metres(error.translation_m)
+);
 
 fn remedies(ask: &Ask<'_>) -> Vec<Remedy> {
     let mut tried = vec![vec![ask.ratio(-0.1)], vec![ask.ratio(-0.2)]];

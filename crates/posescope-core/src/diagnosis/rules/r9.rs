@@ -1,17 +1,7 @@
 //! R9: a pose outside the prior.
 
-use std::fmt;
-
-use serde::Serialize;
-
-use super::{Code, DecidedAt, Rule, Test};
-use crate::diagnosis::ask::{Ask, Remedy};
-use crate::diagnosis::case::Case;
-use crate::diagnosis::family::Family;
-use crate::diagnosis::numbers::metres;
-use crate::diagnosis::{Diagnosis, Proof};
+use super::*;
 use crate::estimator::Failure;
-use crate::geometry::PoseError;
 
 pub(super) const RULE: Rule = Rule {
     code: Code::R9,

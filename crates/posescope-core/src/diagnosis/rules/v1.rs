@@ -1,14 +1,6 @@
 //! V1: the right place was ranked too low.
 
-use std::fmt;
-
-use serde::Serialize;
-
-use super::{Code, DecidedAt, Rule, Test, no_remedy};
-use crate::diagnosis::case::RankingCase;
-use crate::diagnosis::numbers::{metres, ordinal};
-use crate::diagnosis::{Diagnosis, Proof};
-use crate::event::Stage;
+use super::*;
 use crate::retrieval::RankedReference;
 
 pub(super) const RULE: Rule = Rule {

@@ -1,21 +1,13 @@
 //! X1: the ground truth, a calibration or the units are suspect.
 
-use std::fmt;
-
 use nalgebra::{Translation3, Vector2};
 use rayon::prelude::*;
-use serde::Serialize;
 
-use super::{Code, DecidedAt, Rule, Test, no_remedy};
+use super::*;
 use crate::camera::Intrinsics;
-use crate::diagnosis::case::Case;
 use crate::diagnosis::descent::{Descended, compass_search};
-use crate::diagnosis::family::Family;
 use crate::diagnosis::matches::TrueMatches;
-use crate::diagnosis::numbers::{metres, pair};
-use crate::diagnosis::search::{BEYOND_CHANCE, Search};
-use crate::diagnosis::{Diagnosis, Proof};
-use crate::geometry::{Pose, PoseError};
+use crate::diagnosis::search::BEYOND_CHANCE;
 use crate::render::Score;
 use crate::solver::Correspondence;
 
@@ -79,22 +71,10 @@ fn units(case: &Case<'_, '_>) -> Option<Diagnosis> {
     Some(RULE.found(&Units { median_depth_m, unit, depth_in_unit_m: median_depth_m * times }))
 }
 
-#[derive(Serialize)]
-struct Units {
-    median_depth_m: f64,
-    unit: &'static str,
-    depth_in_unit_m: f64,
-}
-
-impl fmt::Display for Units {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            f,
-            "The cloud is hardly in metres: its median depth is {:.3} m. Read as {} it would be {:.1} m.",
-            self.median_depth_m, self.unit, self.depth_in_unit_m
-        )
-    }
-}
+evidence!(Units { median_depth_m: f64, unit: &'static str, depth_in_unit_m: f64 } =>
+    "The cloud is hardly in metres: its median depth is {median_depth_m:.3} m. Read as {unit} it \
+     would be {depth_in_unit_m:.1} m."
+);
 
 /// The pose agrees with the truth if the poses of the scene are read in another way.
 ///
@@ -133,24 +113,11 @@ fn poses(case: &Case<'_, '_>) -> Option<Diagnosis> {
     }))
 }
 
-#[derive(Serialize)]
-struct Poses {
-    reading: &'static str,
-    error: PoseError,
-    error_as_stated: PoseError,
-}
-
-impl fmt::Display for Poses {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            f,
-            "The scene's poses are suspect: read as {}, the estimate is {} off. As stated it is {} off.",
-            self.reading,
-            metres(self.error.translation_m),
-            metres(self.error_as_stated.translation_m)
-        )
-    }
-}
+evidence!(Poses { reading: &'static str, error: PoseError, error_as_stated: PoseError } =>
+    "The scene's poses are suspect: read as {reading}, the estimate is {} off. As stated it is {} \
+     off.",
+    metres(error.translation_m), metres(error_as_stated.translation_m)
+);
 
 /// Fewer matches than this stand out from no crowd.
 const FEW_MATCHES: usize = 8;
@@ -162,21 +129,10 @@ fn cloud(matches: &TrueMatches) -> Option<Diagnosis> {
     is_foreign.then(|| RULE.found(&Cloud { wrong_depth, right_depth }))
 }
 
-#[derive(Serialize)]
-struct Cloud {
-    wrong_depth: usize,
-    right_depth: usize,
-}
-
-impl fmt::Display for Cloud {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            f,
-            "The cloud does not fit the reference photo: {} true matches have a wrong depth, {} the right one.",
-            self.wrong_depth, self.right_depth
-        )
-    }
-}
+evidence!(Cloud { wrong_depth: usize, right_depth: usize } =>
+    "The cloud does not fit the reference photo: {wrong_depth} true matches have a wrong depth, \
+     {right_depth} the right one."
+);
 
 /// From the true pose, another focal length and principal point explain far more matches.
 fn camera_by_matches(case: &Case<'_, '_>, matches: &TrueMatches) -> Option<Diagnosis> {
@@ -208,27 +164,16 @@ fn camera_by_matches(case: &Case<'_, '_>, matches: &TrueMatches) -> Option<Diagn
     })
 }
 
-#[derive(Serialize)]
-struct CameraByMatches {
+evidence!(CameraByMatches {
     explained: usize,
     explained_otherwise: usize,
     camera: Intrinsics,
     stated: Intrinsics,
-}
-
-impl fmt::Display for CameraByMatches {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            f,
-            "The query camera is suspect: its stated focal length is {:.0} px. With {} it explains {} matches at the truth, not \
-             {}.",
-            self.stated.fx,
-            otherwise_stated(&self.camera, &self.stated),
-            self.explained_otherwise,
-            self.explained
-        )
-    }
-}
+} =>
+    "The query camera is suspect: its stated focal length is {:.0} px. With {} it explains \
+     {explained_otherwise} matches at the truth, not {explained}.",
+    stated.fx, otherwise_stated(&camera, &stated)
+);
 
 /// In what a camera differs from the stated one, to the pixel.
 fn otherwise_stated(camera: &Intrinsics, stated: &Intrinsics) -> String {
@@ -320,26 +265,16 @@ fn truth_by_matches(case: &Case<'_, '_>, matches: &TrueMatches) -> Option<Diagno
     })
 }
 
-#[derive(Serialize)]
-struct TruthByMatches {
+evidence!(TruthByMatches {
     inliers: usize,
     correspondences: usize,
     supports_truth: usize,
     error: PoseError,
-}
-
-impl fmt::Display for TruthByMatches {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            f,
-            "The ground truth is suspect: {} of {} matches agree on a pose {} from it. The truth explains {}.",
-            self.inliers,
-            self.correspondences,
-            metres(self.error.translation_m),
-            self.supports_truth
-        )
-    }
-}
+} =>
+    "The ground truth is suspect: {inliers} of {correspondences} matches agree on a pose {} from \
+     it. The truth explains {supports_truth}.",
+    metres(error.translation_m)
+);
 
 /// What another camera must save beyond the best pose, as a share of the cost of shuffled pixels.
 const TELLING_GAIN: f64 = 0.02;
@@ -440,22 +375,10 @@ fn truth_by_cost(case: &Case<'_, '_>, search: &Search<'_, '_>) -> Option<Diagnos
     Some(RULE.found(&TruthByCost { probability, error }))
 }
 
-#[derive(Serialize)]
-struct TruthByCost {
-    probability: f64,
-    error: PoseError,
-}
-
-impl fmt::Display for TruthByCost {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            f,
-            "The ground truth is suspect: the pose is {:.0} % likely right, but {} from it.",
-            100.0 * self.probability,
-            metres(self.error.translation_m)
-        )
-    }
-}
+evidence!(TruthByCost { probability: f64, error: PoseError } =>
+    "The ground truth is suspect: the pose is {:.0} % likely right, but {} from it.",
+    100.0 * probability, metres(error.translation_m)
+);
 
 #[cfg(test)]
 mod tests {

@@ -1,7 +1,6 @@
 //! X9: an estimator panicked.
 
-use super::{Code, DecidedAt, Rule, Test, no_remedy};
-use crate::diagnosis::Proof;
+use super::*;
 
 pub(super) const RULE: Rule = Rule {
     code: Code::X9,

@@ -45,7 +45,7 @@ impl FeatureBased {
                 0..MINIMUM => Vec::new(),
                 _ => {
                     let decisions = self.best_matches(problem, &query, &reference, trace)?;
-                    states.after_matching(&decisions.value.0)
+                    states.after_matching(&decisions.value)
                 }
             };
             let lifted = self.lift(&matches, &reference, &problem.reference, trace)?;

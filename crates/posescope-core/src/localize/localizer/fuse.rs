@@ -4,7 +4,7 @@ use super::work::{MethodOutcome, QueryWork};
 use super::{Localizer, Request};
 use crate::diagnosis::{Member, diagnose_fusion, fused_confidence};
 use crate::estimator::{Failure, JointReference, count_matches};
-use crate::features::{PairMatches, remembered};
+use crate::features::PairMatches;
 use crate::fusion::{self, Fusion, Share, Way};
 use crate::geometry::{Pose, PoseError};
 use crate::localize::observer::checkpoint;
@@ -36,9 +36,8 @@ impl Localizer<'_> {
                 (None, Some(PairMatches::Absent)) => 0,
                 (None, None) => {
                     let surf = &self.params.surf;
-                    let query = remembered(&query.photo.gray, &query.memo, surf);
-                    let reference = remembered(&reference.photo.gray, &reference.memo, surf);
-                    count_matches(&query.value, &reference.value, &self.params.fb)
+                    let (query, reference) = (query.features(surf), reference.features(surf));
+                    count_matches(&query, &reference, &self.params.fb)
                 }
             });
         }
