@@ -1,6 +1,7 @@
 //! X1: the ground truth, a calibration or the units are suspect.
 
 use nalgebra::{Translation3, Vector2};
+use rayon::prelude::*;
 
 use super::*;
 use crate::camera::Intrinsics;
@@ -296,10 +297,9 @@ fn camera_by_cost(search: &Search<'_, '_>) -> Option<Diagnosis> {
     let stated_score = search.scorer.score(&[search.truth])[0];
     let cost_at_truth = stated_score.eligible_cost(search.least_covered)?;
     let costs = |places: &[[f64; 3]]| -> Vec<Option<f64>> {
-        let cameras: Vec<Intrinsics> = places.iter().map(camera).collect();
-        let scores = search.scorer.score_seen_by(&cameras, &search.truth);
-        let costs = scores.iter().map(|score| comparable_cost(score, &stated_score));
-        costs.collect()
+        let scored = |at| search.scorer.seen_by(&camera(at)).score(&[search.truth])[0];
+        let cost = |at| comparable_cost(&scored(at), &stated_score);
+        places.par_iter().map(cost).collect()
     };
     let focal_lengths = TIMES.map(|times| [times.ln(), 0.0, 0.0]);
     let best = focal_lengths

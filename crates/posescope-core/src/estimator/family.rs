@@ -1,0 +1,57 @@
+//! How methods find their poses.
+
+use super::find;
+use crate::method::Method;
+
+/// How a method finds its pose, as far as rules differ by it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Family {
+    /// Features matched once: `fb`.
+    Features,
+    /// Features matched again where a pose says: `fb2`.
+    Guided,
+    /// A cost searched on a grid: `pm`, `mi` and other costs.
+    Grid,
+    /// A cost searched from many starts in six freedoms: `mi6`, `robust`.
+    Starts,
+    /// Another system's pose.
+    Given,
+}
+
+impl Family {
+    /// Every family.
+    pub const ALL: &[Self] = &[Self::Features, Self::Guided, Self::Grid, Self::Starts, Self::Given];
+    /// Those that match features.
+    pub const MATCHING: &[Self] = &[Self::Features, Self::Guided];
+    /// Those that search a cost.
+    pub const SEARCHING: &[Self] = &[Self::Grid, Self::Starts];
+    /// Those whose pose has a cost: searched, or given by another system.
+    pub const COSTED: &[Self] = &[Self::Grid, Self::Starts, Self::Given];
+
+    /// The family in one phrase.
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::Features => "features (fb)",
+            Self::Guided => "features (fb2)",
+            Self::Grid => "grid search (pm, mi)",
+            Self::Starts => "many starts (mi6, robust)",
+            Self::Given => "other systems",
+        }
+    }
+
+    /// The groups of parameters that a method of this family reads.
+    pub(crate) fn groups(self, method: Method) -> Vec<&'static str> {
+        match self {
+            Self::Features => vec!["fb", "surf"],
+            Self::Guided => vec!["fb2", "render"],
+            Self::Grid => vec!["grid", "render", method.name()],
+            Self::Starts => vec!["mi6", "grid", "render", "judge"],
+            Self::Given => Vec::new(),
+        }
+    }
+
+    /// The family of a method that is no hybrid; `None` where nothing is known of it but its pose.
+    pub(crate) fn of(method: Method) -> Option<Self> {
+        find(method).map_or(Some(Self::Given), |entry| entry.family)
+    }
+}
