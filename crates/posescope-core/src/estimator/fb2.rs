@@ -30,9 +30,7 @@ use crate::event::{
     DepthsLifted, FeaturesClassified, FeaturesDetected, HypothesisTried, MatchesDecided,
     MatchesGuided, PoseRefined, ProjectedCloud, Side, Stage,
 };
-use crate::features::{
-    Features, Keypoint, Match, SiftFeatures, best_matches_interruptible, sift_interruptible,
-};
+use crate::features::{Features, Keypoint, Match, SiftFeatures, best_matches, sift_interruptible};
 use crate::geometry::Pose;
 use crate::image::Photo;
 use crate::memo::Memo;
@@ -250,7 +248,7 @@ impl Guided {
             let (query, reference) = (&query.descriptors, &reference.descriptors);
             let ratio = self.params.ratio as f32;
             let decisions: Arc<[Option<Match>]> =
-                best_matches_interruptible(query, reference, ratio, checkpoint)?.into();
+                best_matches(query, reference, ratio, checkpoint)?.into();
             trace.emit(|| MatchesDecided { decisions: Arc::clone(&decisions) })?;
             Ok::<_, Halt>(decisions)
         })?;

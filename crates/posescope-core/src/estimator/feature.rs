@@ -22,8 +22,7 @@ use crate::event::{
     PoseRefined, ProjectedCloud, Side, Stage,
 };
 use crate::features::{
-    Features, FoundMatches, Match, MatchVerdict, PairMatches, SurfParams,
-    best_matches_interruptible, kept_surf,
+    self, Features, FoundMatches, Match, MatchVerdict, PairMatches, SurfParams, kept_surf,
 };
 use crate::geometry::Pose;
 use crate::memo::Recalled;
@@ -263,7 +262,7 @@ impl FeatureBased {
         let FeatureParams { ratio, unique, .. } = self.params;
         let bytes = |decided: &Decided| size_of_val(&**decided);
         let found = problem.try_recall((self.surf, ratio, unique), bytes, || {
-            best_matches(query, reference, &self.params, || trace.checkpoint())
+            matches_of(query, reference, &self.params, || trace.checkpoint())
         });
         Ok(found?)
     }
@@ -398,7 +397,7 @@ fn found_elsewhere(problem: &Problem) -> Result<Option<&FoundMatches>, Failure> 
 }
 
 /// The best match of each query feature, and whether it stands out.
-fn best_matches<E>(
+fn matches_of<E>(
     query: &Features,
     reference: &Features,
     params: &FeatureParams,
@@ -406,7 +405,7 @@ fn best_matches<E>(
 ) -> Result<Decided, E> {
     let (query, reference) = (&query.descriptors, &reference.descriptors);
     let ratio = params.ratio as f32;
-    let mut matches = best_matches_interruptible(query, reference, ratio, checkpoint)?;
+    let mut matches = features::best_matches(query, reference, ratio, checkpoint)?;
     if !params.unique {
         for found in matches.iter_mut().flatten() {
             if let MatchVerdict::NotUnique { .. } = found.verdict {
@@ -441,6 +440,6 @@ pub fn count_matches(query: &Features, reference: &Features, params: &FeaturePar
     if query.keypoints.len() < MINIMUM || reference.keypoints.len() < MINIMUM {
         return 0;
     }
-    let Ok(matches) = best_matches(query, reference, params, || Ok::<_, Infallible>(()));
+    let Ok(matches) = matches_of(query, reference, params, || Ok::<_, Infallible>(()));
     matches.iter().flatten().filter(|found| found.verdict == MatchVerdict::Candidate).count()
 }
