@@ -15,6 +15,7 @@ use crate::geometry::{Pose, PoseError};
 use crate::method::Method;
 use crate::retrieval::ReferenceRanking;
 use crate::solver::Correspondence;
+use crate::stats::mean_and_squares;
 
 /// A result that is wrong, missing or perhaps uncertain.
 pub struct Case<'a, 'cost> {
@@ -69,10 +70,9 @@ impl<'a, 'cost> Case<'a, 'cost> {
         *self.contrast.get_or_init(|| {
             let photo = &self.subject.problem.query.photo.gray;
             let values = photo.as_raw().iter().step_by(STRIDE);
-            let values = values.map(|&value| f64::from(value));
-            let count = values.len() as f64;
-            let mean = values.clone().sum::<f64>() / count;
-            (values.map(|value| (value - mean).powi(2)).sum::<f64>() / count).sqrt()
+            let values: Vec<f64> = values.map(|&value| f64::from(value)).collect();
+            let squares = mean_and_squares(&values).map_or(f64::NAN, |(_, squares)| squares);
+            (squares / values.len() as f64).sqrt()
         })
     }
 

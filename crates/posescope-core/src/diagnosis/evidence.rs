@@ -42,11 +42,10 @@ pub struct Evidence {
 }
 
 impl Evidence {
-    /// The first lattice of positions.
-    pub fn coarse(&self) -> Option<&ScoredLattice> {
-        let is_coarse =
-            |surface: &&Arc<ScoredLattice>| surface.lattice.phase == Phase::PositionCoarse;
-        self.surfaces.iter().find(is_coarse).map(AsRef::as_ref)
+    /// The first scored lattice of a phase.
+    pub fn surface(&self, phase: Phase) -> Option<&ScoredLattice> {
+        let found = self.surfaces.iter().find(|surface| surface.lattice.phase == phase);
+        found.map(AsRef::as_ref)
     }
 
     /// What a hybrid of two methods would have told that fell back to the second.

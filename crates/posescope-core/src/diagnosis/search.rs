@@ -6,7 +6,7 @@
 //!
 //! Another system's pose is looked at in the same way, as if a search by the cost of MI had ended there.
 
-use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+use std::sync::{Mutex, OnceLock, PoisonError};
 
 use nalgebra::{Translation3, UnitQuaternion, Vector3};
 use rayon::prelude::*;
@@ -17,9 +17,10 @@ use super::descent::compass_search;
 use crate::cost::{Cost, shuffled};
 use crate::estimator;
 use crate::geometry::{Pose, PoseError, yaw};
-use crate::grid::{GridParams, Offset, Phase, ScoredLattice, least_covered};
+use crate::grid::{GridParams, Offset, Phase, least_covered};
 use crate::method::Method;
 use crate::render::{Score, Scorer};
+use crate::stats::mean_and_squares;
 
 /// The method whose cost judges the poses of other systems: it bears the greatest changes of appearance.
 pub(super) const JUDGE: Method = Method::MI;
@@ -89,8 +90,6 @@ pub(super) struct Search<'a, 'cost> {
     pub(super) result: Offset,
     /// The cost there; `None` where too little is covered.
     pub(super) result_cost: Option<f64>,
-    /// The cost there with the view's pixels shuffled.
-    pub(super) shuffled_cost: Option<f64>,
     /// Pixels that a pose must cover.
     pub(super) least_covered: u32,
     /// The method whose cost judges another system's pose.
@@ -124,11 +123,7 @@ impl Search<'_, '_> {
         let mut done = None;
         entry.make(subject.params).with_scorer(subject.problem, &mut |scorer| {
             let Some(work) = work.take() else { return };
-            let ended = if is_given {
-                ended_as_given(subject, scorer, measure.as_ref())
-            } else {
-                ended(subject)
-            };
+            let ended = if is_given { ended_as_given(subject, scorer) } else { ended(subject) };
             done = Some(match ended {
                 None => work(None),
                 Some(ended) => work(Some(&Search {
@@ -138,7 +133,6 @@ impl Search<'_, '_> {
                     truth,
                     result: ended.offset,
                     result_cost: ended.cost,
-                    shuffled_cost: ended.shuffled,
                     least_covered: ended.least_covered,
                     judge: is_given.then_some(JUDGE),
                     measure: measure.as_ref(),
@@ -328,7 +322,7 @@ impl Search<'_, '_> {
             lowest.filter(|place| place.cost < than)
         };
         lower(&[self.result]).or_else(|| {
-            let coarse = self.surface(Phase::PositionCoarse)?;
+            let coarse = self.subject.evidence.surface(Phase::PositionCoarse)?;
             let minima: Vec<Offset> = coarse
                 .local_minima()
                 .into_iter()
@@ -338,13 +332,6 @@ impl Search<'_, '_> {
                 .collect();
             lower(&minima)
         })
-    }
-
-    /// The scored lattice of a phase. Nothing was searched for another system's pose.
-    pub(super) fn surface(&self, phase: Phase) -> Option<&ScoredLattice> {
-        let mut surfaces = self.subject.evidence.surfaces.iter();
-        let found = surfaces.find(|surface| surface.lattice.phase == phase);
-        found.map(Arc::as_ref)
     }
 
     pub(super) fn distance_from_truth(&self, offset: &Offset) -> f64 {
@@ -372,17 +359,13 @@ impl Search<'_, '_> {
         if let Some((_, against)) = found {
             return against;
         }
-        let against = self.against_chance_of(self.scorer, &offset.reference_from_camera());
+        let against = self.against_chance_of(&offset.reference_from_camera());
         known().push((*offset, against));
         against
     }
 
-    pub(super) fn against_chance_of(
-        &self,
-        scorer: &Scorer<'_>,
-        pose: &Pose,
-    ) -> Option<AgainstChance> {
-        let pairs = scorer.pairs(pose);
+    fn against_chance_of(&self, pose: &Pose) -> Option<AgainstChance> {
+        let pairs = self.scorer.pairs(pose);
         let measure = self.measure;
         let seed = self.subject.problem.random_seed("shuffled truth");
         let costs: Vec<Option<f64>> = (0..SHUFFLES)
@@ -393,16 +376,10 @@ impl Search<'_, '_> {
             )
             .collect();
         let costs: Vec<f64> = costs.into_iter().flatten().collect();
-        let count = costs.len() as f64;
-        let mean = costs.iter().sum::<f64>() / count;
-        let squared: f64 = costs.iter().map(|cost| (cost - mean).powi(2)).sum();
-        Some(AgainstChance {
-            pixels: pairs.len(),
-            cost: measure.evaluate(&pairs)?,
-            mean,
-            deviation: (squared / (count - 1.0)).sqrt(),
-        })
-        .filter(|_| costs.len() > 1)
+        let (mean, squares) = mean_and_squares(&costs)?;
+        let deviation = (squares / (costs.len() as f64 - 1.0)).sqrt();
+        let cost = measure.evaluate(&pairs)?;
+        (costs.len() > 1).then_some(AgainstChance { pixels: pairs.len(), cost, mean, deviation })
     }
 
     pub(super) fn gain(&self, offset: &Offset) -> Option<f64> {
@@ -460,7 +437,6 @@ impl Search<'_, '_> {
 struct Ended {
     offset: Offset,
     cost: Option<f64>,
-    shuffled: Option<f64>,
     least_covered: u32,
 }
 
@@ -471,26 +447,22 @@ fn ended(subject: &Subject<'_>) -> Option<Ended> {
     Some(Ended {
         offset: minimum.offset,
         cost: Some(subject.outcome.cost?.best),
-        shuffled: subject.outcome.cost?.shuffled,
         least_covered: surfaces.first().map_or(0, |surface| surface.least_covered),
     })
 }
 
 /// What stands for a search that ended in another system's pose.
-fn ended_as_given(subject: &Subject<'_>, scorer: &Scorer<'_>, measure: &dyn Cost) -> Option<Ended> {
+fn ended_as_given(subject: &Subject<'_>, scorer: &Scorer<'_>) -> Option<Ended> {
     let problem = subject.problem;
     let pose = problem.reference_from_query(subject.outcome.pose.as_ref().ok()?);
     let start = Offset::default().reference_from_camera();
     let [at_pose, at_reference] = scorer.score(&[pose, start])[..] else {
         return None;
     };
-    let pairs = scorer.compare(&pose).pairs;
-    let pairs = shuffled(&pairs, problem.random_seed("shuffled pixels"));
     let least_covered = least_covered(subject.params.grid.coverage_floor, at_reference.covered);
     Some(Ended {
         offset: Offset::of(&pose),
         cost: at_pose.eligible_cost(least_covered),
-        shuffled: measure.evaluate(&pairs),
         least_covered,
     })
 }

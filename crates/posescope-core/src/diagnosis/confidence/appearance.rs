@@ -7,12 +7,13 @@
 
 use std::convert::Infallible;
 
-use super::{centre_and_deviation, tamed};
+use super::tamed;
 use crate::geometry::{Pose, yaw};
 use crate::judge::{Judge, moved};
 use crate::params::Params;
 use crate::problem::Problem;
 use crate::render::Score;
+use crate::stats::median_and_deviation;
 
 /// How closely one looks. A method's coefficients belong to its look.
 #[derive(Clone, Copy, Debug)]
@@ -44,7 +45,7 @@ const RINGS_M: [f64; 2] = [0.5, 1.0];
 const DEG_PER_M: f64 = 2.0;
 
 /// A pose that covers less of what the reference pose covers has no say.
-const LEAST_COVERED: f64 = 0.25;
+const MIN_COVERED: f64 = 0.25;
 
 /// The cost at a pose among the costs of others; all but the last in robust standard deviations of the
 /// costs around the reference.
@@ -94,11 +95,11 @@ impl Appearance {
         let [pose, start, beside @ ..] = of_poses else {
             return None;
         };
-        let least_covered = (LEAST_COVERED * f64::from(start.covered)) as u32;
+        let least_covered = (MIN_COVERED * f64::from(start.covered)) as u32;
         let mut around: Vec<f64> =
             around.iter().filter_map(|score| score.eligible_cost(least_covered)).collect();
         let least = around.iter().copied().reduce(f64::min)?;
-        let (centre, deviation) = centre_and_deviation(&mut around)?;
+        let (centre, deviation) = median_and_deviation(&mut around)?;
         let cost = pose.cost?;
         let above = |other: f64| (other - cost) / deviation;
         // Neighbours that show nothing are no better than the pose.
@@ -119,14 +120,14 @@ impl Appearance {
     /// The signals: depth, margin, both rises, above the start, gain.
     pub(super) fn signals(&self) -> [f64; 6] {
         /// Below this the logarithm tells nothing but how small it is.
-        const LEAST_GAIN: f64 = 1e-3;
+        const MIN_GAIN: f64 = 1e-3;
         [
             tamed(self.depth),
             tamed(self.margin),
             tamed(self.rises[0]),
             tamed(self.rises[1]),
             tamed(self.below_start),
-            self.gain.max(LEAST_GAIN).ln(),
+            self.gain.max(MIN_GAIN).ln(),
         ]
     }
 }

@@ -149,7 +149,7 @@ struct Loss {
 /// The phase that turned away from the truth.
 fn lost_in(search: &Search<'_, '_>, near: &Place) -> Loss {
     let at = |phase: Phase| {
-        let surface = search.surface(phase)?;
+        let surface = search.subject.evidence.surface(phase)?;
         Some((surface, surface.lattice.offset(surface.minimum()?)?))
     };
     let Some((coarse, chosen)) = at(Phase::PositionCoarse) else {
@@ -168,7 +168,7 @@ fn lost_in(search: &Search<'_, '_>, near: &Place) -> Loss {
     let tolerance_m = search.subject.tolerance.translation_m;
     let phase = match at(Phase::PositionFine) {
         Some((_, chosen)) if away(&chosen) > tolerance_m => Some(Phase::PositionFine),
-        _ => search.surface(Phase::YawCoarse).map(|_| Phase::YawCoarse),
+        _ => search.subject.evidence.surface(Phase::YawCoarse).map(|_| Phase::YawCoarse),
     };
     Loss { phase, ..Loss::default() }
 }

@@ -6,7 +6,7 @@ use super::*;
 use crate::camera::Intrinsics;
 
 /// Share of the reference's points that the query must show.
-const LEAST_OVERLAP: f64 = 0.05;
+const MIN_OVERLAP: f64 = 0.05;
 
 pub(super) const RULE: Rule = Rule {
     code: Code::R1,
@@ -39,7 +39,7 @@ fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
         }
     }
     let overlap = shared as f64 / seen.max(1) as f64;
-    (seen > 0 && overlap < LEAST_OVERLAP).then(|| RULE.found(&Overlap { overlap }))
+    (seen > 0 && overlap < MIN_OVERLAP).then(|| RULE.found(&Overlap { overlap }))
 }
 
 evidence!(Overlap { overlap: f64 } =>
