@@ -35,7 +35,7 @@ mod view_crop;
 use std::path::{Path, PathBuf};
 
 pub use posescope_core::scene::{
-    CachedScene, DegradedScene, Entry, FrameStore, Scene, SceneError, degraded,
+    CachedScene, DegradedScene, Entry, FrameStore, Scene, SceneError, degraded, frame_range,
 };
 pub use posescope_street as street;
 

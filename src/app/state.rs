@@ -393,15 +393,15 @@ impl AppState {
             0 => Protocol::EXPLAINING_RUNS,
             _ => 0,
         };
-        let words = match *explain {
-            0 => "Nothing is explained any more",
-            _ => "Trying remedies for the wrong results",
-        };
+        let is_over = *explain == 0;
         let shows_why = self.options.shows_why;
         self.restart_run();
         // The estimates are at hand: the picture of the cause stays, and only the remedies are new.
         self.options.shows_why = shows_why;
-        self.note(words, false);
+        // What is tried, the button says.
+        if is_over {
+            self.note("Nothing is explained any more", false);
+        }
     }
 
     /// What all queries were run with holds no longer.

@@ -24,10 +24,14 @@ pub fn open(args: &TaskArgs, scene: &str, queries: &[String]) -> Result<OpenedTa
     let mut task = args.task(scene)?;
     let mut first: Option<Arc<dyn Scene>> = None;
     if args.camera.is_none() && queries.iter().any(|query| Path::new(query).is_file()) {
-        // A name of a frame always means the frame.
+        // The name of a frame means the frame. A file with an extension is a photo even where a frame has its number.
         let named = task.query_scene().unwrap_or(scene);
         let opened = posescope::scene::open(named, task.protocol.format.as_deref())?;
-        let is_loose = |query: &&String| opened.find(query).is_err();
+        let is_loose = |query: &&String| {
+            let path = Path::new(query.as_str());
+            let is_photo = path.is_file() && path.extension().is_some();
+            !opened.frames().contains(query) && (is_photo || opened.find(query).is_err())
+        };
         let loose = queries.iter().filter(is_loose).count();
         if loose > 0 && loose < queries.len() {
             return Err(CliError::Usage(

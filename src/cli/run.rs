@@ -8,7 +8,7 @@ use posescope::localize::{
     ChoiceError, Chooser, Localizer, QueryResult, Ranking, References, Request, Selection,
 };
 use posescope::method::Method;
-use posescope::scene::{Retriever, Scene};
+use posescope::scene::{Retriever, Scene, frame_range};
 use posescope::session::{Breakpoints, StopAtBreakpoint, Task};
 use posescope::sink::SceneNames;
 use posescope::sink::rerun::{Identity, Recorder, Targets};
@@ -43,6 +43,13 @@ pub fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), CliError> {
     let OpenedTask { task, scenes, queries: wanted } =
         opened::open(&args.task, &args.scene, &args.query)?;
     let queries = scenes.queries.as_ref();
+    if wanted.is_empty() && !args.all {
+        return Err(CliError::Usage(format!(
+            "--query FRAME, --query PHOTO or --all expected; frames of {}: {}",
+            queries.name(),
+            frame_range(queries)
+        )));
+    }
     let localizer = task.protocol.configured(Localizer::new(
         scenes.references.as_ref(),
         queries,
@@ -66,6 +73,12 @@ pub fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), CliError> {
         tasks => tasks?,
     };
     drop(progress);
+    if !args.task.protocol.has("references")
+        && matches!(task.protocol.selection(), Selection::Random(_))
+    {
+        let reach_m = task.reach_m();
+        terminal.say(|| format!("References are drawn at random within {reach_m} m of the query; --reference names others"));
+    }
     let mut json = args.json.as_deref().map(JsonLines::create).transpose()?;
     let mut results = Vec::new();
     let methods = &task.protocol.methods;

@@ -1,19 +1,22 @@
-//! The text below the table of results: why poses are wrong or missing, and what would have helped.
+//! The text below the table of results: poses without a known truth, why poses are wrong or missing, and what would have
+//! helped.
 
 use std::time::Duration;
 
+use posescope::diagnosis::Grade;
+use posescope::estimator;
 use posescope::localize::QueryResult;
 use posescope::table::wrapped;
 
-/// The verdicts of all results in sentences, wrapped at `width` characters if given; empty if there is no
-/// verdict.
+/// The poses and verdicts of all results, wrapped at `width` characters if given; empty if there is nothing to say.
 pub fn story(results: &[(QueryResult, Duration)], width: Option<usize>) -> String {
     let mut text = String::new();
     let lines = |paragraph: String| wrapped(&paragraph, width.unwrap_or(usize::MAX), "    ");
     for (result, _) in results {
-        let Some(verdict) = result.verdict() else {
+        let (pose, verdict) = (pose(result), result.verdict());
+        if pose.is_none() && verdict.is_none() {
             continue;
-        };
+        }
         // With several references, the sentence names the one that gave the pose.
         let is_same = |other: &QueryResult| {
             other.query == result.query && other.method_name() == result.method_name()
@@ -22,11 +25,26 @@ pub fn story(results: &[(QueryResult, Duration)], width: Option<usize>) -> Strin
             1 => String::new(),
             _ => format!(" against {}", result.references.join(" ")),
         };
-        let sentence = format!("{} {}{against}: {verdict}", result.query, result.method_name());
-        text += &format!("\n{}", lines(sentence));
+        let name = format!("{} {}{against}", result.query, result.method_name());
+        let sentences = [pose, verdict].into_iter().flatten();
+        text.push('\n');
+        for sentence in sentences {
+            text += &lines(format!("{name}: {sentence}"));
+        }
         for paragraph in result.paragraphs() {
             text += &lines(format!("  {paragraph}"));
         }
     }
     text
+}
+
+/// The pose of a query without a known truth: there it is the result, and no error stands for it.
+fn pose(result: &QueryResult) -> Option<String> {
+    let is_ours = estimator::find(result.method).is_some();
+    let pose = result.pose.as_ref().filter(|_| is_ours && result.grade == Grade::Unmeasured)?;
+    let [x, y, z] = pose.position_m;
+    let [qx, qy, qz, qw] = pose.quaternion_xyzw;
+    Some(format!(
+        "world_from_camera: position {x:.3} {y:.3} {z:.3} m, quaternion x y z w {qx:.6} {qy:.6} {qz:.6} {qw:.6}"
+    ))
 }

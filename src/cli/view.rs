@@ -225,3 +225,19 @@ fn of_a_run(args: &ViewArgs, folder: &Path) -> Result<(Setup, KnownResults), Cli
     let known = KnownResults { now: results, before };
     Ok((setup, known))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The window opens at the cause, so the run goes on by itself.
+    #[test]
+    fn the_window_of_a_scene_runs_its_query() {
+        let parsed = Arguments::parse_from(["posescope", "view", "street", "--query", "589"]);
+        let Some(Command::View(args)) = parsed.command else {
+            panic!("another command");
+        };
+        let (setup, _) = setup(&args).expect("a built-in scene");
+        assert_eq!(setup.mode, RunMode::Running);
+    }
+}

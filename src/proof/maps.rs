@@ -178,7 +178,7 @@ fn map(
             });
             panel.line(palette::ESTIMATE, 2.5, around);
             let turn_deg = case.params.grid.yaw_range_deg;
-            panel.title = format!("Searched within {radius_m} m, ±{turn_deg}° (white)");
+            panel.title = format!("Searched: {radius_m} m (orange), ±{turn_deg}° (white)");
             let truth = case.truth.map(place);
             if let Some(turned_deg) = too_far_turned(case) {
                 panel.title += &format!("; truth turned by {turned_deg:.0}° (green)");

@@ -227,7 +227,7 @@ pub(super) fn depth_patches(case: &ProofCase<'_>) -> Option<ProofPicture> {
         format!(
             "Depths of the cloud. Matches: {with_depth} {judged}, {missing} without a depth (white)"
         ),
-        cloud_picture(&reference.photo, &reference.intrinsics, case, &Pose::identity()),
+        cloud_picture(&reference.photo, &reference.intrinsics, case, &Pose::identity()).0,
     );
     for one in &doubtful {
         let color = match one.point {
@@ -335,14 +335,18 @@ pub(super) fn cloud_on_photo(case: &ProofCase<'_>) -> Option<ProofPicture> {
         return Some(cameras);
     }
     let (query, reference) = (&case.problem.query, &case.problem.reference);
+    let (photo, points) =
+        cloud_picture(&reference.photo, &reference.intrinsics, case, &Pose::identity());
     let large = Panel::new(
-        "The cloud on the reference photo, coloured by depth",
-        cloud_picture(&reference.photo, &reference.intrinsics, case, &Pose::identity()),
+        format!("The cloud on the reference photo, coloured by depth: {points} points"),
+        photo,
     );
     let on_query = |what: &str, query_from_reference: &Pose| {
+        let (picture, points) =
+            cloud_picture(&query.photo, &query.intrinsics, case, query_from_reference);
         Panel::new(
-            format!("The cloud on the query photo, from the {what}"),
-            cloud_picture(&query.photo, &query.intrinsics, case, query_from_reference),
+            format!("The same points in the query, from the {what}: {points} points"),
+            picture,
         )
     };
     let truth = case.query_from_reference().map(|pose| on_query("truth", &pose));
@@ -364,7 +368,7 @@ fn cloud_by_two_cameras(case: &ProofCase<'_>) -> Option<ProofPicture> {
     let seen_by = |what: &str, camera: &Intrinsics| {
         Panel::new(
             format!("{what}: {:.0} px", camera.fx),
-            cloud_picture(&query.photo, camera, case, &query_from_reference),
+            cloud_picture(&query.photo, camera, case, &query_from_reference).0,
         )
     };
     Some(ProofPicture {
@@ -397,25 +401,32 @@ fn depth_legend() -> Panel {
     panel
 }
 
-/// A darkened photo with the points of the reference's cloud in the colours of their depths, near ones above.
+/// A darkened photo with those points of the cloud that the reference's photo shows, in the colours of their depths, near
+/// ones above; and how many are in the picture. What the scan holds beside and behind, no method sees.
 fn cloud_picture(
     photo: &Arc<Photo>,
     camera: &Intrinsics,
     case: &ProofCase<'_>,
     camera_from_reference: &Pose,
-) -> RgbImage {
+) -> (RgbImage, usize) {
     let mut canvas = picture::photo(photo).into_rgb8();
     for pixel in canvas.pixels_mut() {
         pixel.0 = pixel.0.map(|value| value / 3);
     }
-    let points = case.problem.reference.cloud.points.iter();
-    let seen = points.filter_map(|point| {
-        let point = camera_from_reference * point.cast::<f64>();
+    let reference = &case.problem.reference;
+    let points = reference.cloud.points.iter().map(|point| point.cast::<f64>());
+    let shown = points.filter(|point| {
+        let pixel = reference.intrinsics.project(point);
+        pixel.is_some_and(|pixel| reference.intrinsics.contains(&pixel))
+    });
+    let seen = shown.filter_map(|point| {
+        let point = camera_from_reference * point;
         let pixel = camera.project(&point)?;
         camera.contains(&pixel).then_some((point.z, pixel))
     });
     let mut seen: Vec<(f64, Point2<f64>)> = seen.collect();
     seen.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let count = seen.len();
     for (depth_m, pixel) in seen {
         let (x, y) = (pixel.x.round() as u32, pixel.y.round() as u32);
         for (x, y) in [(x, y), (x + 1, y), (x, y + 1), (x + 1, y + 1)] {
@@ -424,7 +435,7 @@ fn cloud_picture(
             }
         }
     }
-    canvas
+    (canvas, count)
 }
 
 fn pixel(keypoint: &Keypoint) -> Point2<f64> {

@@ -13,6 +13,18 @@ struct Kept {
     truth: Option<Pose>,
 }
 
+impl Kept {
+    fn case<'a>(&'a self, result: &'a QueryResult, params: &'a Params) -> ProofCase<'a> {
+        ProofCase {
+            problem: &self.problems[0],
+            records: self.history.records(),
+            result,
+            truth: self.truth.as_ref(),
+            params,
+        }
+    }
+}
+
 impl Sink for Kept {
     fn accept(&mut self, record: &Record) -> Result<(), Cancelled> {
         self.history.accept(record)
@@ -78,13 +90,8 @@ fn the_map_of_a_search_that_missed_agrees_with_its_sentence() {
     let primary = &result.diagnosis[0];
     assert_eq!(primary.code.name(), "D3");
     let rank = primary.evidence["rank"].as_u64().expect("a rank");
-    let case = ProofCase {
-        problem: &kept.problems[0],
-        records: kept.history.records(),
-        result: &result,
-        truth: kept.truth.as_ref(),
-        params: &Params::default(),
-    };
+    let params = Params::default();
+    let case = kept.case(&result, &params);
     let picture = ProofPicture::of(&case).expect("a map");
     paint("missed", &picture);
     let map = picture.large;
@@ -97,7 +104,7 @@ fn the_map_of_a_search_that_missed_agrees_with_its_sentence() {
     let truth = at(|thing| thing == Thing::Truth);
     let found = at(|thing| matches!(thing, Thing::Result(_)));
     let apart = f64::from((truth[0] - found[0]).hypot(truth[1] - found[1]));
-    let step_m = Params::default().grid.coarse_step_m;
+    let step_m = params.grid.coarse_step_m;
     let error_m = result.error.expect("the truth is known").translation_m;
     assert!((apart * step_m - error_m).abs() < 0.5, "{apart} cells, {error_m} m");
 }
@@ -112,13 +119,7 @@ fn pictures(kept: &Kept, result: &QueryResult) -> Vec<(&'static str, ProofPictur
             text: String::new(),
             evidence: Default::default(),
         }];
-        let case = ProofCase {
-            problem: &kept.problems[0],
-            records: kept.history.records(),
-            result: &result,
-            truth: kept.truth.as_ref(),
-            params: &params,
-        };
+        let case = kept.case(&result, &params);
         Some((rule.code.name(), ProofPicture::of(&case)?))
     });
     drawn.collect()
@@ -257,11 +258,28 @@ fn a_heading_outside_the_search_is_in_the_title() {
     let range_deg = Params::default().grid.yaw_range_deg;
     let turned = format!("±{range_deg}° (white); truth turned by ");
     let within = title(&kept);
-    assert_eq!(within, format!("Searched within 5 m, ±{range_deg}° (white)"));
+    assert_eq!(within, format!("Searched: 5 m (orange), ±{range_deg}° (white)"));
     let turn = crate::geometry::yaw(90_f64.to_radians());
     kept.truth = kept.truth.map(|truth| truth * turn);
     let outside = title(&kept);
     assert!(outside.contains(&turned), "{outside}");
+}
+
+/// A reference that looks elsewhere: of what its photo shows, nothing is in the query, whatever else the scan holds.
+#[test]
+fn a_scan_behind_the_reference_camera_is_not_drawn_into_the_query() {
+    let scenes = ["street:snow", "street:night"];
+    let (kept, result) = localized(scenes, ["000122", "000138"], 15.0, Method::FB);
+    let primary = &result.diagnosis[0];
+    assert_eq!(primary.code.name(), "R1");
+    assert!(primary.text.contains("0.0 % of its cloud"), "{}", primary.text);
+    let params = Params::default();
+    let picture = ProofPicture::of(&kept.case(&result, &params)).expect("a picture");
+    assert!(picture.large.title.ends_with(" points"), "{}", picture.large.title);
+    let [truth] = picture.beside.as_slice() else {
+        panic!("{} panels", picture.beside.len());
+    };
+    assert!(truth.title.ends_with(": 0 points"), "{}", truth.title);
 }
 
 /// A suspect camera: the photo shows the cloud as it was stated and as another camera would have it.
@@ -275,13 +293,8 @@ fn a_suspect_camera_is_drawn_beside_the_better_one() {
         text: String::new(),
         evidence: serde_json::json!({ "camera": other }),
     }];
-    let case = ProofCase {
-        problem: &kept.problems[0],
-        records: kept.history.records(),
-        result: &result,
-        truth: kept.truth.as_ref(),
-        params: &Params::default(),
-    };
+    let params = Params::default();
+    let case = kept.case(&result, &params);
     let picture = ProofPicture::of(&case).expect("a picture");
     let [better] = picture.beside.as_slice() else {
         panic!("{} panels", picture.beside.len());

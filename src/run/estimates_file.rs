@@ -19,10 +19,15 @@ impl FromStr for EstimatesFile {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let (name, path) = text
-            .split_once('=')
-            .filter(|(_, path)| !path.is_empty())
-            .ok_or("NAME=FILE expected, such as superglue=poses.txt")?;
+        let (name, path) =
+            text.split_once('=').filter(|(_, path)| !path.is_empty()).ok_or_else(|| match text
+                .contains('=')
+            {
+                true => "NAME=FILE expected, such as superglue=poses.txt".to_owned(),
+                false => {
+                    format!("NAME=FILE expected; give the poses a name, such as superglue={text}")
+                }
+            })?;
         let ours = crate::estimator::methods().find(|method| method.name() == name);
         if let Some(method) = ours {
             return Err(format!(

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use posescope_core::foreign::Estimates;
+use posescope_core::scene::trailing_number;
 
 use super::frame_names::FrameNames;
 use super::lines::TextFile;
@@ -67,25 +68,25 @@ fn by_time(
     Ok(estimates)
 }
 
+/// Poses without names. Fewer lines than frames could belong to any of them.
 fn by_line(file: &TextFile, poses: &PoseLines, scene: &dyn Scene) -> Result<Estimates, SceneError> {
     let frames = scene.frames();
-    let named = frames.iter().enumerate();
-    let estimates: Estimates = named
-        .filter_map(|(index, name)| {
-            let pose = poses.of_frame(index, frames.len(), name)?;
-            Some((name.clone(), pose))
-        })
-        .collect();
-    if estimates.is_empty() {
+    let last = frames.iter().filter_map(|name| trailing_number(name)).max();
+    if poses.count() != frames.len() && last.is_none_or(|last| poses.count() as u64 <= last) {
         return Err(file.error(format!(
-            "one line per frame expected ({} of {}), or one per number from 0 at the end of their names; \
-             {} lines found, none for a frame",
+            "one line per frame expected ({} of {}), or one per number from 0 at the end of their names; {} lines \
+             found. Poses of some frames need names: `name qw qx qy qz x y z`, world to camera",
             frames.len(),
             scene.name(),
             poses.count()
         )));
     }
-    Ok(estimates)
+    let named = frames.iter().enumerate();
+    let posed = named.filter_map(|(index, name)| {
+        let pose = poses.of_frame(index, frames.len(), name)?;
+        Some((name.clone(), pose))
+    });
+    Ok(posed.collect())
 }
 
 /// Looks poses up by name; each frame may occur once.

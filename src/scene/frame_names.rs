@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use posescope_core::scene::stem;
+
 use super::Scene;
 use super::lines::excerpt_of;
 
@@ -24,13 +26,19 @@ impl<'a> FrameNames<'a> {
         Self { scene, stems }
     }
 
-    /// The frame with a name: as it is, or without folder and extension, or by number.
-    pub fn find(&self, name: &str) -> Option<usize> {
+    /// The frame with a name: as it is, without folder and extension, or of the same number.
+    pub fn find_named(&self, name: &str) -> Option<usize> {
         let frames = self.scene.frames();
         let whole = frames.iter().position(|frame| frame == name);
         let by_stem = || self.stems.get(stem(name)).copied().flatten();
-        let by_number = || self.scene.find(stem(name)).ok();
-        whole.or_else(by_stem).or_else(by_number)
+        let number = name.parse::<u64>().ok();
+        let same = |frame: &String| number.is_some() && frame.parse().ok() == number;
+        whole.or_else(by_stem).or_else(|| frames.iter().position(same))
+    }
+
+    /// The frame with a name, also as a command line would find it.
+    pub fn find(&self, name: &str) -> Option<usize> {
+        self.find_named(name).or_else(|| self.scene.find(name).ok())
     }
 
     /// The error of a file that has something (`what`) for unknown frames only, one of which it calls `called`.
@@ -41,27 +49,5 @@ impl<'a> FrameNames<'a> {
             self.scene.frames().first().map_or("", String::as_str),
             excerpt_of(called, 60)
         )
-    }
-}
-
-/// A name without folder and image extension.
-fn stem(name: &str) -> &str {
-    const ENDINGS: [&str; 6] = ["png", "jpg", "jpeg", "bmp", "tif", "tiff"];
-    let base = name.rsplit(['/', '\\']).next().unwrap_or(name);
-    match base.rsplit_once('.') {
-        Some((stem, ending)) if ENDINGS.contains(&ending.to_ascii_lowercase().as_str()) => stem,
-        _ => base,
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_name_is_known_without_folder_and_ending() {
-        assert_eq!(stem("rear/1418381798086398.jpg"), "1418381798086398");
-        assert_eq!(stem("1305031102.175304"), "1305031102.175304");
-        assert_eq!(stem("a\\b.c.PNG"), "b.c");
     }
 }

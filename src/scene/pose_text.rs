@@ -5,6 +5,8 @@
 //! - visuallocalization.net: `name qw qx qy qz x y z`, world to camera;
 //! - `images.txt` of a COLMAP model: world to camera.
 
+use posescope_core::scene::trailing_number;
+
 use super::SceneError;
 use super::colmap::image_lines;
 use super::frame_names::FrameNames;
@@ -55,9 +57,13 @@ impl<'a> PoseText<'a> {
                     Some(_) => ", `name qw qx qy qz x y z` or COLMAP's images.txt",
                     None => "",
                 };
+                let comma = match first.text.contains(',') {
+                    true => "; separate them by spaces, without a header",
+                    false => "",
+                };
                 Err(first.error(format!(
                     "TUM (8 numbers: time x y z qx qy qz qw), KITTI (12 numbers: a 3x4 matrix){named} \
-                     expected; words found: {words}"
+                     expected; words found: {words}{comma}"
                 )))
             }
         }
@@ -69,7 +75,7 @@ impl<'a> PoseText<'a> {
 fn is_named(line: Line<'_>, names: &FrameNames<'_>) -> bool {
     let name = line.words().next().unwrap_or_default();
     match (timed(line).is_ok(), named(line).is_ok()) {
-        (true, true) => names.find(name).is_some(),
+        (true, true) => names.find_named(name).is_some(),
         (false, false) => line.number(name).is_err(),
         (_, is_named) => is_named,
     }
@@ -117,11 +123,8 @@ impl PoseLines {
     /// The pose of a frame. If there are as many lines as frames, lines are in the order of the frames. Otherwise
     /// the number at the end of the frame's name is the number of its line.
     pub fn of_frame(&self, index: usize, frames: usize, name: &str) -> Option<Pose> {
-        if self.count() == frames {
-            return self.get(index);
-        }
-        let digits = name.rfind(|c: char| !c.is_ascii_digit());
-        self.get(name[digits.map_or(0, |at| at + 1)..].parse().ok()?)
+        let by_name = || trailing_number(name)?.try_into().ok();
+        self.get(if self.count() == frames { index } else { by_name()? })
     }
 }
 

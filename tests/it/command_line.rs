@@ -55,9 +55,9 @@ fn usage_errors_have_exit_code_2_and_name_the_next_step() {
         --query 70 --degrade noise=8,noise=9 | `noise` is given twice
         --query 70 --degrade '' | such as gamma=0.4,noise=8,invert
         --query 5 --estimates mi=poses.txt | mi is a built-in method
-        --query 5 --estimates poses.txt | NAME=FILE expected
+        --query 5 --estimates poses.txt | give the poses a name, such as superglue=poses.txt
         --query 5 --estimates 'A B=poses.txt' | is not a possible name of a method
-        --method mi | --query
+        --method mi | --query FRAME, --query PHOTO or --all expected; frames of kitti/42: 000004 … 000007
     ";
     for row in table.lines().map(str::trim).filter(|row| !row.is_empty()) {
         let [words, expected] = cells(row);

@@ -88,7 +88,7 @@ fn a_question_is_answered_before_anything_of_the_answer_is_shown() {
     let at = |window: &Harness<'_, App>| app(window).cursor();
     let found = moment.find(app(&window).run());
     assert_eq!(Some(at(&window)), found);
-    assert!(!is_said(&window, "● right"), "nothing is told before its time");
+    assert!(!is_said(&window, "● right"), "The page gives the answer away");
     assert!(!is_said(&window, "It was said in the beginning"));
     assert!(!app(&window).options.shows_truth);
 

@@ -10,7 +10,7 @@ use posescope::scene::{LoosePhotos, Scene};
 use serde_json::Value as Json;
 use tempfile::TempDir;
 
-use crate::binary::{objects, refused, run_in, write};
+use crate::binary::{has, objects, refused, run_in, write};
 use crate::damage;
 use crate::small_sequence::{HEIGHT, SmallSequence, WIDTH, wall};
 
@@ -57,7 +57,16 @@ fn without_a_position_the_reference_that_looks_most_alike_is_taken() {
     let results: Vec<Json> = objects(&sequence.run(&format!("{line} --camera {CAMERA}")).ok().out);
     assert_eq!(results.len(), 1);
     assert_eq!(results[0]["references"].as_array().map(Vec::len), Some(1));
-    assert!(!results[0]["pose"].is_null());
+    let position = results[0]["pose"]["position_m"].as_array().expect("a pose");
+    let position: Vec<String> =
+        position.iter().map(|axis| format!("{:.3}", axis.as_f64().expect("a number"))).collect();
+    // Without a truth, the pose is the result.
+    let line_of_words = line.replace(" --json - -q", "");
+    let shown = sequence.run(&format!("{line_of_words} --camera {CAMERA}")).ok().out;
+    has(
+        &shown,
+        &format!("IMG_1 mi: world_from_camera: position {} m, quaternion", position.join(" ")),
+    );
     let table = format!(
         "
         2 | {line} --camera {CAMERA} --reference random:1 | IMG_1 ~ --gps ~ retrieve:K

@@ -67,6 +67,17 @@ fn a_lecture_shows_no_cause_and_inspect_shows_it_again() {
 }
 
 #[test]
+fn a_click_on_the_words_of_another_finding_opens_it() {
+    let mut window = grey();
+    send(&mut window, Command::ShowPart(Part::Reference(Method::FB, 0)));
+    let words = "Too few true matches: 0 of 0";
+    assert!(!is_said(&window, words));
+    window.get_by_label("Too few true matches").click();
+    window.run_steps(10);
+    assert!(is_said(&window, words));
+}
+
+#[test]
 fn remedies_are_tried_beside_the_picture_of_the_cause() {
     let mut window = grey();
     let part = Part::Reference(Method::PM, 0);

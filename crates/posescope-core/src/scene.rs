@@ -148,28 +148,61 @@ pub fn fingerprint(scene: &(impl Scene + ?Sized), more: &[u8]) -> u64 {
 }
 
 impl dyn Scene + '_ {
-    /// The frame of a name; numbers match whatever their leading zeros (`3823` finds `003823`).
+    /// The frame of a name, which may lack leading zeros (`3823` finds `003823`), what stands before the number
+    /// (`frame-003823`) or decimals of a time, and may have a folder and the extension of a photo.
     ///
     /// # Errors
     /// [`SceneError::UnknownFrame`] says which frames there are.
     pub fn find(&self, name: &str) -> Result<usize, SceneError> {
         let frames = self.frames();
-        let number = name.parse::<u64>().ok();
-        frames
-            .iter()
-            .position(|frame| frame == name)
-            .or_else(|| {
-                frames.iter().position(|frame| number.is_some() && frame.parse().ok() == number)
-            })
+        let short = stem(name);
+        let number = short.parse::<u64>().ok();
+        let first = |is_it: &dyn Fn(&str) -> bool| frames.iter().position(|frame| is_it(frame));
+        // These may fit several frames, and then name none.
+        let only = |is_it: &dyn Fn(&str) -> bool| {
+            let mut fitting = (0..frames.len()).filter(|&at| is_it(&frames[at]));
+            fitting.next().filter(|_| fitting.next().is_none())
+        };
+        let begins_a_time = |frame: &str| {
+            let rest = frame.strip_prefix(short).unwrap_or_default();
+            short.parse::<f64>().is_ok()
+                && (rest.starts_with('.') || short.contains('.') && !rest.is_empty())
+        };
+        first(&|frame| frame == name || frame == short)
+            .or_else(|| first(&|frame| number.is_some() && frame.parse().ok() == number))
+            .or_else(|| only(&|frame| stem(frame) == short))
+            .or_else(|| only(&|frame| number.is_some() && trailing_number(frame) == number))
+            .or_else(|| only(&begins_a_time))
             .ok_or_else(|| SceneError::UnknownFrame {
                 scene: self.name().to_owned(),
                 frame: name.to_owned(),
-                known: match frames {
-                    [] => "none".to_owned(),
-                    [only] => only.clone(),
-                    [first, .., last] => format!("{first} … {last}, {} in all", frames.len()),
-                },
+                known: frame_range(self),
             })
+    }
+}
+
+/// The first and the last frame of a scene and their number, for messages.
+pub fn frame_range(scene: &dyn Scene) -> String {
+    match scene.frames() {
+        [] => "none".to_owned(),
+        [only] => only.clone(),
+        [first, .., last] => format!("{first} … {last}, {} in all", scene.frames().len()),
+    }
+}
+
+/// The number at the end of a name.
+pub fn trailing_number(name: &str) -> Option<u64> {
+    let before = name.trim_end_matches(|c: char| c.is_ascii_digit());
+    name[before.len()..].parse().ok()
+}
+
+/// A name without folder and extension of a photo.
+pub fn stem(name: &str) -> &str {
+    const ENDINGS: [&str; 6] = ["png", "jpg", "jpeg", "bmp", "tif", "tiff"];
+    let base = name.rsplit(['/', '\\']).next().unwrap_or(name);
+    match base.rsplit_once('.') {
+        Some((stem, ending)) if ENDINGS.contains(&ending.to_ascii_lowercase().as_str()) => stem,
+        _ => base,
     }
 }
 
@@ -231,6 +264,30 @@ mod tests {
         let scene = bare([1.5; 3]);
         assert_eq!(fingerprint(&scene, b"more"), xxh3_64(written.as_bytes()));
         assert_eq!(scene.fingerprint(), fingerprint(&scene, b""));
+    }
+
+    #[test]
+    fn a_frame_is_found_by_what_people_call_it_if_only_one_is_called_so() {
+        let found = |names: [&str; 3], name: &str| {
+            let scene = Bare(names.map(str::to_owned), [1.5; 3]);
+            let scene: &dyn Scene = &scene;
+            scene.find(name).ok()
+        };
+        let numbers = ["000016", "000160", "000161"];
+        for name in ["000016", "16", "16.png", "image_0/000016.jpg"] {
+            assert_eq!(found(numbers, name), Some(0), "{name}");
+        }
+        assert_eq!(found(numbers, "17"), None);
+        assert_eq!(found(["frame-000025", "frame-000026", "a-25b"], "25"), Some(0));
+        assert_eq!(found(["left-25", "right-25", "left-26"], "25"), None);
+        assert_eq!(found(["left-25", "right-25", "left-26"], "26"), Some(2));
+        let times = ["12.25", "12.75", "13.5"];
+        assert_eq!(found(times, "13"), Some(2));
+        assert_eq!(found(times, "12.7"), Some(1));
+        assert_eq!(found(times, "12"), None);
+        assert_eq!(found(times, "1"), None);
+        assert_eq!(found(["a/b.png", "c/b.png", "c/d.png"], "d"), Some(2));
+        assert_eq!(found(["a/b.png", "c/b.png", "c/d.png"], "b.png"), None);
     }
 
     #[test]

@@ -3,7 +3,7 @@
 mod numbers;
 
 use egui::collapsing_header::CollapsingState;
-use egui::{Button, Frame, Grid, Label, RichText, ScrollArea, Stroke, Ui, vec2};
+use egui::{Button, Frame, Grid, Label, RichText, ScrollArea, Sense, Stroke, Ui, vec2};
 use serde_json::Value;
 
 use super::Panes;
@@ -62,9 +62,14 @@ fn why(ui: &mut Ui, state: &AppState, commands: &Queue) {
                 for (index, other) in others.iter().enumerate() {
                     let id = ui.make_persistent_id(("also", index));
                     let state = CollapsingState::load_with_default_open(ui.ctx(), id, false);
-                    let header = state.show_header(ui, |ui| {
-                        ui.add(Label::new(capital(other.code.title())).wrap());
+                    let mut is_clicked = false;
+                    let mut header = state.show_header(ui, |ui| {
+                        let title = Label::new(capital(other.code.title())).wrap();
+                        is_clicked = ui.add(title.sense(Sense::click())).clicked();
                     });
+                    if is_clicked {
+                        header.toggle();
+                    }
                     header.body(|ui| {
                         ui.label(&other.text);
                         evidence(ui, other);
@@ -171,8 +176,8 @@ fn evidence(ui: &mut Ui, found: &Diagnosis) {
 
 /// Fields of evidence whose key says too little, as people read them; of one verdict, or of all.
 const NAMES: &[(&str, &str)] = &[
-    ("after", "Of them with a true match"),
-    ("before", "Keypoints that are visible"),
+    ("after", "Keypoints after that step"),
+    ("before", "Keypoints before that step"),
     ("chance_deviation", "Spread of chance"),
     ("chance_level", "Cost of shuffled pixels"),
     ("deviation", "Contrast of the costs"),
@@ -240,7 +245,7 @@ fn helped(
     }
     let Some(explanation) = &result.explanation else {
         heading(ui, "What may help");
-        ui.label(primary.code.rule().advice);
+        ui.label(primary.code.advice(result.method));
         if result.error.or(result.initial_error).is_some() && state.setup.task.protocol.explain == 0
         {
             let button = ui
@@ -288,7 +293,7 @@ fn remedy(ui: &mut Ui, commands: &Queue, helped: &Helped) {
         let color = theme::grade(ui.visuals(), Grade::Right);
         ui.label(RichText::new(format!("● {}", helped.error.translation())).color(color));
     });
-    let response = response.response.interact(egui::Sense::click());
+    let response = response.response.interact(Sense::click());
     let spoken = format!("Run with {args}");
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, &spoken));
     if response.on_hover_text("Keeps this run as A and runs the query with this").clicked() {

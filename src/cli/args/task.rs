@@ -18,8 +18,7 @@ pub struct RunArgs {
     /// The frame to localise, or a photo; repeatable
     ///
     /// 3823 finds the frame 003823. A photo is an image file that is not a frame of the scene.
-    #[arg(long, value_name = "FRAME|PHOTO", required_unless_present = "all")]
-    #[arg(help_heading = "Queries")]
+    #[arg(long, value_name = "FRAME|PHOTO", help_heading = "Queries")]
     pub query: Vec<String>,
     /// Localise every frame
     #[arg(long, help_heading = "Queries", conflicts_with_all = ["query", "camera"])]

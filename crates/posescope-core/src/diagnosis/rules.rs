@@ -21,6 +21,7 @@ use super::{Diagnosis, MapOverlay, Proof};
 use crate::event::Stage;
 use crate::geometry::{Pose, PoseError};
 use crate::grid::{Offset, Phase};
+use crate::method::Method;
 use crate::text::UnknownWord;
 
 /// The evidence of a verdict: a struct whose fields go into a file, and the sentence that is made of them.
@@ -173,6 +174,18 @@ impl Code {
     /// What it means, in one phrase.
     pub fn title(self) -> &'static str {
         self.rule().title
+    }
+
+    /// What to try against it. Another system does not read our parameters.
+    pub fn advice(self, method: Method) -> &'static str {
+        let rule = self.rule();
+        let is_of_a_cost = !rule.applies_to.contains(&Family::Features);
+        match Family::of(method) {
+            Some(Family::Given) if is_of_a_cost && rule.applies_to.contains(&Family::Given) => {
+                "compare it with --method robust, or use another reference"
+            }
+            _ => rule.advice,
+        }
     }
 
     /// Whether it says that something failed: all but [`Code::L1`], which says that the pose is uncertain.

@@ -40,7 +40,7 @@ impl QueryResult {
         let mut paragraphs: Vec<String> = also.collect();
         let Some(explanation) = &self.explanation else {
             if self.grade.is_failure() {
-                paragraphs.push(format!("try: {}", primary.code.rule().advice));
+                paragraphs.push(format!("try: {}", primary.code.advice(self.method)));
             }
             return paragraphs;
         };

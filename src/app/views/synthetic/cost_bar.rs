@@ -46,7 +46,7 @@ pub(super) fn ui(ui: &mut Ui, context: &ViewContext<'_>, method: Method, present
                 let share = 100.0 * range.share(present);
                 ui.weak(format!("{share:.0} % of the way from shuffled pixels"))
             }
-            (None, _) => ui.weak("what shuffled pixels cost is told at the end of the search"),
+            (None, _) => ui.weak("The search computes the cost of shuffled pixels at its end"),
             (Some(_), None) => ui.weak("no cost here"),
         }
     });
