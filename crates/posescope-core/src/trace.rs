@@ -105,17 +105,12 @@ impl<'a> Trace<'a> {
 
     /// Every wanted event goes to `sink`, on the caller's thread.
     pub fn to(sink: &'a mut dyn Sink) -> Self {
-        Self::new(sink, None)
+        Self::watched(sink, None)
     }
 
-    /// A trace as [`Self::to`] makes it; whenever `attention` is raised, the sink's
-    /// [`Sink::attend`] is called at the next event or checkpoint, wanted or not, and the flag is
-    /// lowered.
-    pub fn watched(sink: &'a mut dyn Sink, attention: &'a AtomicBool) -> Self {
-        Self::new(sink, Some(attention))
-    }
-
-    fn new(sink: &'a mut dyn Sink, attention: Option<&'a AtomicBool>) -> Self {
+    /// A trace as [`Self::to`] makes it. While `attention` is raised, the next event or checkpoint calls
+    /// [`Sink::attend`], wanted or not, and lowers the flag.
+    pub fn watched(sink: &'a mut dyn Sink, attention: Option<&'a AtomicBool>) -> Self {
         let wanted = sink.wanted();
         Self {
             observer: Some(Observer {
@@ -219,7 +214,7 @@ impl<'a> Trace<'a> {
         let first = observer.next;
         let mut onward = Onward { observer, first };
         let mut both = Fanout::new(vec![second, &mut onward]);
-        let mut inner = Trace::new(&mut both, attention);
+        let mut inner = Trace::watched(&mut both, attention);
         let outcome = body(&mut inner);
         let emitted = inner.observer.map_or(0, |inner| inner.next);
         observer.next = first + emitted;
@@ -410,7 +405,7 @@ mod tests {
     fn raised_attention_reaches_the_sink_once_even_without_a_wanted_event() {
         let mut sink = RecordingSink::wanting(KindSet::NONE);
         let attention = AtomicBool::new(true);
-        let mut trace = Trace::watched(&mut sink, &attention);
+        let mut trace = Trace::watched(&mut sink, Some(&attention));
         for _ in 0..3 {
             trace.checkpoint().expect("not cancelled");
         }

@@ -61,6 +61,7 @@ pub struct Request {
 ///
 /// The frames that were used last are at hand for the next method and the next query, with all that
 /// was worked out about them.
+#[derive(Clone)]
 pub struct Localizer<'a> {
     references: CachedScene<'a>,
     queries: CachedScene<'a>,
@@ -109,17 +110,7 @@ impl<'a> Localizer<'a> {
 
     /// The same scenes and their frames, localised with other parameters. It explains nothing.
     fn with_other_params<'b>(&'b self, params: &'b Params) -> Localizer<'b> {
-        Localizer {
-            references: self.references.clone(),
-            queries: self.queries.clone(),
-            params,
-            seed: self.seed,
-            tolerance: self.tolerance,
-            least_probability: self.least_probability,
-            runs_to_explain: 0,
-            foreign: self.foreign.clone(),
-            is_one_drive: self.is_one_drive,
-        }
+        Localizer { params, runs_to_explain: 0, ..self.clone() }
     }
 
     /// Whether queries and references are frames of one drive, so that a query must not be its own
@@ -418,10 +409,7 @@ impl<'a> Localizer<'a> {
         let attention = observer.attention();
         let sinks: Vec<&mut dyn Sink> = vec![&mut timings, &mut evidence, observer];
         let mut fanout = Fanout::new(sinks);
-        let mut trace = match &attention {
-            Some(flag) => Trace::watched(&mut fanout, flag),
-            None => Trace::to(&mut fanout),
-        };
+        let mut trace = Trace::watched(&mut fanout, attention.as_deref());
         let current = &work.problems[problem];
         let outcome = match self.foreign.estimates(method) {
             Some(estimates) => {

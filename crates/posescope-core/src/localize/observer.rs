@@ -66,10 +66,7 @@ pub trait LocalizeObserver: Sink {
 /// Between two steps that tell nothing: calls [`Sink::attend`] where the flag is up.
 pub(super) fn checkpoint(observer: &mut dyn LocalizeObserver) -> Result<(), Cancelled> {
     let attention = observer.attention();
-    match &attention {
-        Some(flag) => Trace::watched(observer, flag).checkpoint(),
-        None => Ok(()),
-    }
+    Trace::watched(observer, attention.as_deref()).checkpoint()
 }
 
 /// An observer that wants to hear nothing, for queries that nobody watches.
