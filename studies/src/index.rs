@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use cpu_time::ProcessTime;
 use posescope::features::{Descriptor, Features, Keypoint};
-use posescope::retrieval::{BuildRequest, Index, RetrievalParams, build};
+use posescope::retrieval::{BuildRequest, Clustering, Index, RetrievalParams, build};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_pcg::Pcg64;
 
@@ -116,8 +116,7 @@ fn built(path: &Path, frames: usize, options: &Options) -> Result<[f64; 6], Fail
 }
 
 fn queried(path: &Path, frames: usize, options: &Options) -> Result<[f64; 11], Failure> {
-    let RetrievalParams { sample, iterations, trees, checks, .. } = RetrievalParams::default();
-    let words = options.words;
+    let params = RetrievalParams::default();
     let started = Instant::now();
     let index = Index::open(path, params.checks)?;
     let opened = started.elapsed().as_secs_f64();
