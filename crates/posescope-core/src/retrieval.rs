@@ -10,7 +10,7 @@
 //! | `tf_idf` | how much a word weighs, the inverted index | 3 |
 //! | `affine`, `verification` | do the shared words lie alike? LO-RANSAC on affine transforms | 4 |
 //! | `build` | from the features of the frames to a file | |
-//! | `layout` | the file, and its checks | |
+//! | `layout` | the file: checked, then mapped | |
 //! | `index` | from the features of a query to ranked frames | |
 //! | `ranking` | what is told of ranked frames | |
 //!

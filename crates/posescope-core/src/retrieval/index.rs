@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use super::build::{BuildRequest, fingerprint_text};
 use super::error::IndexError;
-use super::layout::{Description, StoredIndex};
+use super::layout::{Description, MappedIndex};
 use super::params::RetrievalParams;
 use super::tf_idf::query_weights;
 use super::verification::{Verification, WordMatch, verify};
@@ -63,18 +63,18 @@ pub struct Retrieval {
 /// An index, open to queries from any thread.
 pub struct Index {
     path: PathBuf,
-    stored: StoredIndex,
+    stored: MappedIndex,
     vocabulary: Vocabulary,
 }
 
 impl Index {
-    /// Opens an index after checking every byte of it. All of it stays in memory: 128 MB for 4,541 frames of
-    /// 1,000 features.
+    /// Opens an index after checking every byte of it; its vocabulary comes into memory, the rest is
+    /// mapped.
     ///
     /// # Errors
     /// [`IndexError`] when there is none, or it is damaged or of another layout.
     pub fn open(path: &Path, checks: usize) -> Result<Self, IndexError> {
-        let stored = StoredIndex::open(path)?;
+        let stored = MappedIndex::open(path)?;
         let Description { trees, seed, .. } = *stored.description();
         Ok(Self {
             path: path.to_owned(),

@@ -12,13 +12,14 @@
 //! | footer | length of the description, checksum | XXH3 of all before the checksum |
 
 use std::collections::BTreeMap;
-use std::fs;
-use std::io::{self, Write};
+use std::fs::File;
+use std::io::{self, Read, Seek as _, Write};
 use std::ops::Range;
 use std::path::Path;
 
+use memmap2::Mmap;
 use serde::{Deserialize, Serialize};
-use xxhash_rust::xxh3::{Xxh3, xxh3_64};
+use xxhash_rust::xxh3::Xxh3;
 
 use super::error::IndexError;
 use crate::features::{Descriptor, Keypoint};
@@ -33,6 +34,8 @@ const DOCUMENT: usize = 8;
 const WORD: usize = size_of::<Descriptor>();
 const LIST: usize = 8;
 const POSTING: usize = 8;
+/// Bytes read at a time to check them.
+const BLOCK: usize = 1 << 20;
 
 /// What an index was made from and how.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -144,9 +147,9 @@ impl<W: Write> IndexWriter<W> {
     }
 }
 
-/// An index as it is in its file, all of it in memory.
-pub struct StoredIndex {
-    bytes: Vec<u8>,
+/// An index in its file, of which what is asked for comes into memory.
+pub struct MappedIndex {
+    map: Mmap,
     description: Description,
     features: Range<usize>,
     documents: Range<usize>,
@@ -155,39 +158,56 @@ pub struct StoredIndex {
     postings: Range<usize>,
 }
 
-impl StoredIndex {
-    /// Reads a file and checks every byte of it.
+impl MappedIndex {
+    /// Maps a file whose every byte was checked before.
     pub fn open(path: &Path) -> Result<Self, IndexError> {
-        let bytes = fs::read(path).map_err(|source| match source.kind() {
+        let io = |source: io::Error| match source.kind() {
             io::ErrorKind::NotFound => IndexError::NotFound { path: path.to_owned() },
             _ => IndexError::Io { path: path.to_owned(), source },
-        })?;
+        };
         let damaged = |what| IndexError::Damaged { path: path.to_owned(), what };
-        if bytes.len() < MAGIC || !bytes.starts_with(&KIND) {
+        let mut file = File::open(path).map_err(io)?;
+        let length = file.metadata().map_err(io)?.len();
+        let length = usize::try_from(length).map_err(|_| damaged("it is too long"))?;
+        let mut magic = [0; MAGIC];
+        let read = file.read_exact(&mut magic);
+        if read.is_err() || magic[..KIND.len()] != KIND {
             return Err(IndexError::NotAnIndex { path: path.to_owned() });
         }
-        let footer = bytes.split_last_chunk().and_then(|(summed, sum)| {
-            let (_, text_length) = summed.split_last_chunk()?;
-            (bytes.len() >= MAGIC + FOOTER).then_some((summed, *sum, *text_length))
-        });
-        let (summed, sum, text_length) = footer.ok_or_else(|| damaged("it is cut off"))?;
-        if u64::from_le_bytes(sum) != xxh3_64(summed) {
+        if length < MAGIC + FOOTER {
+            return Err(damaged("it is cut off"));
+        }
+        file.rewind().map_err(io)?;
+        let summed = length - size_of::<u64>();
+        let sum = checksum(&mut file, summed).map_err(io)?;
+        let map = map(&file).map_err(io)?;
+        let footer = map.get(summed - size_of::<u64>()..length);
+        let Some([text_length, expected]) = footer.and_then(|footer| {
+            let (numbers, _) = footer.as_chunks::<8>();
+            numbers.first_chunk::<2>()
+        }) else {
+            return Err(damaged("it is cut off"));
+        };
+        if u64::from_le_bytes(*expected) != sum {
             return Err(damaged("its checksum does not match"));
         }
-        let found = bytes[KIND.len()];
-        if found != LAYOUT {
-            return Err(IndexError::Version { path: path.to_owned(), found, expected: LAYOUT });
+        if magic[KIND.len()] != LAYOUT {
+            return Err(IndexError::Version {
+                path: path.to_owned(),
+                found: magic[KIND.len()],
+                expected: LAYOUT,
+            });
         }
-        let stored = Self::parse(bytes, u64::from_le_bytes(text_length));
-        stored.ok_or_else(|| damaged("its parts do not fit together"))
+        let text_length = u64::from_le_bytes(*text_length);
+        Self::parse(map, text_length).ok_or_else(|| damaged("its parts do not fit together"))
     }
 
     /// Whatever the file says, every range that is used later lies within it.
-    fn parse(bytes: Vec<u8>, text_length: u64) -> Option<Self> {
-        let text_end = bytes.len().checked_sub(FOOTER)?;
+    fn parse(map: Mmap, text_length: u64) -> Option<Self> {
+        let text_end = map.len().checked_sub(FOOTER)?;
         let text_start = text_end.checked_sub(usize::try_from(text_length).ok()?)?;
         let description: Description =
-            serde_json::from_slice(bytes.get(text_start..text_end)?).ok()?;
+            serde_json::from_slice(map.get(text_start..text_end)?).ok()?;
         let counts = description.counts;
         let mut at = MAGIC;
         let mut part = |records: usize, size: usize| {
@@ -201,7 +221,7 @@ impl StoredIndex {
             words: part(counts.words, WORD)?,
             lists: part(counts.words.checked_add(1)?, LIST)?,
             postings: part(counts.postings, POSTING)?,
-            bytes,
+            map,
             description,
         };
         if stored.postings.end != text_start {
@@ -229,7 +249,7 @@ impl StoredIndex {
     }
 
     fn records<const SIZE: usize>(&self, part: &Range<usize>) -> &[[u8; SIZE]] {
-        let bytes = self.bytes.get(part.clone()).unwrap_or_default();
+        let bytes = self.map.get(part.clone()).unwrap_or_default();
         bytes.as_chunks().0
     }
 
@@ -294,4 +314,30 @@ impl StoredIndex {
 fn numbers(record: &[u8; 8]) -> (u32, u32) {
     let [a, b, c, d, e, f, g, h] = *record;
     (u32::from_le_bytes([a, b, c, d]), u32::from_le_bytes([e, f, g, h]))
+}
+
+/// The checksum of the next `length` bytes. Read and not mapped, so that checking a large index
+/// does not bring all of it into the memory of the process.
+fn checksum(file: &mut File, length: usize) -> io::Result<u64> {
+    let mut sum = Xxh3::new();
+    let mut block = vec![0; BLOCK.min(length)];
+    let mut left = length;
+    while left > 0 {
+        let block = &mut block[..left.min(BLOCK)];
+        file.read_exact(block)?;
+        sum.update(block);
+        left -= block.len();
+    }
+    Ok(sum.digest())
+}
+
+/// The file as bytes. The one unsafe line of the crate: there is no other way to map a file.
+#[allow(
+    unsafe_code,
+    reason = "sound as long as nobody changes the file: an index is written under another name and \
+              then renamed, never changed in place, and a mapping keeps the file it was made from"
+)]
+fn map(file: &File) -> io::Result<Mmap> {
+    // SAFETY: the mapping is read-only and private, and see above.
+    unsafe { Mmap::map(file) }
 }

@@ -153,7 +153,7 @@ fn the_file_gives_back_what_went_in() {
     assert_eq!(description.counts.documents, FRAMES / 2);
     assert_eq!(description.counts.features, FRAMES / 2 * SEEN);
     assert_eq!(description.counts.words, 200);
-    let stored = super::layout::StoredIndex::open(&path).expect("just opened");
+    let stored = super::layout::MappedIndex::open(&path).expect("just opened");
     for document in 0..FRAMES / 2 {
         assert_eq!(stored.frame(document), Some(2 * document));
         let written = view(2 * document, 0);
