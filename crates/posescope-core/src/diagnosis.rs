@@ -107,7 +107,7 @@ impl<'a> Subject<'a> {
         }
     }
 
-    /// The same, compared with the truth: right is what is within the tolerance of it.
+    /// The same, compared with the truth: a pose within the tolerance of it is right.
     #[must_use]
     pub fn against(self, truth: Option<&'a Pose>, tolerance: Tolerance) -> Self {
         Self { truth, tolerance, ..self }

@@ -1,7 +1,7 @@
-//! What the estimators tell: one struct per event, one line in the list of kinds.
+//! The events of the estimators: one struct per event, one line in the list of kinds.
 //!
-//! Large payloads are shared (`Arc`), so keeping an event is cheap. Written as data, an event has one array for
-//! each property of what it has many of, and of a picture or a cloud the number of its pixels or points.
+//! Large payloads are shared (`Arc`), so keeping an event is cheap. Written as data, an event has one array
+//! for each property of its items, and for a picture or a cloud the number of its pixels or points.
 
 mod columns;
 
@@ -119,7 +119,7 @@ pub struct KindSet(u32);
 impl KindSet {
     /// Every kind.
     pub const ALL: Self = Self(u32::MAX);
-    /// No kind; stages are told all the same.
+    /// No kind; stage events come all the same.
     pub const NONE: Self = Self(0);
 
     /// Just these kinds.
@@ -147,7 +147,7 @@ impl KindSet {
 
 macro_rules! events {
     ($($name:ident),+ $(,)?) => {
-        /// Anything that an estimator tells.
+        /// Any event of an estimator.
         #[derive(Clone, Debug, Serialize)]
         #[serde(tag = "kind")]
         #[allow(missing_docs, reason = "each variant is named after the struct it holds")]
@@ -221,7 +221,7 @@ pub struct StageEnded {
     pub stage: Stage,
     /// Whether it did what it was for.
     pub succeeded: bool,
-    /// Whether its result was remembered from an earlier run.
+    /// Whether its result is from an earlier run.
     pub reused: bool,
 }
 

@@ -91,7 +91,7 @@ pub struct Features {
 }
 
 impl Features {
-    /// The `count` strongest: what is found where [`SurfParams::max_keypoints`] is so many.
+    /// The `count` strongest, as [`SurfParams::max_keypoints`] keeps them.
     #[must_use]
     pub fn strongest(&self, count: usize) -> Self {
         let first = |length: usize| ..count.min(length);

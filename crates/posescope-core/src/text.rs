@@ -1,4 +1,4 @@
-//! What is written as a word: on the command line, in files, in tables.
+//! Words on the command line, in files and in tables.
 
 use std::fmt;
 use std::marker::PhantomData;
@@ -87,7 +87,7 @@ pub fn similar<'a>(word: &str, names: impl IntoIterator<Item = &'a str>) -> Opti
         .map(|(_, name)| name)
 }
 
-/// What is wrong with a piece of JSON, without the line, which its reader counts in the whole file.
+/// The message of a JSON error, without the line, which its reader counts in the whole file.
 pub fn json_message(error: &serde_json::Error) -> String {
     let text = error.to_string();
     let place = format!(" at line {} column {}", error.line(), error.column());

@@ -1,4 +1,4 @@
-//! What an estimator told that a verdict is drawn from.
+//! The events of an estimator from which verdicts are drawn.
 
 use std::sync::Arc;
 
@@ -48,7 +48,7 @@ impl Evidence {
         found.map(AsRef::as_ref)
     }
 
-    /// What a hybrid of two methods would have told that fell back to the second.
+    /// The evidence of a hybrid that fell back from this method to a second.
     #[must_use]
     pub fn followed_by(&self, second: &Self) -> Self {
         Self {

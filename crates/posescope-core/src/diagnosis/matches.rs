@@ -100,7 +100,7 @@ pub(super) struct TrueMatches {
 }
 
 impl TrueMatches {
-    /// `None` where the method did not come to matching, or nobody knows the truth.
+    /// `None` where the method did not reach matching, or the truth is unknown.
     pub(super) fn of(subject: &Subject<'_>, matching: &Matching<'_>) -> Option<Self> {
         let evidence = subject.evidence;
         let (query, reference) = (evidence.query.as_ref()?, evidence.reference.as_ref()?);

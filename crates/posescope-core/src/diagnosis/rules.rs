@@ -121,7 +121,7 @@ pub struct Rule {
     pub decided_at: DecidedAt,
     /// The kind of picture that proves it.
     pub proof: Proof,
-    /// What may help a method against it, what is likeliest to help first.
+    /// What may help a method against it, the likeliest first.
     pub remedies: fn(&Ask<'_>) -> Vec<Remedy>,
 }
 

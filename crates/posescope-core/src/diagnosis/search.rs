@@ -33,7 +33,7 @@ const OTHER_PLACES: usize = 4;
 /// to do with each other.
 pub(super) const BEYOND_CHANCE: f64 = 6.0;
 
-/// Fewer pixels do not tell whether images have anything to do with each other.
+/// With fewer pixels, a low cost can be chance.
 pub(super) const TELLING_PIXELS: usize = 500;
 
 /// How often pixels are shuffled to see what chance gives.

@@ -1,4 +1,4 @@
-//! What SURF is told.
+//! The parameters of SURF.
 
 use crate::describe::parameters;
 

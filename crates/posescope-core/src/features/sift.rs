@@ -129,7 +129,7 @@ pub fn sift_interruptible<E>(
     Ok(features)
 }
 
-/// The image as the first octave wants it, 0 … 1, and the size of its pixels in those of the photo.
+/// The base image of the first octave, 0 … 1, and the size of its pixels in those of the photo.
 fn base(image: &GrayImage, params: &SiftParams) -> (FloatImage, f32) {
     let value = |x: u32, y: u32| f32::from(image.get_pixel(x, y).0[0]) / 255.0;
     if image.width() == 0 || image.height() == 0 {

@@ -211,8 +211,8 @@ pub struct CostReport {
     /// truth is known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub basin_m: Option<f64>,
-    /// What the cheapest coarse minimum elsewhere costs more than the one at the truth
-    /// ([`Basin::margin`]); negative where the cost prefers another place.
+    /// Cost of the lowest coarse minimum elsewhere less that at the truth ([`Basin::margin`]); negative
+    /// where the cost prefers another place.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub basin_margin: Option<f64>,
 }
@@ -235,7 +235,7 @@ impl CostReport {
     }
 }
 
-/// What a cost says of a pose that nobody searched by it.
+/// A cost at a pose that was not searched by it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CostAtPose {
     /// The method that searches this cost.

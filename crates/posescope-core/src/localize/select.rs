@@ -131,7 +131,7 @@ impl From<Vec<usize>> for References {
     }
 }
 
-/// Tells whoever watches how the references of a query were ranked.
+/// Emits how the references of a query were ranked.
 ///
 /// # Errors
 /// Only [`Cancelled`]. A photo that cannot be read is not shown: watching never changes the answer.
@@ -187,7 +187,7 @@ pub fn draw(mut candidates: Vec<usize>, count: usize, query: &str, seed: u64) ->
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ChoiceError {
-    /// References are sought around the query, whose position nobody knows.
+    /// References are sought around the query, whose position is unknown.
     #[error(
         "the position of query {query} is not known; name a frame with --reference, say where it is \
          with --gps, or choose by looks with --reference matches:K or retrieve:K"
@@ -214,7 +214,7 @@ const AT_ONCE: usize = 8;
 
 /// Ranks by exhaustive matching of features.
 pub struct ByMatches<'a> {
-    /// The references' scene. Features are kept with its frames where these are remembered.
+    /// The references' scene.
     pub scene: &'a dyn Scene,
     /// Parameters of features and matching.
     pub params: &'a Params,

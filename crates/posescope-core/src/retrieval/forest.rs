@@ -17,7 +17,7 @@ use crate::features::Descriptor;
 
 /// A split's dimension is drawn among this many of the greatest variance, so that the trees differ.
 const CANDIDATE_DIMENSIONS: usize = 5;
-/// Variances and mean are those of so many points of a node: more do not change the split's worth.
+/// Points of a node that variances and mean are taken of; more do not improve the split.
 const VARIANCE_SAMPLE: usize = 100;
 
 /// Points of a leaf at most. Comparing a few more points takes less time than walking to them one by
@@ -55,7 +55,7 @@ pub struct Nearest {
     pub squared_distance: f32,
 }
 
-/// What a search needs to remember; kept between searches to spare allocations.
+/// Memory of a search, kept between searches to spare allocations.
 #[derive(Default)]
 pub struct Scratch {
     branches: BinaryHeap<Reverse<Branch>>,
@@ -149,7 +149,7 @@ struct Search<'a> {
 }
 
 impl Search<'_> {
-    /// Walks to the leaf on the query's side, remembers the other sides, compares the leaf's points.
+    /// Walks to the leaf on the query's side, queues the other sides, compares the leaf's points.
     fn descend(&mut self, tree: &Tree, number: u32, mut node: u32, bound: f32) {
         loop {
             match &tree.nodes[node as usize] {

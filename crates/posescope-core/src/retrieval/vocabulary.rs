@@ -10,7 +10,7 @@ use crate::features::Descriptor;
 
 /// Descriptors that one task of a thread looks up, so that its scratch memory pays.
 const CHUNK: usize = 256;
-/// The centres have settled when fewer than one in so many descriptors change their word.
+/// The centres have settled when fewer than one in this many descriptors change their word.
 const SETTLED: usize = 1000;
 
 /// How the centres are found.
@@ -73,7 +73,7 @@ impl Vocabulary {
                 break;
             }
         }
-        // Whoever reads the words from a file makes this forest from them again.
+        // An index that is opened makes the same forest of these words.
         Self::new(vocabulary.words, trees, checks, seed)
     }
 

@@ -64,9 +64,8 @@ pub(super) struct Appearance {
 }
 
 impl Appearance {
-    /// What is seen at a pose of the query's camera in the reference camera's frame, remembered with the
-    /// query: a method and the hybrid that keeps its pose ask the same. Where nothing can be compared,
-    /// nothing speaks for the pose.
+    /// The appearance at a pose of the query camera in the reference camera's frame, kept with the query: a
+    /// method and the hybrid that keeps its pose ask the same. All 0 where nothing can be compared.
     pub(super) fn of(
         problem: &Problem,
         params: &Params,
@@ -119,7 +118,7 @@ impl Appearance {
 
     /// The signals: depth, margin, both rises, above the start, gain.
     pub(super) fn signals(&self) -> [f64; 6] {
-        /// Below this the logarithm tells nothing but how small it is.
+        /// Smaller gains would dominate the logarithm.
         const MIN_GAIN: f64 = 1e-3;
         [
             tamed(self.depth),
