@@ -192,9 +192,9 @@ impl LineTracer {
                 let poses: Vec<Pose> = CostLine::shares()
                     .map(|share| problem.reference_from_query(&line.pose(share)))
                     .collect();
-                let mut scores = Vec::new();
                 let estimator = estimator::entry(line.method).make(&params);
-                estimator.with_scorer(&problem, &mut |scorer| scores = scorer.score(&poses));
+                let scorer = estimator.scorer(&problem);
+                let scores = scorer.map_or_else(Vec::new, |scorer| scorer.score(&poses));
                 CostAlong {
                     line,
                     scores: CostLine::shares().zip(scores.into_iter().map(Some)).collect(),
@@ -411,17 +411,16 @@ impl DenseFiller {
 fn fill(mut request: DenseRequest, emit: &mut dyn FnMut(Scored) -> bool) {
     let DenseRequest { problem, params, ask, surface } = &mut request;
     let estimator = estimator::entry(ask.method).make(params);
-    let has_cost = estimator.with_scorer(problem, &mut |scorer| {
-        let mut is_wanted = true;
-        while is_wanted && !surface.is_complete() {
-            let begun = Instant::now();
-            let scores = Some(surface.score_next(scorer));
-            let took = begun.elapsed();
-            is_wanted = emit(Scored { ask: *ask, scores, took });
-        }
-    });
-    if !has_cost {
+    let Some(scorer) = estimator.scorer(problem) else {
         emit(Scored { ask: *ask, scores: None, took: Duration::ZERO });
+        return;
+    };
+    let mut is_wanted = true;
+    while is_wanted && !surface.is_complete() {
+        let begun = Instant::now();
+        let scores = Some(surface.score_next(&scorer));
+        let took = begun.elapsed();
+        is_wanted = emit(Scored { ask: *ask, scores, took });
     }
 }
 

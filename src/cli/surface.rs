@@ -55,11 +55,8 @@ pub fn surface(args: &RunArgs, out: &Path, terminal: &Terminal) -> Result<(), Cl
     }
     let estimator = estimator::entry(method).make(&task.params);
     let start = Instant::now();
-    let mut filled = None;
-    estimator.with_scorer(&problem, &mut |scorer| {
-        filled = Some(fill(scorer, task.radius_m(), &grid, terminal));
-    });
-    let surface = filled.ok_or_else(|| no_cost(method))??;
+    let scorer = estimator.scorer(&problem).ok_or_else(|| no_cost(method))?;
+    let surface = fill(&scorer, task.radius_m(), &grid, terminal)?;
     let seconds = start.elapsed().as_secs_f64();
     writer(&surface, out)?;
     if !terminal.is_quiet() {

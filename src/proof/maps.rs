@@ -357,10 +357,8 @@ fn curve(
     let poses: Vec<Pose> = (0..=steps)
         .map(|step| case.problem.reference_from_query(&between(&from, &to, share(step))))
         .collect();
-    let mut costs: Vec<Option<f64>> = Vec::new();
-    estimator.with_scorer(case.problem, &mut |scorer| {
-        costs = scorer.score(&poses).into_iter().map(|score| score.cost).collect();
-    });
+    let scores = estimator.scorer(case.problem)?.score(&poses);
+    let costs: Vec<Option<f64>> = scores.into_iter().map(|score| score.cost).collect();
     let known = || costs.iter().flatten().copied();
     let (least, most) = (known().reduce(f64::min)?, known().reduce(f64::max)?);
     let (width, height) = (CURVE.0 as f32, CURVE.1 as f32);

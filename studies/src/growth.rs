@@ -2,10 +2,10 @@ use std::sync::Arc;
 
 use cpu_time::ProcessTime;
 use posescope::camera::Intrinsics;
-use posescope::cost::{Cost, MutualInformation, MutualInformationParams};
+use posescope::cost::{Cost, MutualInformation};
 use posescope::features::{SurfParams, nearest_neighbours, surf};
 use posescope::image::{FloatImage, GrayImage};
-use posescope::render::{ColoredPoint, Scorer};
+use posescope::render::{ColoredCloud, ColoredPoint, Scorer};
 use posescope_studies::{PAIR, poses_of_a_disc, registered_cost, seen_by};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_pcg::Pcg64;
@@ -112,8 +112,7 @@ fn scaled(intrinsics: &Intrinsics, scale: f64) -> Intrinsics {
 /// A hypothesis of MI over the bins of its histogram.
 fn by_bins(rounds: usize) {
     let rows = BINS.map(|bins| {
-        let params = MutualInformationParams { bins, ..MutualInformationParams::default() };
-        let cost = MutualInformation::new(&params);
+        let cost = MutualInformation { bins, ..MutualInformation::default() };
         let (query, cloud) = seen_by(&cost);
         let intrinsics = &PAIR.query.intrinsics;
         row(bins, [hypothesis(&cloud.points, &query, intrinsics, &cost, rounds)])
@@ -151,7 +150,8 @@ fn hypothesis(
     rounds: usize,
 ) -> f64 {
     let poses: Vec<_> = poses_of_a_disc().into_iter().step_by(EVERY).collect();
-    let scorer = Scorer::new(points, Arc::clone(query), intrinsics, 1, cost);
+    let cloud = ColoredCloud { points: points.to_vec(), ..ColoredCloud::default() };
+    let scorer = Scorer::new(cloud, Arc::clone(query), intrinsics, 1, cost);
     scorer.score(&poses[..1]);
     1e6 * processor_s(rounds, || scorer.score(&poses)) / poses.len() as f64
 }

@@ -174,7 +174,7 @@ fn measure(cases: &[Case], options: &Options) -> Result<Vec<Measured>, Failure> 
             let seconds = started.elapsed().as_secs_f64();
             let error = outcome.pose.as_ref().ok();
             let information = || {
-                let at_truth = estimator.score_at(problem, &case.truth)?.cost?;
+                let at_truth = estimator.compare_at(problem, &case.truth)?.score.cost?;
                 let found = outcome.cost?;
                 let costs = [at_truth, found.best, found.shuffled.unwrap_or(1.0)];
                 Some(costs.map(|cost| 1.0 - cost))

@@ -41,15 +41,15 @@ fn named_pair(scene: &str, indices: &str) -> Result<Problem, Box<dyn Error>> {
 /// Where no method is called so.
 pub fn registered_cost(name: &str) -> Box<dyn Cost> {
     let entry = cost::ALL.iter().find(|entry| entry.name == name);
-    (entry.expect("the name of a direct method").params)().cost()
+    (entry.expect("the name of a direct method").make)()
 }
 
 /// The query of the pair and the cloud of its reference, as a cost looks at them.
-pub fn seen_by(cost: &dyn Cost) -> (Arc<FloatImage>, ColoredCloud) {
+pub fn seen_by(cost: &dyn Cost) -> (Arc<FloatImage>, Arc<ColoredCloud>) {
     let (query, reference) = (&PAIR.query, &PAIR.reference);
     let visible = reference.visible_cloud(&Params::default().render);
     let cloud = visible.colored_by(cost.reference_channel(&reference.photo.gray));
-    (Arc::new(cost.query_channel(&query.photo.gray)), cloud)
+    (Arc::new(cost.query_channel(&query.photo.gray)), Arc::new(cloud))
 }
 
 /// The cameras of the coarse search in a disc of 10 m.

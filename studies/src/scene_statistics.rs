@@ -194,8 +194,8 @@ fn pairs(
         );
         inliers.extend(outcome.counts.map(|counts| counts.inliers as f64));
         let direct = estimator::entry(Method::MI).make(&params);
-        let score = direct.score_at(&problem, &truth);
-        information.extend(score.and_then(|score| score.cost).map(|cost| 1.0 - cost));
+        let at_truth = direct.compare_at(&problem, &truth);
+        information.extend(at_truth.and_then(|seen| seen.score.cost).map(|cost| 1.0 - cost));
     }
     let found = [
         ("unique matches, ratio 0.8", survivors, 0),

@@ -1,6 +1,6 @@
 //! The stages by name: the same work for the benches and for the comparison with others.
 
-use posescope::cost::{self, Evaluator, IntensityPair};
+use posescope::cost::{self, Entropies, IntensityPair, LesserHalfFinder, Statistic};
 use posescope::estimator;
 use posescope::features::{SurfParams, nearest_neighbours, surf};
 use posescope::geometry::Pose;
@@ -91,7 +91,7 @@ fn hypotheses<R>(
     let cost = registered_cost(name);
     let (query, cloud) = seen_by(cost.as_ref());
     let intrinsics = &PAIR.query.intrinsics;
-    let scorer = Scorer::new(&cloud.points, query, intrinsics, splat_px, cost.as_ref());
+    let scorer = Scorer::new(cloud, query, intrinsics, splat_px, cost.as_ref());
     let poses = poses_of_a_disc();
     scorer.score(&poses[..1]);
     measure(poses.len(), &mut || {
@@ -102,17 +102,16 @@ fn hypotheses<R>(
 
 /// Rendering each hypothesis once and judging it by PM's cost and MI's, on one thread.
 fn both_costs<R>(splat_px: usize, measure: impl FnOnce(usize, &mut Work<'_>) -> R) -> R {
-    let [photometric, information] = ["pm", "mi"].map(registered_cost);
+    let information = registered_cost("mi");
     let (query, cloud) = seen_by(information.as_ref());
-    let (Evaluator::SquaredDifferences(mut error), Evaluator::Counts { bins, mut cost }) =
-        (photometric.evaluator(), information.evaluator())
-    else {
-        unreachable!("PM looks at differences, MI at a joint histogram");
+    let Statistic::Histogram { bins, cost } = information.statistic() else {
+        unreachable!("MI looks at a joint histogram");
     };
+    let mut halves = LesserHalfFinder::default();
     let of_points: Vec<f32> = cloud.points.iter().map(|point| point.intensity).collect();
     let values = Values { query: &query, points: &of_points };
     let points = PointArrays::new(cloud.points.iter().map(|point| point.position));
-    let mut canvas = DepthCanvas::new(&PAIR.query.intrinsics, splat_px).expect("a usual photo");
+    let mut canvas = DepthCanvas::new(&PAIR.query.intrinsics, splat_px);
     let keep = |query, synthetic| IntensityPair { query, synthetic };
     let (mut differences, mut bin_pairs, mut counts) = (Vec::new(), Vec::new(), Vec::new());
     let poses = poses_of_a_disc();
@@ -125,7 +124,8 @@ fn both_costs<R>(splat_px: usize, measure: impl FnOnce(usize, &mut Work<'_>) -> 
             cost::put_into_bins(pairs, bins, &mut bin_pairs);
             cost::count_pairs(&bin_pairs, bins, &mut counts);
             covered += pairs.len();
-            sum += error(&differences).unwrap_or_default() + cost(&counts).unwrap_or_default();
+            let information = cost(&Entropies::of(&counts, bins));
+            sum += halves.mean(&differences).unwrap_or_default() + information.unwrap_or_default();
         }
         json!({ "covered": covered, "sum": sum })
     })

@@ -385,7 +385,7 @@ fn the_dense_map_is_the_cheapest_heading_of_each_position_and_takes_the_camera_t
     let estimator = posescope::estimator::entry(Method::MI).make(&params);
     let score = |offset: &Offset| {
         let pose = problem.world_from_query(&offset.reference_from_camera());
-        estimator.score_at(&problem, &pose)
+        estimator.compare_at(&problem, &pose).map(|seen| seen.score)
     };
     let (cells, least_covered) = (filled.cheapest().scores.len(), filled.cheapest().least_covered);
     let mut turned = 0;
@@ -490,11 +490,10 @@ fn a_dense_map_that_nobody_looks_at_stands_still_and_is_gone_on_with() {
     let least_covered = whole.cheapest().least_covered;
     let mut at_once = DenseSurface::new(3.0, &grid, least_covered).expect("small");
     let estimator = posescope::estimator::entry(Method::MI).make(params);
-    estimator.with_scorer(problem, &mut |scorer| {
-        while !at_once.is_complete() {
-            at_once.score_next(scorer);
-        }
-    });
+    let scorer = estimator.scorer(problem).expect("it has a cost");
+    while !at_once.is_complete() {
+        at_once.score_next(&scorer);
+    }
     assert_eq!(whole.tried(), at_once.tried());
     for cell in 0..whole.cheapest().scores.len() {
         assert_eq!(whole.at(cell), at_once.at(cell));

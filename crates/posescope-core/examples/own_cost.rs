@@ -5,6 +5,7 @@ mod walls;
 
 use std::error::Error;
 
+use posescope_core::cost::Statistic;
 use posescope_core::geometry::PoseError;
 use posescope_core::image::{FloatImage, GrayImage, gaussian_smoothed};
 use posescope_core::memo::{Key, key};
@@ -28,24 +29,29 @@ impl Cost for CrossCorrelation {
         key("smoothed by 1 px")
     }
 
-    fn evaluate(&self, pairs: &[IntensityPair]) -> Option<f64> {
-        let count = pairs.len() as f64;
-        let mean = |value: fn(&IntensityPair) -> f32| {
-            pairs.iter().map(|pair| f64::from(value(pair))).sum::<f64>() / count
-        };
-        let (query, synthetic) = (mean(|pair| pair.query), mean(|pair| pair.synthetic));
-        let (mut both, mut of_query, mut of_synthetic) = (0.0, 0.0, 0.0);
-        for pair in pairs {
-            let q = f64::from(pair.query) - query;
-            let s = f64::from(pair.synthetic) - synthetic;
-            both += q * s;
-            of_query += q * q;
-            of_synthetic += s * s;
-        }
-        let scale = (of_query * of_synthetic).sqrt();
-        // No pair, or an image without contrast, decides nothing: that is no cost, not a high one.
-        (scale > 0.0).then(|| 1.0 - both / scale)
+    /// It looks at each pair.
+    fn statistic(&self) -> Statistic<'_> {
+        Statistic::of_pairs(distance)
     }
+}
+
+fn distance(pairs: &[IntensityPair]) -> Option<f64> {
+    let count = pairs.len() as f64;
+    let mean = |value: fn(&IntensityPair) -> f32| {
+        pairs.iter().map(|pair| f64::from(value(pair))).sum::<f64>() / count
+    };
+    let (query, synthetic) = (mean(|pair| pair.query), mean(|pair| pair.synthetic));
+    let (mut both, mut of_query, mut of_synthetic) = (0.0, 0.0, 0.0);
+    for pair in pairs {
+        let q = f64::from(pair.query) - query;
+        let s = f64::from(pair.synthetic) - synthetic;
+        both += q * s;
+        of_query += q * q;
+        of_synthetic += s * s;
+    }
+    let scale = (of_query * of_synthetic).sqrt();
+    // No pair, or an image without contrast, decides nothing: that is no cost, not a high one.
+    (scale > 0.0).then(|| 1.0 - both / scale)
 }
 
 fn main() -> Result<(), Box<dyn Error>> {

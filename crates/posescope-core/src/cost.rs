@@ -8,14 +8,12 @@
 //! the same name, reachable from the command line, the window and the recordings: a direct estimator
 //! is a cost with a search.
 
-mod evaluator;
 mod joint_histogram;
 mod lesser_half;
-mod median;
 mod mutual_information;
 mod orientation;
 mod photometric;
-mod tallying;
+mod statistic;
 
 use std::fmt;
 
@@ -23,18 +21,17 @@ use rand::SeedableRng as _;
 use rand::seq::SliceRandom as _;
 use rand_pcg::Pcg64;
 
-pub use evaluator::{CostOf, Evaluator};
 pub use joint_histogram::{
     Entropies, JointHistogram, LEAST_ENTROPY, MOST_BYTE_BINS, bin, byte_bin, count_pairs,
     put_into_bins,
 };
-pub use mutual_information::{MutualInformation, MutualInformationParams};
-pub use orientation::{Orientation, OrientationParams};
-pub use photometric::{Photometric, PhotometricParams, PhotometricWeights};
+pub use lesser_half::{LesserHalf, LesserHalfFinder};
+pub use mutual_information::MutualInformation;
+pub use orientation::Orientation;
+pub use photometric::Photometric;
+pub use statistic::{CostOfPairs, Explanation, ExplanationKind, PhotometricWeights, Statistic};
 
-pub use tallying::{LesserHalf, Tallying};
-
-use crate::describe::{Describe, choice};
+use crate::describe::{About, Describe, Field, choice};
 use crate::image::{FloatImage, GrayImage, cubic_interpolated};
 use crate::memo::{Key, key};
 
@@ -95,51 +92,9 @@ pub trait Cost: Send + Sync {
         key("grey")
     }
 
-    /// The cost over the pairs; `None` where they decide nothing (no pair, constant image).
-    fn evaluate(&self, pairs: &[IntensityPair]) -> Option<f64>;
-
-    /// The same cost for one hypothesis after another. One that needs less than all pairs, or memory
-    /// of its own, says so here; the answers are those of [`Self::evaluate`], bit for bit.
-    fn evaluator(&self) -> Evaluator<'_> {
-        Evaluator::Pairs(Box::new(|pairs| self.evaluate(pairs)))
-    }
-
-    /// The whole numbers that decide the cost, and how, so that a [device](crate::render::Device) can find
-    /// them; `None` where only the pairs do. The cost is that of [`Self::evaluate`], bit for bit.
-    fn tallying(&self) -> Option<Tallying> {
-        None
-    }
-
-    /// The smooth cost that is descended instead of searching a grid for the least of this one; `None` for
-    /// the grid.
-    fn descended(&self) -> Option<SmoothCost> {
-        None
-    }
-
-    /// Why the cost of these pairs is what it is; `None` where there is no cost, and for a cost that
-    /// has nothing of the kind to show.
-    fn explain(&self, pairs: &[IntensityPair]) -> Option<Explanation> {
-        let _ = pairs;
-        None
-    }
-}
-
-/// What a cost was made of.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Explanation {
-    /// Which residuals counted.
-    Weights(PhotometricWeights),
-    /// How the values of both images fall together.
-    JointHistogram(JointHistogram),
-}
-
-/// Which kind of [`Explanation`] a cost gives.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum ExplanationKind {
-    /// [`Explanation::Weights`].
-    Weights,
-    /// [`Explanation::JointHistogram`].
-    JointHistogram,
+    /// What decides the cost of the covered pixels, and how. The threads, a
+    /// [device](crate::render::Device) and the explanation all follow from it.
+    fn statistic(&self) -> Statistic<'_>;
 }
 
 /// How a direct method finds the pose of least cost.
@@ -155,39 +110,14 @@ pub enum SearchRule {
 
 choice!(SearchRule: Grid = "grid", Descent = "descent");
 
-/// What a cost is like that has derivatives.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum SmoothCost {
-    /// Squared differences of values, robustly.
-    Differences,
-    /// The information distance of a histogram with so many bins per axis.
-    Information {
-        /// Bins per axis.
-        bins: usize,
-    },
+/// A cost whose parameters describe themselves.
+pub trait RegisteredCost: Cost + Describe + fmt::Debug {
+    /// The same cost once more.
+    fn boxed(&self) -> Box<dyn RegisteredCost>;
 }
 
-/// Parameters that make a cost.
-pub trait MakesCost: Describe + Clone + fmt::Debug + Send + Sync + 'static {
-    /// The cost with these parameters.
-    fn make(&self) -> Box<dyn Cost>;
-}
-
-/// The parameters of any cost: they describe themselves, and make the cost.
-pub trait CostParams: Describe + fmt::Debug + Send + Sync {
-    /// The cost with these parameters.
-    fn cost(&self) -> Box<dyn Cost>;
-
-    /// The same parameters.
-    fn boxed(&self) -> Box<dyn CostParams>;
-}
-
-impl<P: MakesCost> CostParams for P {
-    fn cost(&self) -> Box<dyn Cost> {
-        self.make()
-    }
-
-    fn boxed(&self) -> Box<dyn CostParams> {
+impl<C: Cost + Describe + Clone + fmt::Debug + 'static> RegisteredCost for C {
+    fn boxed(&self) -> Box<dyn RegisteredCost> {
         Box::new(self.clone())
     }
 }
@@ -210,45 +140,81 @@ pub struct Entry {
     pub about: &'static str,
     /// What a value of its channel is: `grey value`.
     pub sees: &'static str,
-    /// How it explains itself.
-    pub explains: ExplanationKind,
+    /// Whether it can be descended too: then how it is searched is a parameter, `search`.
+    pub is_smooth: bool,
     /// What the cost is one minus of, where it is made of a joint histogram.
     pub similarity: Option<Similarity>,
-    /// Its parameters with their defaults.
-    pub params: fn() -> Box<dyn CostParams>,
+    /// The cost with its default parameters.
+    pub make: fn() -> Box<dyn RegisteredCost>,
+}
+
+impl Entry {
+    /// How it explains itself, if it does.
+    pub fn explains(&self) -> Option<ExplanationKind> {
+        (self.make)().statistic().explains()
+    }
 }
 
 /// Every cost.
 pub const ALL: &[Entry] = &[photometric::ENTRY, mutual_information::ENTRY, orientation::ENTRY];
 
-/// The parameters of every cost, in the order of [`ALL`].
+/// A registered cost with its parameters, and how it is searched.
 #[derive(Debug)]
-pub struct CostSettings(Vec<Box<dyn CostParams>>);
+pub struct CostSetting {
+    /// The cost.
+    pub cost: Box<dyn RegisteredCost>,
+    /// How its minimum is found.
+    pub search: SearchRule,
+    is_smooth: bool,
+}
+
+impl CostSetting {
+    /// The default setting of a cost.
+    pub fn new(entry: &Entry) -> Self {
+        let search = SearchRule::default();
+        Self { cost: (entry.make)(), search, is_smooth: entry.is_smooth }
+    }
+}
+
+impl Describe for CostSetting {
+    fn fields(&mut self) -> Vec<Field<'_>> {
+        let mut fields = self.cost.fields();
+        if self.is_smooth {
+            let doc = "How the pose of least cost is found: over the grid, or from the reference pose downhill.";
+            let about = About { name: "search", unit: "", doc };
+            fields.push(Field::choice(about, &mut self.search));
+        }
+        fields
+    }
+}
+
+impl Clone for CostSetting {
+    fn clone(&self) -> Self {
+        Self { cost: self.cost.boxed(), ..*self }
+    }
+}
+
+/// The setting of every cost, in the order of [`ALL`].
+#[derive(Clone, Debug)]
+pub struct CostSettings(Vec<CostSetting>);
 
 impl CostSettings {
     /// Names of the groups, with their parameters.
     pub fn groups(&mut self) -> impl Iterator<Item = (&'static str, &mut dyn Describe)> {
-        ALL.iter()
-            .zip(&mut self.0)
-            .map(|(entry, params)| (entry.name, params.as_mut() as &mut dyn Describe))
+        let settings = self.0.iter_mut().map(|setting| setting as &mut dyn Describe);
+        ALL.iter().map(|entry| entry.name).zip(settings)
     }
 
-    /// The parameters of a registered cost.
-    pub fn of(&self, entry: &Entry) -> Option<&dyn CostParams> {
+    /// The setting of a registered cost.
+    pub fn of(&self, entry: &Entry) -> Option<&CostSetting> {
         let place = ALL.iter().position(|known| known.name == entry.name)?;
-        self.0.get(place).map(AsRef::as_ref)
+        self.0.get(place)
     }
 }
 
 impl Default for CostSettings {
     fn default() -> Self {
-        Self(ALL.iter().map(|entry| (entry.params)()).collect())
-    }
-}
-
-impl Clone for CostSettings {
-    fn clone(&self) -> Self {
-        Self(self.0.iter().map(|params| params.boxed()).collect())
+        Self(ALL.iter().map(CostSetting::new).collect())
     }
 }
 
@@ -267,14 +233,6 @@ mod tests {
         values.iter().map(|&(query, synthetic)| IntensityPair { query, synthetic }).collect()
     }
 
-    /// The cost of the pairs as the grid search asks for it, after that of other pairs.
-    fn by_evaluator(cost: &dyn Cost, pairs: &[IntensityPair]) -> Option<f64> {
-        let before = &pairs[..pairs.len() / 2];
-        let mut evaluator = cost.evaluator();
-        evaluator.cost(before);
-        evaluator.cost(pairs)
-    }
-
     #[test]
     fn names_are_unique_and_settings_are_equal_to_their_copies() {
         let mut names: Vec<_> = ALL.iter().map(|entry| entry.name).collect();
@@ -291,9 +249,9 @@ mod tests {
     #[test]
     fn no_pair_has_no_cost() {
         for entry in ALL {
-            let cost = (entry.params)().cost();
-            assert_eq!(cost.evaluate(&[]), None, "{}", entry.name);
-            assert_eq!(cost.explain(&[]), None, "{}", entry.name);
+            let cost = (entry.make)();
+            assert_eq!(cost.statistic().cost(&[]), None, "{}", entry.name);
+            assert_eq!(cost.statistic().explain(&[]), None, "{}", entry.name);
         }
     }
 
@@ -309,9 +267,9 @@ mod tests {
             .map(|i| (equal[i].0, equal[(i * 1237 + 11) % equal.len()].1))
             .collect();
         for entry in ALL {
-            let cost = (entry.params)().cost();
-            let at_equal = cost.evaluate(&pairs(&equal)).expect("textured");
-            let at_shuffled = cost.evaluate(&pairs(&shuffled)).expect("textured");
+            let cost = (entry.make)();
+            let at_equal = cost.statistic().cost(&pairs(&equal)).expect("textured");
+            let at_shuffled = cost.statistic().cost(&pairs(&shuffled)).expect("textured");
             assert!(at_equal.abs() < 1e-9, "{}: {at_equal}", entry.name);
             assert!(at_shuffled > 0.5, "{}: {at_shuffled}", entry.name);
         }
@@ -323,11 +281,10 @@ mod tests {
             values in prop::collection::vec((0.0_f32..=255.0, 0.0_f32..=255.0), 0..200)
         ) {
             for entry in ALL {
-                let cost = (entry.params)().cost();
+                let cost = (entry.make)();
                 let pairs = pairs(&values);
-                let value = cost.evaluate(&pairs);
-                prop_assert_eq!(value.is_some(), cost.explain(&pairs).is_some());
-                prop_assert_eq!(value, by_evaluator(cost.as_ref(), &pairs));
+                let value = cost.statistic().cost(&pairs);
+                prop_assert_eq!(value.is_some(), cost.statistic().explain(&pairs).is_some());
                 if let Some(value) = value {
                     prop_assert!(value.is_finite() && value >= 0.0, "{} {}", entry.name, value);
                 }

@@ -40,7 +40,7 @@ use crate::grid::Offset;
 use crate::method::Method;
 use crate::params::Params;
 use crate::problem::Problem;
-use crate::render::{Comparison, Score, Scorer};
+use crate::render::{Comparison, Scorer};
 use crate::text::UnknownWord;
 use crate::trace::{Cancelled, Trace};
 
@@ -117,21 +117,18 @@ pub trait Estimator: Send + Sync {
     /// Only [`Cancelled`]: a query without a pose is an [`Outcome`] with a [`Failure`].
     fn estimate(&self, problem: &Problem, trace: &mut Trace<'_>) -> Result<Outcome, Cancelled>;
 
-    /// The cost that this estimator minimises, at any pose of the query; `None` if it has none.
-    fn score_at(&self, problem: &Problem, world_from_query: &Pose) -> Option<Score> {
-        Some(self.compare_at(problem, world_from_query)?.score)
-    }
-
-    /// Hands `work` what scores many poses of the query by that cost, and says whether there is one.
-    fn with_scorer(&self, problem: &Problem, work: &mut dyn FnMut(&Scorer<'_>)) -> bool {
-        let _ = (problem, work);
-        false
-    }
-
-    /// What [`Self::score_at`] returns, with the synthetic view and what the cost was made of.
-    fn compare_at(&self, problem: &Problem, world_from_query: &Pose) -> Option<Comparison> {
-        let _ = (problem, world_from_query);
+    /// What scores many poses of the query by the cost that this estimator minimises; `None` if it has none of
+    /// one channel.
+    fn scorer(&self, problem: &Problem) -> Option<Scorer<'_>> {
+        let _ = problem;
         None
+    }
+
+    /// The synthetic view at any pose of the query, with its cost and what that was made of; `None` for an
+    /// estimator that minimises no cost.
+    fn compare_at(&self, problem: &Problem, world_from_query: &Pose) -> Option<Comparison> {
+        let pose = problem.reference_from_query(world_from_query);
+        Some(self.scorer(problem)?.compare(&pose))
     }
 }
 

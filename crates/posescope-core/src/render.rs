@@ -1,24 +1,26 @@
 //! Synthetic views: the reference cloud, coloured by the reference photo and splatted into a camera
 //! elsewhere (paper, appendix B, "generation of synthetic views").
 
-mod canvas;
 mod color;
 mod depth_canvas;
 mod device;
+mod points;
+mod pool;
 mod projection;
 mod score;
 mod scorer;
 mod splat;
-mod worker;
 
-pub use canvas::{Canvas, PointArrays, Values};
 pub use color::{ColoredCloud, ColoredPoint, ColoringCounts, VisibleCloud, color_cloud};
 pub use depth_canvas::DepthCanvas;
 pub(crate) use device::leave_out;
 pub use device::{Device, Loaded, Tally, Workload, use_device};
+pub use points::{PointArrays, Values};
+pub use pool::MOST_AT_A_TIME;
+pub(crate) use pool::{Pool, ShownPoints, at_a_time};
 pub use projection::ProjectionRows;
 pub use score::Score;
-pub use scorer::{Comparison, MOST_AT_A_TIME, Scorer};
+pub use scorer::{Comparison, Scorer};
 pub use splat::{Rasterizer, SplattedPixel, SyntheticView};
 
 use crate::describe::parameters;

@@ -6,7 +6,7 @@ use std::sync::{Arc, OnceLock};
 use nalgebra::Point3;
 use posescope_core::camera::Intrinsics;
 use posescope_core::cloud::Cloud;
-use posescope_core::cost::{IntensityPair, JointHistogram, Tallying};
+use posescope_core::cost::{IntensityPair, JointHistogram, Statistic};
 use posescope_core::event::{Event, Kind, KindSet};
 use posescope_core::geometry::Pose;
 use posescope_core::grid::{Phase, ScoredLattice};
@@ -47,7 +47,7 @@ impl Device for Sly {
     }
 
     fn load(&self, workload: &Workload<'_>) -> Option<Box<dyn Loaded>> {
-        let Tallying::Counts { bins, .. } = workload.tallying else {
+        let &Statistic::Histogram { bins, .. } = workload.statistic else {
             return None;
         };
         self.loaded.fetch_add(1, Ordering::Relaxed);

@@ -17,7 +17,7 @@ use posescope_core::cost;
 use posescope_core::geometry::Pose;
 use posescope_core::grid::{GridParams, Lattice, Offset, Phase};
 use posescope_core::params::Params;
-use posescope_core::render::{ColoredPoint, Device, Scorer};
+use posescope_core::render::{ColoredCloud, ColoredPoint, Device, Scorer};
 use posescope_core::scene::Scene as _;
 use posescope_gpu::Gpu;
 use posescope_street::Street;
@@ -46,14 +46,17 @@ fn main() -> Result<(), Box<dyn Error>> {
         for name in ["mi", "pm"] {
             let entry = cost::ALL.iter().find(|entry| entry.name == name);
             let entry = entry.ok_or("a registered cost")?;
-            let cost = params.costs.of(entry).ok_or("its parameters")?.cost();
+            let cost = params.costs.of(entry).ok_or("its parameters")?.cost.boxed();
             let channel = cost.reference_channel(&reference.photo.gray);
             let visible = reference.visible_cloud(&params.render);
             let colored = visible.colored_by(channel);
             let points = resized(&colored.points, count);
+            let cloud = Arc::new(ColoredCloud { points, ..colored });
             let channel = Arc::new(cost.query_channel(&query.photo.gray));
-            let scorer =
-                || Scorer::new(&points, Arc::clone(&channel), &query.intrinsics, 1, cost.as_ref());
+            let scorer = || {
+                let (cloud, channel) = (Arc::clone(&cloud), Arc::clone(&channel));
+                Scorer::new(cloud, channel, &query.intrinsics, 1, cost.as_ref())
+            };
             let on_threads = scorer().on(None);
             let on_card = scorer().on(Some(Arc::clone(&gpu) as Arc<dyn Device>));
             // Both have made what they make once before anything is timed.

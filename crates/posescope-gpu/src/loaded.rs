@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use posescope_core::cost::{LesserHalf, Tallying, bin};
+use posescope_core::cost::{LesserHalf, Statistic, bin};
 use posescope_core::render::{Loaded, ProjectionRows, Tally, Workload};
 use wgpu::BufferUsages;
 
@@ -42,17 +42,18 @@ impl OnCard {
         if count >= MOST_POINTS || 16 * count as u64 > most_bytes {
             return Err(too_small(format!("{count} points do not fit")));
         }
-        let (kernel, value): (_, &dyn Fn(f32) -> u32) = match workload.tallying {
-            Tallying::Counts { bins, .. } if bins > MOST_BINS => {
+        let (kernel, value): (_, &dyn Fn(f32) -> u32) = match workload.statistic {
+            &Statistic::Histogram { bins, .. } if bins > MOST_BINS => {
                 return Err(too_small(format!(
                     "a joint histogram of {bins} × {bins} bins does not fit, at most \
                      {MOST_BINS} × {MOST_BINS} do"
                 )));
             }
-            Tallying::Counts { bins, .. } => {
+            &Statistic::Histogram { bins, .. } => {
                 (Kernel::Counts { bins: bins as u32 }, &move |value| bin(value, bins) as u32)
             }
-            Tallying::LesserHalf => (Kernel::LesserHalf, &f32::to_bits),
+            // The core asks for nothing that is not counted.
+            _ => (Kernel::LesserHalf, &f32::to_bits),
         };
         let points: Vec<[u32; 4]> = workload
             .points

@@ -8,7 +8,7 @@ use posescope_core::cost::{self, Cost};
 use posescope_core::geometry::Pose;
 use posescope_core::image::FloatImage;
 use posescope_core::params::Params;
-use posescope_core::render::{ColoredPoint, Device, Scorer, use_device};
+use posescope_core::render::{ColoredCloud, ColoredPoint, Device, Scorer, use_device};
 use posescope_gpu::{Gpu, GpuError};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_pcg::Pcg64;
@@ -30,7 +30,7 @@ fn camera() -> Intrinsics {
 }
 
 struct World {
-    points: Vec<ColoredPoint>,
+    cloud: Arc<ColoredCloud>,
     query: Arc<FloatImage>,
     poses: Vec<Pose>,
 }
@@ -64,7 +64,8 @@ fn world(seed: u64, points: usize, poses: usize) -> World {
             Pose::from_parts(Translation3::from(centre), turn.into())
         })
         .collect();
-    World { points: cloud, query: Arc::new(query), poses }
+    let cloud = ColoredCloud { points: cloud, ..ColoredCloud::default() };
+    World { cloud: Arc::new(cloud), query: Arc::new(query), poses }
 }
 
 fn cost_of(name: &str, setting: &str) -> Box<dyn Cost> {
@@ -74,7 +75,7 @@ fn cost_of(name: &str, setting: &str) -> Box<dyn Cost> {
     }
     let entry = cost::ALL.iter().find(|entry| entry.name == name);
     let entry = entry.expect("a registered cost");
-    params.costs.of(entry).expect("its parameters").cost()
+    params.costs.of(entry).expect("its parameters").cost.boxed()
 }
 
 #[test]
@@ -94,8 +95,9 @@ fn scores_are_those_of_the_threads_to_the_last_bit() {
         for (name, setting, splat_px) in asked {
             let cost = cost_of(name, setting);
             let query = Arc::clone(&world.query);
-            let scorer =
-                || Scorer::new(&world.points, query.clone(), &camera(), splat_px, cost.as_ref());
+            let scorer = || {
+                Scorer::new(world.cloud.clone(), query.clone(), &camera(), splat_px, cost.as_ref())
+            };
             let expected = scorer().on(None).score(&world.poses);
             let device = Arc::clone(&gpu) as Arc<dyn Device>;
             let found = scorer().on(Some(device)).score(&world.poses);
@@ -110,7 +112,7 @@ fn scores_are_those_of_the_threads_to_the_last_bit() {
 
 fn expected_costs(world: &World) -> usize {
     let cost = cost_of("mi", "");
-    let scorer = Scorer::new(&world.points, world.query.clone(), &camera(), 1, cost.as_ref());
+    let scorer = Scorer::new(world.cloud.clone(), world.query.clone(), &camera(), 1, cost.as_ref());
     let scores = scorer.on(None).score(&world.poses);
     scores.iter().filter(|score| score.cost.is_some()).count()
 }
@@ -120,7 +122,7 @@ fn what_is_too_large_is_left_to_the_processor_and_said() {
     let Some(gpu) = gpu() else { return };
     let world = world(4, 500, 50);
     let cost = cost_of("mi", "mi.bins=61");
-    let scorer = Scorer::new(&world.points, world.query.clone(), &camera(), 1, cost.as_ref());
+    let scorer = Scorer::new(world.cloud.clone(), world.query.clone(), &camera(), 1, cost.as_ref());
     let device = Arc::clone(&gpu) as Arc<dyn Device>;
     let scores = scorer.on(Some(device)).score(&world.poses);
     assert_eq!(scores.len(), 50);

@@ -73,6 +73,5 @@ impl HistogramView {
 
 /// How a method's cost explains itself, if it has one.
 pub(super) fn explains(method: Method) -> Option<ExplanationKind> {
-    let cost = estimator::find(method).and_then(Entry::cost);
-    cost.map(|cost| cost.explains)
+    estimator::find(method).and_then(Entry::cost)?.explains()
 }

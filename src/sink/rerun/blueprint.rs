@@ -78,7 +78,7 @@ fn shows_features(methods: &[Method]) -> bool {
 /// Whether a method's cost uses a joint histogram.
 fn has_histogram(method: Method) -> bool {
     let cost = estimator::find(method).and_then(Entry::cost);
-    cost.is_some_and(|cost| cost.explains == ExplanationKind::JointHistogram)
+    cost.and_then(|cost| cost.explains()) == Some(ExplanationKind::JointHistogram)
 }
 
 /// The world and text on the left, a row per method on the right.

@@ -1,9 +1,6 @@
 //! 1 − normalised mutual information, the cost of MI (paper, section 2.3).
 
-use super::{
-    Cost, Entropies, Entry, Evaluator, Explanation, ExplanationKind, IntensityPair, JointHistogram,
-    MakesCost, SearchRule, Similarity, SmoothCost, Tallying,
-};
+use super::{Cost, Entropies, Entry, Similarity, Statistic};
 use crate::describe::parameters;
 use crate::image::{FloatImage, GrayImage, gaussian_smoothed};
 use crate::memo::{Key, key};
@@ -13,82 +10,41 @@ pub(super) const ENTRY: Entry = Entry {
     name: "mi",
     about: "1 − mutual information normalised by the larger entropy",
     sees: "grey value",
-    explains: ExplanationKind::JointHistogram,
+    is_smooth: true,
     similarity: Some(Similarity { name: "NMI", formula: "I(Q,S) / max(H(Q), H(S))" }),
-    params: || Box::new(MutualInformationParams::default()),
+    make: || Box::new(MutualInformation::default()),
 };
 
 parameters! {
-    /// Parameters of the mutual-information cost.
+    /// 1 − NMI, NMI = (H(S) + H(Q) − H(S,Q)) / max(H(S), H(Q)), the marginals from the joint histogram.
     #[derive(Clone, Debug, PartialEq)]
-    pub struct MutualInformationParams {
+    pub struct MutualInformation {
         /// Standard deviation of the Gaussian that smooths the query.
         pub sigma_px: f64 = number("sigma", "px", 0.0..=20.0),
         /// Bins per axis of the joint histogram, over 0 … 255.
         ///
         /// 8 to 32 are equal on real pairs; 64 is unstable where few pixels are covered.
         pub bins: usize = count("bins", "", 2..=256),
-        /// How the pose of least cost is found: over the grid, or from the reference pose downhill.
-        pub search: SearchRule = choice("search"),
     }
 }
 
-impl Default for MutualInformationParams {
+impl Default for MutualInformation {
     fn default() -> Self {
-        Self { sigma_px: 1.5, bins: 16, search: SearchRule::Grid }
-    }
-}
-
-impl MakesCost for MutualInformationParams {
-    fn make(&self) -> Box<dyn Cost> {
-        Box::new(MutualInformation::new(self))
-    }
-}
-
-/// 1 − NMI, NMI = (H(S) + H(Q) − H(S,Q)) / max(H(S), H(Q)), the marginals from the joint histogram.
-#[derive(Clone, Debug)]
-pub struct MutualInformation {
-    params: MutualInformationParams,
-}
-
-impl MutualInformation {
-    /// The cost with these parameters.
-    pub fn new(params: &MutualInformationParams) -> Self {
-        Self { params: params.clone() }
+        Self { sigma_px: 1.5, bins: 16 }
     }
 }
 
 impl Cost for MutualInformation {
     fn query_channel(&self, photo: &GrayImage) -> FloatImage {
-        gaussian_smoothed(photo, self.params.sigma_px)
+        gaussian_smoothed(photo, self.sigma_px)
     }
 
     fn query_channel_key(&self) -> Key {
-        key(("grey", self.params.sigma_px))
+        key(("grey", self.sigma_px))
     }
 
-    fn evaluate(&self, pairs: &[IntensityPair]) -> Option<f64> {
-        distance(&JointHistogram::of(pairs, self.params.bins).entropies())
-    }
-
-    fn evaluator(&self) -> Evaluator<'_> {
-        Evaluator::of_entropies(self.params.bins, distance)
-    }
-
-    fn tallying(&self) -> Option<Tallying> {
-        let bins = self.params.bins;
-        Some(Tallying::Counts { bins, cost: distance })
-    }
-
-    fn descended(&self) -> Option<SmoothCost> {
-        let bins = self.params.bins;
-        (self.params.search == SearchRule::Descent).then_some(SmoothCost::Information { bins })
-    }
-
-    fn explain(&self, pairs: &[IntensityPair]) -> Option<Explanation> {
-        let histogram = JointHistogram::of(pairs, self.params.bins);
-        distance(&histogram.entropies())?;
-        Some(Explanation::JointHistogram(histogram))
+    fn statistic(&self) -> Statistic<'_> {
+        Statistic::Histogram { bins: self.bins, cost: distance }
     }
 }
 
@@ -100,13 +56,14 @@ fn distance(entropies: &Entropies) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cost::{IntensityPair, JointHistogram};
 
     fn pairs(values: impl IntoIterator<Item = (f32, f32)>) -> Vec<IntensityPair> {
         values.into_iter().map(|(query, synthetic)| IntensityPair { query, synthetic }).collect()
     }
 
     fn cost(values: &[IntensityPair]) -> Option<f64> {
-        MutualInformation::new(&MutualInformationParams::default()).evaluate(values)
+        MutualInformation::default().statistic().cost(values)
     }
 
     #[test]

@@ -9,10 +9,7 @@ use std::f32::consts::PI;
 
 use image::Luma;
 
-use super::{
-    Cost, Entropies, Entry, Evaluator, Explanation, ExplanationKind, IntensityPair, JointHistogram,
-    LEAST_ENTROPY, MakesCost, Similarity, Tallying,
-};
+use super::{Cost, Entropies, Entry, LEAST_ENTROPY, Similarity, Statistic};
 use crate::describe::parameters;
 use crate::image::{FloatImage, GrayImage, gaussian_smoothed};
 use crate::memo::{Key, key};
@@ -22,15 +19,15 @@ pub(super) const ENTRY: Entry = Entry {
     name: "nid",
     about: "normalised information distance of gradient orientations",
     sees: "orientation",
-    explains: ExplanationKind::JointHistogram,
+    is_smooth: false,
     similarity: Some(Similarity { name: "shared information", formula: "I(Q,S) / H(Q,S)" }),
-    params: || Box::new(OrientationParams::default()),
+    make: || Box::new(Orientation::default()),
 };
 
 parameters! {
-    /// Parameters of the cost of orientations.
+    /// NID = (H(S,Q) − I(S,Q)) / H(S,Q) of the orientations, modulo 180°.
     #[derive(Clone, Debug, PartialEq)]
-    pub struct OrientationParams {
+    pub struct Orientation {
         /// Standard deviation of the Gaussian that smooths both photos before they are
         /// differentiated.
         pub sigma_px: f64 = number("sigma", "px", 0.0..=20.0),
@@ -41,37 +38,20 @@ parameters! {
     }
 }
 
-impl Default for OrientationParams {
+impl Default for Orientation {
     fn default() -> Self {
         Self { sigma_px: 1.5, bins: 9, least_gradient: 2.0 }
     }
 }
 
-impl MakesCost for OrientationParams {
-    fn make(&self) -> Box<dyn Cost> {
-        Box::new(Orientation::new(self))
-    }
-}
-
-/// NID = (H(S,Q) − I(S,Q)) / H(S,Q) of the orientations, modulo 180°.
-#[derive(Clone, Debug)]
-pub struct Orientation {
-    params: OrientationParams,
-}
-
 impl Orientation {
-    /// The cost with these parameters.
-    pub fn new(params: &OrientationParams) -> Self {
-        Self { params: params.clone() }
-    }
-
     /// The orientation of the smoothed photo's gradient as a value 0 … 255: flat places fall into the
-    /// first of [`OrientationParams::bins`] equal intervals, angles from 0 to 180° into the others.
+    /// first of [`Self::bins`] equal intervals, angles from 0 to 180° into the others.
     fn channel(&self, photo: &GrayImage) -> FloatImage {
-        let smooth = gaussian_smoothed(photo, self.params.sigma_px);
+        let smooth = gaussian_smoothed(photo, self.sigma_px);
         let (width, height) = smooth.dimensions();
-        let first = 256.0 / self.params.bins as f32;
-        let least = self.params.least_gradient as f32;
+        let first = 256.0 / self.bins as f32;
+        let least = self.least_gradient as f32;
         let at = |x: u32, y: u32| smooth.get_pixel(x, y).0[0];
         FloatImage::from_fn(width, height, |x, y| {
             let (left, right) = (x.saturating_sub(1), (x + 1).min(width - 1));
@@ -110,26 +90,11 @@ impl Cost for Orientation {
     }
 
     fn reference_channel_key(&self) -> Key {
-        key(&self.params)
+        key(self)
     }
 
-    fn evaluate(&self, pairs: &[IntensityPair]) -> Option<f64> {
-        distance(&JointHistogram::of(pairs, self.params.bins).entropies())
-    }
-
-    fn evaluator(&self) -> Evaluator<'_> {
-        Evaluator::of_entropies(self.params.bins, distance)
-    }
-
-    fn tallying(&self) -> Option<Tallying> {
-        let bins = self.params.bins;
-        Some(Tallying::Counts { bins, cost: distance })
-    }
-
-    fn explain(&self, pairs: &[IntensityPair]) -> Option<Explanation> {
-        let histogram = JointHistogram::of(pairs, self.params.bins);
-        distance(&histogram.entropies())?;
-        Some(Explanation::JointHistogram(histogram))
+    fn statistic(&self) -> Statistic<'_> {
+        Statistic::Histogram { bins: self.bins, cost: distance }
     }
 }
 
@@ -143,6 +108,7 @@ fn distance(entropies: &Entropies) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cost::IntensityPair;
 
     fn stripes(angle: f32, contrast: f32) -> GrayImage {
         let (sin, cos) = angle.sin_cos();
@@ -153,7 +119,7 @@ mod tests {
     }
 
     fn bin_of(photo: &GrayImage) -> usize {
-        let cost = Orientation::new(&OrientationParams::default());
+        let cost = Orientation::default();
         let channel = cost.channel(photo);
         let mut counts = [0; 9];
         for y in 8..56 {
@@ -178,7 +144,7 @@ mod tests {
 
     #[test]
     fn a_flat_photo_has_no_orientation_and_no_cost() {
-        let cost = Orientation::new(&OrientationParams::default());
+        let cost = Orientation::default();
         let flat = GrayImage::from_pixel(20, 10, Luma([77]));
         let channel = cost.channel(&flat);
         let pairs: Vec<_> = channel
@@ -186,6 +152,6 @@ mod tests {
             .map(|pixel| IntensityPair { query: pixel.0[0], synthetic: pixel.0[0] })
             .collect();
         assert!(pairs.iter().all(|pair| pair.query < 256.0 / 9.0));
-        assert_eq!(cost.evaluate(&pairs), None);
+        assert_eq!(cost.statistic().cost(&pairs), None);
     }
 }

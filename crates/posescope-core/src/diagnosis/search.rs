@@ -14,7 +14,7 @@ use rayon::prelude::*;
 use super::Subject;
 use super::confidence;
 use super::descent::compass_search;
-use crate::cost::{Cost, shuffled};
+use crate::cost::shuffled;
 use crate::estimator;
 use crate::geometry::{Pose, PoseError, yaw};
 use crate::grid::{GridParams, Offset, Phase, least_covered};
@@ -94,7 +94,6 @@ pub(super) struct Search<'a, 'cost> {
     pub(super) least_covered: u32,
     /// The method whose cost judges another system's pose.
     pub(super) judge: Option<Method>,
-    measure: &'a dyn Cost,
     near_truth: OnceLock<Option<Place>>,
     rivals: OnceLock<Option<Rivals>>,
     /// What was shuffled already: several rules ask for the same poses.
@@ -112,41 +111,28 @@ impl Search<'_, '_> {
         let responsible =
             if is_given { JUDGE } else { confidence::responsible(subject.method, subject.outcome) };
         let entry = estimator::find(responsible);
-        let cost = entry.and_then(|entry| entry.cost());
-        let measure = cost.and_then(|cost| Some(subject.params.costs.of(cost)?.cost()));
-        let (Some(truth), Some(entry), Some(measure)) =
-            (subject.reference_from_truth(), entry, measure)
-        else {
+        let (Some(truth), Some(entry)) = (subject.reference_from_truth(), entry) else {
             return work(None);
         };
-        let mut work = Some(work);
-        let mut done = None;
-        entry.make(subject.params).with_scorer(subject.problem, &mut |scorer| {
-            let Some(work) = work.take() else { return };
-            let ended = if is_given { ended_as_given(subject, scorer) } else { ended(subject) };
-            done = Some(match ended {
-                None => work(None),
-                Some(ended) => work(Some(&Search {
-                    subject,
-                    scorer,
-                    grid: &subject.params.grid,
-                    truth,
-                    result: ended.offset,
-                    result_cost: ended.cost,
-                    least_covered: ended.least_covered,
-                    judge: is_given.then_some(JUDGE),
-                    measure: measure.as_ref(),
-                    near_truth: OnceLock::new(),
-                    rivals: OnceLock::new(),
-                    against_chance: Mutex::default(),
-                })),
-            });
+        let estimator = entry.make(subject.params);
+        let Some(scorer) = estimator.scorer(subject.problem) else {
+            return work(None);
+        };
+        let ended = if is_given { ended_as_given(subject, &scorer) } else { ended(subject) };
+        let search = ended.map(|ended| Search {
+            subject,
+            scorer: &scorer,
+            grid: &subject.params.grid,
+            truth,
+            result: ended.offset,
+            result_cost: ended.cost,
+            least_covered: ended.least_covered,
+            judge: is_given.then_some(JUDGE),
+            near_truth: OnceLock::new(),
+            rivals: OnceLock::new(),
+            against_chance: Mutex::default(),
         });
-        match (done, work) {
-            (Some(done), _) => done,
-            (None, Some(work)) => work(None),
-            (None, None) => unreachable!("what was taken was done"),
-        }
+        work(search.as_ref())
     }
 
     /// What beat the truth; `None` where the truth is out of reach, or covers too little.
@@ -366,19 +352,16 @@ impl Search<'_, '_> {
 
     fn against_chance_of(&self, pose: &Pose) -> Option<AgainstChance> {
         let pairs = self.scorer.pairs(pose);
-        let measure = self.measure;
+        let measure = self.scorer.statistic();
         let seed = self.subject.problem.random_seed("shuffled truth");
         let costs: Vec<Option<f64>> = (0..SHUFFLES)
             .into_par_iter()
-            .map_init(
-                || measure.evaluator(),
-                |evaluator, k| evaluator.cost(&shuffled(&pairs, seed.wrapping_add(k))),
-            )
+            .map(|k| measure.cost(&shuffled(&pairs, seed.wrapping_add(k))))
             .collect();
         let costs: Vec<f64> = costs.into_iter().flatten().collect();
         let (mean, squares) = mean_and_squares(&costs)?;
         let deviation = (squares / (costs.len() as f64 - 1.0)).sqrt();
-        let cost = measure.evaluate(&pairs)?;
+        let cost = measure.cost(&pairs)?;
         (costs.len() > 1).then_some(AgainstChance { pixels: pairs.len(), cost, mean, deviation })
     }
 

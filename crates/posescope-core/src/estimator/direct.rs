@@ -7,7 +7,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::{CostSummary, Estimator, Failure, Halt, Outcome, separate_failure};
-use crate::cost::{self, Cost, shuffled};
+use crate::cost::{self, Cost, CostSetting, SearchRule, shuffled};
 use crate::descent::DescentParams;
 use crate::event::{CloudColored, Moment, PhaseSearched, PoseScored, Stage, ViewRendered};
 use crate::geometry::Pose;
@@ -17,13 +17,14 @@ use crate::memo::{Key, Recalled, key};
 use crate::method::Method;
 use crate::params::Params;
 use crate::problem::Problem;
-use crate::render::{ColoredCloud, Comparison, RenderParams, Score, Scorer, leave_out};
+use crate::render::{ColoredCloud, RenderParams, Score, Scorer, leave_out};
 use crate::trace::{Cancelled, Trace};
 
 /// A direct estimator: a cost and the way to search it.
 pub struct Direct {
     method: Method,
     cost: Box<dyn Cost>,
+    search: SearchRule,
     render: RenderParams,
     pub(super) grid: GridParams,
     descent: DescentParams,
@@ -34,15 +35,17 @@ pub struct Direct {
 impl Direct {
     /// The estimator that searches the pose of least registered cost.
     pub fn new(entry: &cost::Entry, params: &Params) -> Self {
-        let default = (entry.params)();
-        let cost = params.costs.of(entry).unwrap_or(default.as_ref());
+        let setting = params.costs.of(entry).cloned();
+        let CostSetting { cost, search, .. } = setting.unwrap_or_else(|| CostSetting::new(entry));
+        let cost_key = key((entry.name, &cost));
         Self {
             method: Method::named(entry.name),
-            cost: cost.cost(),
+            cost,
+            search,
             render: params.render.clone(),
             grid: params.grid.clone(),
             descent: params.descent.clone(),
-            cost_key: key((entry.name, cost)),
+            cost_key,
         }
     }
 
@@ -56,6 +59,7 @@ impl Direct {
         Self {
             method: Method::named(name),
             cost,
+            search: SearchRule::Grid,
             render: params.render.clone(),
             grid: params.grid.clone(),
             descent: params.descent.clone(),
@@ -66,11 +70,10 @@ impl Direct {
 
 impl Estimator for Direct {
     fn estimate(&self, problem: &Problem, trace: &mut Trace<'_>) -> Result<Outcome, Cancelled> {
-        let found =
-            trace.stage(Stage::Estimator(self.method), |trace| match self.cost.descended() {
-                None => self.search(problem, trace),
-                Some(smooth) => self.descend(smooth, problem, trace),
-            });
+        let found = trace.stage(Stage::Estimator(self.method), |trace| match self.search {
+            SearchRule::Grid => self.search_grid(problem, trace),
+            SearchRule::Descent => self.descend(problem, trace),
+        });
         Ok(match separate_failure(found)? {
             Ok((pose, cost)) => {
                 Outcome { pose: Ok(pose), counts: None, cost: Some(cost), fell_back: false }
@@ -79,33 +82,25 @@ impl Estimator for Direct {
         })
     }
 
-    fn with_scorer(&self, problem: &Problem, work: &mut dyn FnMut(&Scorer<'_>)) -> bool {
-        let cloud = self.colored(problem).value;
-        work(&self.scorer(problem, &cloud));
-        true
-    }
-
-    fn compare_at(&self, problem: &Problem, world_from_query: &Pose) -> Option<Comparison> {
-        let cloud = self.colored(problem).value;
-        let reference_from_query = problem.reference_from_query(world_from_query);
-        Some(self.scorer(problem, &cloud).compare(&reference_from_query))
+    fn scorer(&self, problem: &Problem) -> Option<Scorer<'_>> {
+        Some(self.scorer_of(problem))
     }
 }
 
 impl Direct {
-    fn search(
+    fn search_grid(
         &self,
         problem: &Problem,
         trace: &mut Trace<'_>,
     ) -> Result<(Pose, CostSummary), Halt> {
         let radius = problem.uncertainty_radius_m;
         check_size(&self.grid, radius)?;
-        if self.cost.tallying().is_none() {
+        if !self.cost.statistic().is_counted() {
             leave_out(self.method, "has a cost that whole numbers do not decide");
         }
-        let cloud = self.colored_and_told(problem, trace)?;
+        self.color(problem, trace)?;
         trace.checkpoint()?;
-        let scorer = self.scorer(problem, &cloud);
+        let scorer = self.scorer_of(problem);
         trace.checkpoint()?;
 
         // The reference pose is the starting value, and its coverage the measure of all others.
@@ -154,7 +149,8 @@ impl Direct {
         })
     }
 
-    fn colored_and_told(
+    /// Colours the cloud, and tells of it.
+    pub(super) fn color(
         &self,
         problem: &Problem,
         trace: &mut Trace<'_>,
@@ -181,14 +177,14 @@ impl Direct {
         })
     }
 
-    pub(super) fn scorer<'a>(&'a self, problem: &Problem, cloud: &'a ColoredCloud) -> Scorer<'a> {
+    pub(super) fn scorer_of(&self, problem: &Problem) -> Scorer<'_> {
         let query = &problem.query;
         let bytes = |image: &FloatImage| size_of_val(image.as_raw().as_slice());
         let channel = query.memo.recall(self.cost.query_channel_key(), bytes, || {
             self.cost.query_channel(&query.photo.gray)
         });
         Scorer::new(
-            &cloud.points,
+            self.colored(problem).value,
             channel.value,
             &query.intrinsics,
             self.render.splat_px,
@@ -206,7 +202,7 @@ impl Direct {
         lattice: Lattice,
         least_covered: u32,
         trace: &mut Trace<'_>,
-        mut tell: impl FnMut(Scored, &mut Trace<'_>) -> Result<(), Cancelled>,
+        mut tell: impl FnMut(&[Scored], &mut Trace<'_>) -> Result<(), Cancelled>,
     ) -> Result<ScoredLattice, Cancelled> {
         let batch = scorer.at_a_time_of(lattice.cells());
         let mut surface = None;
@@ -214,8 +210,8 @@ impl Direct {
         let inputs = (self.cost_key, &self.render, &lattice);
         let found = problem.try_recall(inputs, bytes, || {
             let score = |poses: &[Pose]| scorer.score(poses);
-            let each = |one| tell(one, trace);
-            let mut scored = scan(lattice.clone(), least_covered, batch, score, each)?;
+            let tell = |some: &[Scored]| tell(some, trace);
+            let mut scored = scan(lattice.clone(), least_covered, batch, score, tell)?;
             // Settled scores are cached: a later scorer asks no device, so it would correct nothing.
             scored.settle(scorer);
             let scores = scored.scores.iter().flatten().copied().collect();
@@ -228,14 +224,14 @@ impl Direct {
         }
         let mut known = found.value.iter().copied();
         let score = |poses: &[Pose]| known.by_ref().take(poses.len()).collect();
-        scan(lattice, least_covered, batch, score, |one| tell(one, trace))
+        scan(lattice, least_covered, batch, score, |some| tell(some, trace))
     }
 
     /// The cost at a pose if the view's pixels had nothing to do with the query's: what a minimum must beat to
     /// mean anything.
     fn shuffled_cost(&self, problem: &Problem, scorer: &Scorer<'_>, pose: &Pose) -> Option<f64> {
         let seed = problem.random_seed("shuffled pixels");
-        self.cost.evaluate(&shuffled(&scorer.pairs(pose), seed))
+        self.cost.statistic().cost(&shuffled(&scorer.pairs(pose), seed))
     }
 }
 
@@ -320,12 +316,15 @@ impl Search<'_, '_> {
     ) -> Result<Arc<ScoredLattice>, Cancelled> {
         let &mut Self { direct, problem, scorer, covered_at_reference, least_covered, .. } = self;
         let phase = lattice.phase;
-        let tell = |one: Scored, trace: &mut Trace<'_>| {
-            let evaluation = self.evaluations;
-            self.evaluations += 1;
-            trace.emit(|| PoseScored::new(phase, evaluation, one, covered_at_reference))?;
-            if one.is_best {
-                trace.emit(|| self.render(Moment::NewBest, one.offset))?;
+        let tell = |some: &[Scored], trace: &mut Trace<'_>| {
+            trace.checkpoint()?;
+            for &one in some {
+                let evaluation = self.evaluations;
+                self.evaluations += 1;
+                trace.emit(|| PoseScored::new(phase, evaluation, one, covered_at_reference))?;
+                if one.is_best {
+                    trace.emit(|| self.render(Moment::NewBest, one.offset))?;
+                }
             }
             Ok(())
         };

@@ -88,8 +88,8 @@ impl Estimator for Hybrid {
         self.estimate_with(problem, ask, trace)
     }
 
-    fn with_scorer(&self, problem: &Problem, work: &mut dyn FnMut(&Scorer<'_>)) -> bool {
-        self.second.with_scorer(problem, work)
+    fn scorer(&self, problem: &Problem) -> Option<Scorer<'_>> {
+        self.second.scorer(problem)
     }
 
     fn compare_at(&self, problem: &Problem, world_from_query: &Pose) -> Option<Comparison> {

@@ -19,11 +19,13 @@ use std::sync::Arc;
 
 pub use params::SixParams;
 
-use super::own::{self, View};
+use super::direct::Direct;
+use super::own;
 use super::{CostSummary, Estimator, Failure, Halt, Outcome, separate_failure};
-use crate::event::{Moment, PhaseSearched, PoseScored, Stage, StartsRefined};
+use crate::cost;
+use crate::event::{Moment, PhaseSearched, PoseScored, Stage, StartsRefined, ViewRendered};
 use crate::geometry::{Pose, PoseError};
-use crate::grid::{GridParams, Lattice, Offset, Phase, ScoredLattice, least_covered, scan};
+use crate::grid::{GridParams, Lattice, Offset, Phase, Scored, ScoredLattice, least_covered, scan};
 use crate::judge::{Freedoms, Judge, JudgeParams, Refined, Shrinking, Start, shrink};
 use crate::method::Method;
 use crate::params::Params;
@@ -62,7 +64,8 @@ pub struct SixFreedoms {
     judge: JudgeParams,
     /// How far outside the disc a pose may be, as a share of its radius.
     radius_slack: f64,
-    view: View,
+    /// What draws the pictures: grey values, explained by the joint histogram of MI.
+    view: Direct,
 }
 
 /// What the search found, in the frame of the reference camera.
@@ -114,13 +117,14 @@ fn middle(values: &mut [f64]) -> f64 {
 impl SixFreedoms {
     /// The estimator with these parameters.
     pub fn new(params: &Params) -> Self {
+        let shown = cost::ALL.iter().find(|entry| entry.name == "mi");
         Self {
             params: params.mi6.clone(),
             grid: params.grid.clone(),
             render: params.render.clone(),
             judge: params.judge.clone(),
             radius_slack: params.fb.radius_slack,
-            view: View::new(params),
+            view: Direct::new(shown.expect("the paper's cost is registered"), params),
         }
     }
 
@@ -164,6 +168,11 @@ impl SixFreedoms {
         problem.uncertainty_radius_m * (1.0 + self.radius_slack)
     }
 
+    /// The view at a pose beside the query, with the score that the judge gave it.
+    fn compare(&self, problem: &Problem, pose: &Pose, score: Score) -> Comparison {
+        Comparison { score, ..self.view.scorer_of(problem).compare(pose) }
+    }
+
     /// Searches all of the disc.
     pub(super) fn search(
         &self,
@@ -174,7 +183,13 @@ impl SixFreedoms {
         let lattices = self.lattices(problem, self.params.yaws)?;
         self.view.color(problem, trace)?;
         let initial = judge.score(&[Pose::identity()])[0];
-        trace.emit(|| self.view.render(problem, Moment::Start, 0, &Pose::identity(), initial))?;
+        let rendered = |moment, evaluation, pose: &Pose, score| ViewRendered {
+            moment,
+            evaluation,
+            offset: Offset::of(pose),
+            comparison: Arc::new(self.compare(problem, pose, score)),
+        };
+        trace.emit(|| rendered(Moment::Start, 0, &Pose::identity(), initial))?;
         let mut search = Search {
             judge,
             covered_at_reference: initial.covered,
@@ -243,9 +258,7 @@ impl SixFreedoms {
                 coverage_reference: f64::from(initial.covered) / area,
                 evaluations: search.evaluations,
             };
-            trace.emit(|| {
-                self.view.render(problem, Moment::End, search.evaluations - 1, &best.pose, score)
-            })?;
+            trace.emit(|| rendered(Moment::End, search.evaluations - 1, &best.pose, score))?;
             trace.emit(|| summary.assessed(Offset::of(&best.pose)))?;
             Ok(Found { refined, summary, spread })
         })
@@ -277,8 +290,8 @@ impl SixFreedoms {
         let mut surfaces = Vec::new();
         for lattice in self.lattices(problem, self.params.coarse_yaws)? {
             let score = |poses: &[Pose]| judge.score(poses);
-            let each = |_| trace.checkpoint();
-            let surface = scan(lattice, least_covered, judge.at_a_time(), score, each)?;
+            let silently = |_: &[Scored]| trace.checkpoint();
+            let surface = scan(lattice, least_covered, judge.at_a_time(), score, silently)?;
             surfaces.push(Arc::new(surface));
         }
         let mut costs = |poses: &[Pose]| {
@@ -339,7 +352,7 @@ impl Estimator for SixFreedoms {
     fn compare_at(&self, problem: &Problem, world_from_query: &Pose) -> Option<Comparison> {
         let pose = problem.reference_from_query(world_from_query);
         let score = self.judge(problem).score(&[pose])[0];
-        Some(self.view.compare(problem, &pose, score))
+        Some(self.compare(problem, &pose, score))
     }
 }
 
@@ -360,12 +373,16 @@ impl Search<'_> {
         let &mut Self { judge, covered_at_reference, least_covered, .. } = self;
         let phase = lattice.phase;
         let score = |poses: &[Pose]| judge.score(poses);
-        let each = |one| {
-            let evaluation = self.evaluations;
-            self.evaluations += 1;
-            trace.emit(|| PoseScored::new(phase, evaluation, one, covered_at_reference))
+        let tell = |some: &[Scored]| {
+            trace.checkpoint()?;
+            for &one in some {
+                let evaluation = self.evaluations;
+                self.evaluations += 1;
+                trace.emit(|| PoseScored::new(phase, evaluation, one, covered_at_reference))?;
+            }
+            Ok(())
         };
-        let surface = Arc::new(scan(lattice, least_covered, judge.at_a_time(), score, each)?);
+        let surface = Arc::new(scan(lattice, least_covered, judge.at_a_time(), score, tell)?);
         trace.emit(|| PhaseSearched {
             best: surface.minimum().and_then(|cell| surface.lattice.offset(cell)),
             surface: Arc::clone(&surface),

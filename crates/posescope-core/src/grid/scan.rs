@@ -15,17 +15,17 @@ pub struct Scored {
     pub is_best: bool,
 }
 
-/// Scores the hypotheses of a lattice in scan order, `batch` at a time, and passes each to `each`. A hypothesis
-/// is eligible from `least_covered` pixels.
+/// Scores the hypotheses of a lattice in scan order, `batch` at a time, and passes each batch to `tell`. A
+/// hypothesis is eligible from `least_covered` pixels.
 ///
 /// # Errors
-/// The errors of `each`, which end the scan.
+/// The errors of `tell`, which end the scan.
 pub fn scan<E>(
     lattice: Lattice,
     least_covered: u32,
     batch: usize,
     mut score: impl FnMut(&[Pose]) -> Vec<Score>,
-    mut each: impl FnMut(Scored) -> Result<(), E>,
+    mut tell: impl FnMut(&[Scored]) -> Result<(), E>,
 ) -> Result<ScoredLattice, E> {
     let mut scores = vec![None; lattice.cells()];
     let mut least: Option<f64> = None;
@@ -33,15 +33,16 @@ pub fn scan<E>(
     for some in hypotheses.chunks(batch.max(1)) {
         let poses: Vec<Pose> =
             some.iter().map(|(_, offset)| offset.reference_from_camera()).collect();
-        for (&(cell, offset), score) in some.iter().zip(score(&poses)) {
+        let scored = some.iter().zip(score(&poses)).map(|(&(cell, offset), score)| {
             scores[cell] = Some(score);
             let cost = score.eligible_cost(least_covered);
             let is_best = cost.is_some_and(|cost| least.is_none_or(|least| cost < least));
             if is_best {
                 least = cost;
             }
-            each(Scored { offset, score, is_best })?;
-        }
+            Scored { offset, score, is_best }
+        });
+        tell(&scored.collect::<Vec<_>>())?;
     }
     Ok(ScoredLattice { lattice, scores, least_covered })
 }
@@ -70,8 +71,8 @@ mod tests {
                 most = most.max(poses.len());
                 poses.iter().map(score).collect()
             };
-            let surface = scan(lattice(), 5, batch, score, |one| {
-                told.push(one);
+            let surface = scan(lattice(), 5, batch, score, |some| {
+                told.extend_from_slice(some);
                 Ok::<_, ()>(())
             });
             let surface = surface.expect("nobody stops it");

@@ -1,12 +1,11 @@
 //! What poses cost, many at once.
 
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::Arc;
 
 use nalgebra::Point3;
 use rand::SeedableRng as _;
 use rand::seq::SliceRandom as _;
 use rand_pcg::Pcg64;
-use rayon::prelude::*;
 
 use super::chance::corrected_distance;
 use super::channels::ChannelImages;
@@ -17,36 +16,21 @@ use crate::geometry::Pose;
 use crate::image::{GrayImage, cubic_interpolated};
 use crate::problem::Problem;
 use crate::render::{
-    Canvas, DepthCanvas, MOST_AT_A_TIME, PointArrays, RenderParams, Score, Values,
+    ColoredPoint, DepthCanvas, PointArrays, Pool, Rasterizer, RenderParams, Score, ShownPoints,
+    SplattedPixel, Values, at_a_time,
 };
-
-/// Poses that a thread takes at once.
-const PER_JOB: usize = 2;
 
 /// The bins of the three channels at one place.
 type Bins = [u8; 3];
 
 /// Scores query poses against one reference by the mean cost of three channels.
 pub struct Judge {
-    reference: Arc<ReferencePoints>,
+    reference: Arc<ShownPoints<Bins>>,
     query: Arc<Vec<Bins>>,
     intrinsics: Intrinsics,
     splat_px: usize,
     params: JudgeParams,
-    /// Those that no thread works with at present.
-    idle: Mutex<Vec<Worker>>,
-}
-
-/// The coloured points of a reference, as they are drawn.
-struct ReferencePoints {
-    positions: PointArrays,
-    bins: Vec<Bins>,
-}
-
-impl ReferencePoints {
-    fn heap_bytes(&self) -> usize {
-        self.bins.len() * (size_of::<Bins>() + 3 * size_of::<f32>())
-    }
+    pool: Pool<(DepthCanvas<Pair<Bins>>, Vec<u32>)>,
 }
 
 impl Judge {
@@ -65,7 +49,7 @@ impl Judge {
             .recall((params, shrink), bytes, || query_bins(&query.photo.gray, params, shrink));
         let reference = &problem.reference;
         let points =
-            reference.memo.recall((params, render, shrink), ReferencePoints::heap_bytes, || {
+            reference.memo.recall((params, render, shrink), ShownPoints::heap_bytes, || {
                 reference_points(problem, render, params, shrink)
             });
         Self {
@@ -74,32 +58,30 @@ impl Judge {
             intrinsics: shrunk_camera(&query.intrinsics, shrink),
             splat_px: render.splat_px,
             params: params.clone(),
-            idle: Mutex::default(),
+            pool: Pool::default(),
         }
     }
 
     /// Points that the reference camera sees.
     pub fn points(&self) -> usize {
-        self.reference.bins.len()
+        self.reference.values.len()
     }
 
     /// The scores of many cameras `reference_from_camera`, in their order, on all threads. `None` for
     /// the cost where no pixel is covered or all channels are constant, and for images of more than 16
     /// million pixels, which cannot be drawn.
     pub fn score(&self, reference_from_camera: &[Pose]) -> Vec<Score> {
-        let jobs = reference_from_camera.par_chunks(PER_JOB);
-        jobs.flat_map_iter(|poses| {
-            let idle = self.idle().pop();
-            let Some(mut worker) = idle.or_else(|| Worker::new(&self.intrinsics, self.splat_px))
-            else {
-                let nothing = Score { cost: None, covered: 0 };
-                return vec![nothing; poses.len()];
-            };
-            let scores = poses.iter().map(|pose| worker.score(self, pose)).collect();
-            self.idle().push(worker);
-            scores
+        if !DepthCanvas::<u8>::can_draw(&self.intrinsics, self.splat_px) {
+            return vec![Score { cost: None, covered: 0 }; reference_from_camera.len()];
+        }
+        let positions = &self.reference.positions;
+        let values = Values { query: &self.query, points: &self.reference.values };
+        let pair = |query, synthetic| Pair { query, synthetic };
+        let worker = || (DepthCanvas::new(&self.intrinsics, self.splat_px), Vec::new());
+        self.pool.score(reference_from_camera, worker, |(canvas, counts), pose| {
+            let pairs = canvas.draw(positions, values, &pose.inverse(), pair);
+            Score { cost: cost_of(pairs, &self.params, counts), covered: pairs.len() as u32 }
         })
-        .collect()
     }
 
     /// The costs of some poses, `None` for those that cover fewer than `least_covered` pixels.
@@ -111,53 +93,28 @@ impl Judge {
     /// The cost at a pose if the view's pixels had nothing to do with the query's: what a minimum must
     /// beat to mean anything.
     pub fn shuffled(&self, reference_from_camera: &Pose, seed: u64) -> Option<f64> {
-        // What is dealt to whom depends on the order of the pixels.
-        let mut canvas = Canvas::new(&self.intrinsics, self.splat_px)?;
-        let camera_from_points = reference_from_camera.inverse();
-        let positions = &self.reference.positions;
-        let drawn = canvas.draw(positions, self.values(), &camera_from_points);
-        let mut pairs = drawn.to_vec();
-        let mut dealt: Vec<Bins> = pairs.iter().map(|pair| pair.synthetic).collect();
+        // What is dealt to whom depends on the order of the pixels. Each point shows its own number.
+        let numbered = self.reference.positions.iter().zip(0_u32..);
+        let points: Vec<ColoredPoint> = numbered
+            .map(|(position, number)| ColoredPoint { position, intensity: number as f32 })
+            .collect();
+        let mut rasterizer = Rasterizer::new(&self.intrinsics, self.splat_px);
+        let pixels = rasterizer.splat(&points, &reference_from_camera.inverse());
+        let mut dealt: Vec<Bins> =
+            pixels.iter().map(|pixel| self.reference.values[pixel.intensity as usize]).collect();
         dealt.shuffle(&mut Pcg64::seed_from_u64(seed));
-        for (pair, synthetic) in pairs.iter_mut().zip(dealt) {
-            pair.synthetic = synthetic;
-        }
+        let pair = |(pixel, synthetic): (&SplattedPixel, Bins)| Pair {
+            query: self.query[pixel.index as usize],
+            synthetic,
+        };
+        let pairs: Vec<Pair<Bins>> = pixels.iter().zip(dealt).map(pair).collect();
         cost_of(&pairs, &self.params, &mut Vec::new())
     }
 
-    fn values(&self) -> Values<'_, Bins> {
-        Values { query: &self.query, points: &self.reference.bins }
-    }
-
     /// How many poses to score at a time, so that a run can be stopped soon: at most
-    /// [`MOST_AT_A_TIME`].
+    /// [`MOST_AT_A_TIME`](crate::render::MOST_AT_A_TIME).
     pub fn at_a_time(&self) -> usize {
-        (64 * rayon::current_num_threads()).min(MOST_AT_A_TIME)
-    }
-
-    fn idle(&self) -> MutexGuard<'_, Vec<Worker>> {
-        self.idle.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-}
-
-/// A canvas and the three histograms of what is drawn on it.
-struct Worker {
-    canvas: DepthCanvas<Pair<Bins>>,
-    counts: Vec<u32>,
-}
-
-impl Worker {
-    fn new(intrinsics: &Intrinsics, splat_px: usize) -> Option<Self> {
-        Some(Self { canvas: DepthCanvas::new(intrinsics, splat_px)?, counts: Vec::new() })
-    }
-
-    fn score(&mut self, judge: &Judge, reference_from_camera: &Pose) -> Score {
-        let Self { canvas, counts } = self;
-        let camera_from_points = reference_from_camera.inverse();
-        let positions = &judge.reference.positions;
-        let keep = |query, synthetic| Pair { query, synthetic };
-        let pairs = canvas.draw(positions, judge.values(), &camera_from_points, keep);
-        Score { cost: cost_of(pairs, &judge.params, counts), covered: pairs.len() as u32 }
+        at_a_time()
     }
 }
 
@@ -226,7 +183,7 @@ fn reference_points(
     render: &RenderParams,
     params: &JudgeParams,
     shrink: u32,
-) -> ReferencePoints {
+) -> ShownPoints<Bins> {
     let reference = &problem.reference;
     let photo = &reference.photo.gray;
     let (photo, params) = shrunk(photo, params, shrink);
@@ -245,7 +202,7 @@ fn reference_points(
         let values = [intensity, channels.value(1, x, y), channels.value(2, x, y)];
         binned(values, params.bins)
     });
-    ReferencePoints { bins: bins.collect(), positions: PointArrays::new(points.iter().copied()) }
+    ShownPoints { values: bins.collect(), positions: PointArrays::new(points.iter().copied()) }
 }
 
 /// The photo with squares of `shrink` × `shrink` pixels as its pixels, and the parameters for it.

@@ -257,14 +257,13 @@ fn costs_at(subject: &Subject<'_>, pose: &Pose) -> Vec<CostAtPose> {
     let mut costs = Vec::new();
     for entry in searching {
         let estimator = entry.make(subject.params);
-        estimator.with_scorer(problem, &mut |scorer| {
-            let scores = scorer.score(&poses);
-            costs.push(CostAtPose {
-                method: entry.method,
-                cost: scores[0].cost,
-                truth: scores.get(1).and_then(|score| score.cost),
-                coverage: f64::from(scores[0].covered) / problem.query.intrinsics.area(),
-            });
+        let Some(scorer) = estimator.scorer(problem) else { continue };
+        let scores = scorer.score(&poses);
+        costs.push(CostAtPose {
+            method: entry.method,
+            cost: scores[0].cost,
+            truth: scores.get(1).and_then(|score| score.cost),
+            coverage: f64::from(scores[0].covered) / problem.query.intrinsics.area(),
         });
     }
     costs
@@ -284,12 +283,9 @@ pub(super) fn evaluate_as(
     let Subject { problem, method, outcome, truth, .. } = *subject;
     let cost_at_truth = truth.filter(|_| outcome.cost.is_some()).and_then(|truth_pose| {
         let estimator = estimator::find(method)?.make(subject.params);
-        let truth = [problem.reference_from_query(truth_pose)];
-        let mut cost = None;
-        if estimator.with_scorer(problem, &mut |scorer| cost = scorer.score(&truth)[0].cost) {
-            cost
-        } else {
-            estimator.score_at(problem, truth_pose)?.cost
+        match estimator.scorer(problem) {
+            Some(scorer) => scorer.score(&[problem.reference_from_query(truth_pose)])[0].cost,
+            None => estimator.compare_at(problem, truth_pose)?.score.cost,
         }
     });
     let basin = truth.and_then(|truth| {

@@ -4,9 +4,8 @@ use std::hint::select_unpredictable;
 
 use fearless_simd::{Level, Simd, SimdBase as _, dispatch, f32x4};
 
-use super::canvas::{MOST_ROWS, Projected, ROW_BITS};
+use super::points::{MOST_ROWS, PointArrays, Projected, ROW_BITS, Values};
 use super::projection::{Eight, Projection};
-use super::{PointArrays, Values};
 use crate::camera::Intrinsics;
 use crate::geometry::Pose;
 
@@ -39,26 +38,34 @@ pub struct DepthCanvas<K> {
 }
 
 impl<K: Copy + Default> DepthCanvas<K> {
-    /// An empty canvas for a camera; each point covers a square of `splat_px` (odd) pixels. `None` for
-    /// an image of more than 16 million pixels, or 65,000 in a row.
-    pub fn new(intrinsics: &Intrinsics, splat_px: usize) -> Option<Self> {
+    /// Whether there is a canvas for a camera: not for more than 16 million pixels, or 65,000 in a row.
+    pub fn can_draw(intrinsics: &Intrinsics, splat_px: usize) -> bool {
+        let sides = Self::sides(intrinsics, splat_px / 2);
+        sides[0] * sides[1] <= MOST_PIXELS && sides[0].max(sides[1]) < MOST_ROWS
+    }
+
+    /// An empty canvas for a camera; each point covers a square of `splat_px` (odd) pixels.
+    ///
+    /// # Panics
+    /// Where the image is too large ([`Self::can_draw`]).
+    pub fn new(intrinsics: &Intrinsics, splat_px: usize) -> Self {
+        assert!(Self::can_draw(intrinsics, splat_px), "no canvas is so large");
         let reach = splat_px / 2;
-        let sides = [intrinsics.width, intrinsics.height].map(|side| side as usize + 4 * reach);
-        let pixels = sides[0] * sides[1];
-        (pixels <= MOST_PIXELS && sides[0].max(sides[1]) < MOST_ROWS).then(|| Self {
+        let sides = Self::sides(intrinsics, reach);
+        Self {
             level: Level::new(),
             intrinsics: *intrinsics,
             reach,
             // A row of three is written as one of four.
-            nearest: vec![NOTHING; pixels + 1],
+            nearest: vec![NOTHING; sides[0] * sides[1] + 1],
             projected: Projected::default(),
             kept: Vec::new(),
-        })
+        }
     }
 
-    /// From now on, what another camera of the same size sees.
-    pub fn look_through(&mut self, intrinsics: &Intrinsics) {
-        self.intrinsics = *intrinsics;
+    /// Columns and rows, those of the margin included.
+    fn sides(intrinsics: &Intrinsics, reach: usize) -> [usize; 2] {
+        [intrinsics.width, intrinsics.height].map(|side| side as usize + 4 * reach)
     }
 
     /// What `keep` makes of what the query, first, and a camera at `camera_from_points` show, at each pixel on
@@ -282,7 +289,7 @@ mod tests {
             let level = if baseline { Level::baseline() } else { Level::new() };
             let mut canvas = DepthCanvas {
                 level,
-                ..DepthCanvas::new(&small_camera(), splat_px).expect("a small image")
+                ..DepthCanvas::new(&small_camera(), splat_px)
             };
             let pixels: Vec<f32> = (0..63).map(|pixel| pixel as f32).collect();
             let intensities: Vec<f32> = points.iter().map(|point| point.intensity).collect();
@@ -311,7 +318,7 @@ mod tests {
         let arrays = PointArrays::new([point.position].into_iter());
         let values = Values { query: &[0.0; 63], points: &[7.0] };
         for splat_px in [1, 3] {
-            let mut canvas = DepthCanvas::new(&small_camera(), splat_px).expect("a small image");
+            let mut canvas = DepthCanvas::new(&small_camera(), splat_px);
             assert!(canvas.draw(&arrays, values, &twice_as_far, |_, seen| seen).is_empty());
             let mut plainly = Rasterizer::new(&small_camera(), splat_px);
             assert!(plainly.splat(&[point], &twice_as_far).is_empty());
@@ -321,6 +328,7 @@ mod tests {
     #[test]
     fn a_huge_image_has_no_canvas() {
         let huge = Intrinsics { width: 1 << 13, height: (1 << 11) + 1, ..small_camera() };
-        assert!(DepthCanvas::<u8>::new(&huge, 1).is_none());
+        assert!(!DepthCanvas::<u8>::can_draw(&huge, 1));
+        assert!(DepthCanvas::<u8>::can_draw(&small_camera(), 1));
     }
 }

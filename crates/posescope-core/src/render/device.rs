@@ -1,7 +1,7 @@
 //! Scoring many hypotheses on a processor of another kind, such as a graphics card.
 //!
 //! A [`Device`] does not compute costs. For each hypothesis it answers with whole numbers, a [`Tally`],
-//! and both the device and the threads end in the same formula, [`Tallying`]: numbers that are equal give
+//! and both the device and the threads end in the same formula, [`Statistic`]: numbers that are equal give
 //! costs that are equal to the last bit. Nothing that is reported depends on that alone. Of every batch
 //! some hypotheses are scored on the threads as well, and what a search reports always is
 //! ([`ScoredLattice::settle`](crate::grid::ScoredLattice::settle)); a device that disagrees is not asked
@@ -11,7 +11,7 @@ use std::fmt::Debug;
 use std::sync::{Arc, OnceLock};
 
 use super::{ColoredPoint, ProjectionRows, Score};
-use crate::cost::{Entropies, LesserHalf, Tallying};
+use crate::cost::{Entropies, LesserHalf, Statistic};
 use crate::method::Method;
 
 /// What scores many hypotheses at once, beside the threads of the processor. Which results it gives must
@@ -39,7 +39,7 @@ pub trait Loaded: Send + Sync {
 }
 
 /// What all hypotheses of a query have in common.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 pub struct Workload<'a> {
     /// The points in the reference camera. Of two at the same depth in a pixel the first is seen.
     pub points: &'a [ColoredPoint],
@@ -51,8 +51,8 @@ pub struct Workload<'a> {
     pub height: u32,
     /// Each point covers all pixels that are at most as many columns and rows from its own \[px\].
     pub reach: u32,
-    /// What is wanted of the pixels that are covered.
-    pub tallying: Tallying,
+    /// What decides the cost of the pixels that are covered: whole numbers.
+    pub statistic: &'a Statistic<'a>,
 }
 
 /// What the covered pixels of a hypothesis come to.
@@ -71,15 +71,15 @@ pub enum Tally {
 
 impl Tally {
     /// What the hypothesis is worth.
-    pub(super) fn score(&self, tallying: &Tallying) -> Score {
-        match (self, *tallying) {
-            (Self::Counts(counts), Tallying::Counts { bins, cost }) => {
+    pub(super) fn score(&self, statistic: &Statistic<'_>) -> Score {
+        match (self, statistic) {
+            (Self::Counts(counts), &Statistic::Histogram { bins, cost }) => {
                 Score { cost: cost(&Entropies::of(counts, bins)), covered: counts.iter().sum() }
             }
             (Self::LesserHalf { covered, half }, _) => {
                 Score { cost: half.mean(), covered: *covered }
             }
-            (Self::Counts(_), Tallying::LesserHalf) => Score { cost: None, covered: 0 },
+            (Self::Counts(_), _) => Score { cost: None, covered: 0 },
         }
     }
 }

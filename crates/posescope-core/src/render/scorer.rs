@@ -2,15 +2,18 @@
 
 mod on_device;
 
-use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
-
-use rayon::prelude::*;
+use std::sync::{Arc, OnceLock};
 
 use super::device::device_in_use;
-use super::worker::{Prepared, Worker};
-use super::{ColoredPoint, Rasterizer, Score, SplattedPixel, SyntheticView};
+use super::pool::{Pool, ShownPoints, at_a_time};
+use super::{
+    ColoredCloud, DepthCanvas, PointArrays, Rasterizer, Score, SplattedPixel, SyntheticView, Values,
+};
 use crate::camera::Intrinsics;
-use crate::cost::{Cost, Explanation, IntensityPair};
+use crate::cost::{
+    BinPair, Cost, Entropies, Explanation, IntensityPair, LesserHalfFinder, MOST_BYTE_BINS,
+    Statistic, byte_bin, count_pairs,
+};
 use crate::geometry::Pose;
 use crate::image::FloatImage;
 use on_device::OnDevice;
@@ -28,72 +31,65 @@ pub struct Comparison {
     pub explanation: Option<Explanation>,
 }
 
-/// Hypotheses that are scored between two checkpoints, at most: enough to keep eight threads busy.
-pub const MOST_AT_A_TIME: usize = 256;
-
-/// Hypotheses that a thread scores between two checkpoints. Of a street photo of 1241 × 376 px one
-/// takes some 50 µs, so that whoever wants to stop waits a few milliseconds.
-const PER_THREAD: usize = 64;
-
-/// Hypotheses that a thread takes at once. At the end of a batch the others wait for the last job: with 4 of
-/// 32 hypotheses for up to an eighth of the time, with 2 of 64 for a thirty-second.
-const PER_JOB: usize = 2;
-
 /// Renders the coloured cloud for a hypothesis and compares it with the query.
 pub struct Scorer<'a> {
-    points: &'a [ColoredPoint],
+    cloud: Arc<ColoredCloud>,
     query: Arc<FloatImage>,
     intrinsics: Intrinsics,
     splat_px: usize,
-    cost: &'a dyn Cost,
-    prepared: OnceLock<Arc<Prepared>>,
+    statistic: Statistic<'a>,
+    threads: OnceLock<Threads>,
     /// What scores many hypotheses instead of the threads.
     on_device: OnDevice,
-    /// Those that no thread works with at present.
-    idle: Mutex<Vec<Worker<'a>>>,
+}
+
+/// What all hypotheses have in common on the threads, as the statistic wants it.
+enum Threads {
+    /// The statistic may depend on the order of the pairs, or the image or the joint histogram is too large.
+    Plain(Pool<Rasterizer>),
+    LesserHalf {
+        points: Arc<ShownPoints<f32>>,
+        pool: Pool<(DepthCanvas<f32>, LesserHalfFinder)>,
+    },
+    Histogram {
+        bins: usize,
+        cost: fn(&Entropies) -> Option<f64>,
+        query: Arc<[u8]>,
+        points: Arc<ShownPoints<u8>>,
+        pool: Pool<(DepthCanvas<BinPair>, Vec<u32>)>,
+    },
 }
 
 impl<'a> Scorer<'a> {
     /// A scorer for one query. `query` is smoothed as the cost wants it and has the size that
     /// `intrinsics` says.
     pub fn new(
-        points: &'a [ColoredPoint],
+        cloud: impl Into<Arc<ColoredCloud>>,
         query: Arc<FloatImage>,
         intrinsics: &Intrinsics,
         splat_px: usize,
         cost: &'a dyn Cost,
     ) -> Self {
         Self {
-            points,
+            cloud: cloud.into(),
             query,
             intrinsics: *intrinsics,
             splat_px,
-            cost,
-            prepared: OnceLock::new(),
+            statistic: cost.statistic(),
+            threads: OnceLock::new(),
             on_device: OnDevice::new(device_in_use()),
-            idle: Mutex::default(),
         }
     }
 
-    /// The same query as another camera of the same size would have taken it.
-    #[must_use]
-    pub fn seen_by(&self, intrinsics: &Intrinsics) -> Self {
-        Self {
-            points: self.points,
-            query: Arc::clone(&self.query),
-            intrinsics: *intrinsics,
-            splat_px: self.splat_px,
-            cost: self.cost,
-            prepared: self.prepared.clone(),
-            on_device: self.on_device.unused(),
-            idle: Mutex::default(),
-        }
+    /// What decides the cost.
+    pub fn statistic(&self) -> &Statistic<'a> {
+        &self.statistic
     }
 
     /// How many cameras to score at a time: few enough that a run can be stopped soon, enough for all
-    /// threads of the current pool. At most [`MOST_AT_A_TIME`].
+    /// threads of the current pool. At most [`MOST_AT_A_TIME`](super::MOST_AT_A_TIME).
     pub fn at_a_time(&self) -> usize {
-        (PER_THREAD * rayon::current_num_threads()).min(MOST_AT_A_TIME)
+        at_a_time()
     }
 
     /// The scores of many cameras `reference_from_camera`, in their order, on the device where there is
@@ -105,73 +101,81 @@ impl<'a> Scorer<'a> {
 
     /// The scores of many cameras `reference_from_camera`, in their order, on all threads.
     pub(crate) fn score_on_threads(&self, reference_from_camera: &[Pose]) -> Vec<Score> {
-        let prepared = self.prepared();
-        let score = |worker: &mut Option<Worker<'_>>, pose: &Pose| match worker {
-            Some(worker) => worker.score(prepared, &self.query, &pose.inverse()),
-            None => self.compare(pose).score,
-        };
-        reference_from_camera
-            .par_chunks(PER_JOB)
-            .flat_map_iter(|poses| {
-                self.with_worker(prepared, |worker| {
-                    poses.iter().map(|pose| score(worker, pose)).collect::<Vec<Score>>()
+        let (poses, query) = (reference_from_camera, self.query.as_raw().as_slice());
+        let score = |cost, covered: usize| Score { cost, covered: covered as u32 };
+        match self.threads() {
+            Threads::Plain(pool) => pool.score(
+                poses,
+                || self.rasterizer(),
+                |rasterizer, pose| {
+                    let pixels = rasterizer.splat(&self.cloud.points, &pose.inverse());
+                    self.score_of(&self.pair_up(pixels))
+                },
+            ),
+            Threads::LesserHalf { points, pool } => {
+                let values = Values { query, points: &points.values };
+                let error =
+                    |query, synthetic| IntensityPair { query, synthetic }.squared_difference();
+                let worker = || (self.canvas(), LesserHalfFinder::default());
+                pool.score(poses, worker, |(canvas, halves), pose| {
+                    let errors = canvas.draw(&points.positions, values, &pose.inverse(), error);
+                    score(halves.mean(errors), errors.len())
                 })
-            })
-            .collect()
+            }
+            Threads::Histogram { bins, cost, query, points, pool } => {
+                let values = Values { query, points: &points.values };
+                let pair = |query, synthetic| BinPair { query, synthetic };
+                let worker = || (self.canvas(), Vec::new());
+                pool.score(poses, worker, |(canvas, counts), pose| {
+                    let pairs = canvas.draw(&points.positions, values, &pose.inverse(), pair);
+                    count_pairs(pairs, *bins, counts);
+                    score(cost(&Entropies::of(counts, *bins)), pairs.len())
+                })
+            }
+        }
     }
 
-    /// The scores of one pose as cameras of the same size have them that are built otherwise, in their
-    /// order, on all threads.
-    pub fn score_seen_by(
-        &self,
-        cameras: &[Intrinsics],
-        reference_from_camera: &Pose,
-    ) -> Vec<Score> {
-        let prepared = self.prepared();
-        let camera_from_points = reference_from_camera.inverse();
-        let score = |camera: &Intrinsics| {
-            self.with_worker(prepared, |worker| match worker {
-                Some(worker) => {
-                    worker.look_through(camera);
-                    let score = worker.score(prepared, &self.query, &camera_from_points);
-                    worker.look_through(&self.intrinsics);
-                    score
+    fn threads(&self) -> &Threads {
+        self.threads.get_or_init(|| {
+            let positions = || PointArrays::new(self.cloud.points.iter().map(|p| p.position));
+            let values = self.cloud.points.iter().map(|point| point.intensity);
+            let is_large = !DepthCanvas::<u8>::can_draw(&self.intrinsics, self.splat_px);
+            match self.statistic {
+                _ if is_large => Threads::Plain(Pool::default()),
+                Statistic::LesserHalf { power: 1 } => Threads::LesserHalf {
+                    points: Arc::new(ShownPoints {
+                        positions: positions(),
+                        values: values.collect(),
+                    }),
+                    pool: Pool::default(),
+                },
+                Statistic::Histogram { bins, cost } if bins <= MOST_BYTE_BINS => {
+                    let bin = |value: f32| byte_bin(value, bins);
+                    let values = values.map(bin).collect();
+                    Threads::Histogram {
+                        bins,
+                        cost,
+                        query: self.query.iter().copied().map(bin).collect(),
+                        points: Arc::new(ShownPoints { positions: positions(), values }),
+                        pool: Pool::default(),
+                    }
                 }
-                None => self.seen_by(camera).compare(reference_from_camera).score,
-            })
-        };
-        cameras.par_iter().map(score).collect()
+                _ => Threads::Plain(Pool::default()),
+            }
+        })
     }
 
-    fn prepared(&self) -> &Prepared {
-        self.prepared.get_or_init(|| Arc::new(Prepared::new(self.points, &self.query, self.cost)))
-    }
-
-    /// Work for an idle worker, or a new one; `None` where the plain way is the only one.
-    fn with_worker<R>(
-        &self,
-        prepared: &Prepared,
-        work: impl FnOnce(&mut Option<Worker<'a>>) -> R,
-    ) -> R {
-        let idle = self.idle().pop();
-        let mut worker =
-            idle.or_else(|| Worker::new(self.cost, prepared, &self.intrinsics, self.splat_px));
-        let done = work(&mut worker);
-        self.idle().extend(worker);
-        done
-    }
-
-    fn idle(&self) -> MutexGuard<'_, Vec<Worker<'a>>> {
-        self.idle.lock().unwrap_or_else(PoisonError::into_inner)
+    fn canvas<K: Copy + Default>(&self) -> DepthCanvas<K> {
+        DepthCanvas::new(&self.intrinsics, self.splat_px)
     }
 
     /// The synthetic view of one camera beside the query.
     pub fn compare(&self, reference_from_camera: &Pose) -> Comparison {
-        let view = self.rasterizer().view(self.points, &reference_from_camera.inverse());
-        let pairs: Vec<IntensityPair> = self.pair_up(&view.pixels).collect();
+        let view = self.rasterizer().view(&self.cloud.points, &reference_from_camera.inverse());
+        let pairs = self.pair_up(&view.pixels);
         Comparison {
-            score: Score { cost: self.cost.evaluate(&pairs), covered: pairs.len() as u32 },
-            explanation: self.cost.explain(&pairs),
+            score: self.score_of(&pairs),
+            explanation: self.statistic.explain(&pairs),
             view,
             pairs,
         }
@@ -180,23 +184,24 @@ impl<'a> Scorer<'a> {
     /// Query and view of one camera at each covered pixel, as [`Self::compare`] pairs them up.
     pub fn pairs(&self, reference_from_camera: &Pose) -> Vec<IntensityPair> {
         let mut rasterizer = self.rasterizer();
-        let view = rasterizer.view(self.points, &reference_from_camera.inverse());
-        self.pair_up(&view.pixels).collect()
+        self.pair_up(rasterizer.splat(&self.cloud.points, &reference_from_camera.inverse()))
+    }
+
+    fn score_of(&self, pairs: &[IntensityPair]) -> Score {
+        Score { cost: self.statistic.cost(pairs), covered: pairs.len() as u32 }
     }
 
     fn rasterizer(&self) -> Rasterizer {
         Rasterizer::new(&self.intrinsics, self.splat_px)
     }
 
-    fn pair_up<'p>(
-        &self,
-        pixels: &'p [SplattedPixel],
-    ) -> impl Iterator<Item = IntensityPair> + use<'_, 'p, 'a> {
+    fn pair_up(&self, pixels: &[SplattedPixel]) -> Vec<IntensityPair> {
         let query: &[f32] = &self.query;
-        pixels.iter().map(move |pixel| IntensityPair {
+        let pair = |pixel: &SplattedPixel| IntensityPair {
             query: query[pixel.index as usize],
             synthetic: pixel.intensity,
-        })
+        };
+        pixels.iter().map(pair).collect()
     }
 }
 
@@ -204,11 +209,11 @@ impl<'a> Scorer<'a> {
 mod tests {
     use super::*;
     use crate::cost;
-    use crate::render::small_camera;
+    use crate::render::{ColoredPoint, small_camera};
     use nalgebra::Point3;
 
     #[test]
-    fn a_pose_costs_what_another_camera_sees_and_the_own_one_looks_on_after_it() {
+    fn a_pose_costs_the_same_scored_and_compared() {
         let point = |i: u16| ColoredPoint {
             position: Point3::new(
                 f32::from(i % 9) / 4.0 - 1.0,
@@ -217,25 +222,17 @@ mod tests {
             ),
             intensity: f32::from(i * 37 % 256),
         };
-        let points: Vec<ColoredPoint> = (0..200).map(point).collect();
+        let points = (0..200).map(point).collect();
+        let cloud = Arc::new(ColoredCloud { points, ..ColoredCloud::default() });
         let values = |x: u32, y: u32| image::Luma([(x * 29 + y * 31) as f32 % 256.0]);
         let query = Arc::new(FloatImage::from_fn(9, 7, values));
-        let cameras = [0.8, 1.0, 1.3].map(|times| Intrinsics {
-            fx: 10.0 * times,
-            fy: 10.0 * times,
-            cx: 4.0 + times,
-            ..small_camera()
-        });
         let pose = Pose::translation(0.1, 0.0, 0.3);
         for entry in cost::ALL {
-            let cost = (entry.params)().cost();
-            let query = Arc::clone(&query);
-            let scorer = Scorer::new(&points, query, &small_camera(), 1, cost.as_ref());
-            let before = scorer.score(&[pose]);
-            let expected = cameras.map(|camera| scorer.seen_by(&camera).compare(&pose).score);
-            assert_eq!(scorer.score_seen_by(&cameras, &pose), expected, "{}", entry.name);
-            assert_eq!(scorer.score(&[pose]), before, "{}", entry.name);
+            let cost = (entry.make)();
+            let (cloud, query) = (Arc::clone(&cloud), Arc::clone(&query));
+            let scorer = Scorer::new(cloud, query, &small_camera(), 1, cost.as_ref());
             let compared = scorer.compare(&pose);
+            assert_eq!(scorer.score(&[pose]), [compared.score], "{}", entry.name);
             assert_eq!(scorer.pairs(&pose).len(), compared.pairs.len());
         }
     }

@@ -7,9 +7,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use image::{GrayImage, Luma};
 use nalgebra::Point3;
 use posescope_core::cloud::Cloud;
-use posescope_core::cost::{
-    self, Cost, Entropies, Evaluator, Explanation, IntensityPair, JointHistogram,
-};
+use posescope_core::cost::{self, Cost, Entropies, IntensityPair, Photometric, Statistic};
 use posescope_core::diagnosis::Code;
 use posescope_core::estimator::{self, Outcome, Parts};
 use posescope_core::event::{
@@ -265,22 +263,18 @@ fn a_run_that_is_stopped_wherever_it_looks_up_ends_there() {
     }
 }
 
-/// Counts what it judges.
-struct Counting(AtomicUsize);
+/// A cost that looks at each pair in a way of its own.
+struct Own<F>(F);
 
-impl Cost for Counting {
+impl<F: Fn(&[IntensityPair]) -> Option<f64> + Send + Sync> Cost for Own<F> {
     fn query_channel(&self, photo: &GrayImage) -> FloatImage {
         gaussian_smoothed(photo, 0.0)
     }
     fn query_channel_key(&self) -> Key {
         key("grey")
     }
-    fn evaluate(&self, pairs: &[IntensityPair]) -> Option<f64> {
-        self.0.fetch_add(1, Ordering::Relaxed);
-        Some(pairs.len() as f64)
-    }
-    fn explain(&self, _pairs: &[IntensityPair]) -> Option<Explanation> {
-        None
+    fn statistic(&self) -> Statistic<'_> {
+        Statistic::of_pairs(&self.0)
     }
 }
 
@@ -295,12 +289,16 @@ fn what_is_scored_at_a_time_is_bounded_and_scored_once() {
         &reference.intrinsics,
         &Params::default().render,
     );
-    let cost = Counting(AtomicUsize::new(0));
-    let scorer = Scorer::new(&cloud.points, query, &CAMERA, 1, &cost);
+    let judged = AtomicUsize::new(0);
+    let cost = Own(|pairs: &[IntensityPair]| {
+        judged.fetch_add(1, Ordering::Relaxed);
+        Some(pairs.len() as f64)
+    });
+    let scorer = Scorer::new(cloud, query, &CAMERA, 1, &cost);
     assert!(on_many_threads(|| scorer.at_a_time()) <= 300);
     let poses: Vec<_> = (0..70).map(|i| Pose::translation(0.0, 0.0, 0.02 * f64::from(i))).collect();
     let at_once = scorer.score(&poses);
-    assert_eq!(cost.0.load(Ordering::Relaxed), poses.len());
+    assert_eq!(judged.load(Ordering::Relaxed), poses.len());
     let one_by_one: Vec<_> =
         poses.iter().flat_map(|pose| scorer.score(std::slice::from_ref(pose))).collect();
     assert_eq!(at_once, one_by_one);
@@ -316,31 +314,38 @@ impl Cost for ManyBins {
     fn query_channel_key(&self) -> Key {
         key("smooth")
     }
-    fn evaluate(&self, pairs: &[IntensityPair]) -> Option<f64> {
-        let histogram = JointHistogram::of(pairs, self.0);
-        histogram.entropies().normalized_mutual_information()
+    fn statistic(&self) -> Statistic<'_> {
+        let cost = Entropies::normalized_mutual_information;
+        Statistic::Histogram { bins: self.0, cost }
     }
-    fn evaluator(&self) -> Evaluator<'_> {
-        Evaluator::of_entropies(self.0, Entropies::normalized_mutual_information)
-    }
+}
+
+/// What depends on the order of the pairs.
+fn in_order(pairs: &[IntensityPair]) -> Option<f64> {
+    let weighed =
+        (1..).zip(pairs).map(|(place, pair)| f64::from(place) * f64::from(pair.synthetic));
+    Some(weighed.sum())
 }
 
 #[test]
 fn what_the_search_scores_is_what_the_view_shows() {
     let problem = solvable();
     let reference = &problem.reference;
-    let registered = cost::ALL.iter().map(|entry| (entry.params)().cost());
+    let registered = cost::ALL.iter().map(|entry| (entry.make)() as Box<dyn Cost>);
     // More bins than a byte tells apart are scored the plain way.
-    let own = [16, 256, 300].map(|bins| Box::new(ManyBins(bins)) as Box<dyn Cost>);
+    let many = [16, 256, 300].map(|bins| Box::new(ManyBins(bins)) as Box<dyn Cost>);
+    let squared_again: Box<dyn Cost> = Box::new(Photometric { power: 2, ..Photometric::default() });
+    let own = [squared_again, Box::new(Own(in_order))];
     let poses: Vec<_> =
         (0..9).map(|i| Pose::translation(0.1 * f64::from(i), 0.0, 0.3 * f64::from(i))).collect();
-    for cost in registered.chain(own) {
+    for cost in registered.chain(many).chain(own) {
         let visible = reference.visible_cloud(&Params::default().render);
         let cloud = visible.colored_by(cost.reference_channel(&reference.photo.gray));
-        let query = Arc::new(cost.query_channel(&problem.query.photo.gray));
+        let (cloud, query) =
+            (Arc::new(cloud), Arc::new(cost.query_channel(&problem.query.photo.gray)));
         for splat_px in [1, 3] {
-            let query = Arc::clone(&query);
-            let scorer = Scorer::new(&cloud.points, query, &CAMERA, splat_px, cost.as_ref());
+            let (cloud, query) = (Arc::clone(&cloud), Arc::clone(&query));
+            let scorer = Scorer::new(cloud, query, &CAMERA, splat_px, cost.as_ref());
             let shown: Vec<_> = poses.iter().map(|pose| scorer.compare(pose).score).collect();
             assert!(shown.iter().all(|score| score.cost.is_some()));
             assert_eq!(scorer.score(&poses), shown);

@@ -1,5 +1,6 @@
 //! The ways of a library's user: one call for one query, a cost of one's own.
 
+use posescope_core::cost::Statistic;
 use posescope_core::event::{Stage, StageEnded, ViewRendered};
 use posescope_core::image::{FloatImage, GrayImage, gaussian_smoothed};
 use posescope_core::memo::{Key, key};
@@ -23,9 +24,11 @@ impl Cost for Mean {
         key("grey")
     }
 
-    fn evaluate(&self, pairs: &[IntensityPair]) -> Option<f64> {
-        let sum: f64 = pairs.iter().map(self.0).sum();
-        (!pairs.is_empty()).then(|| sum / pairs.len() as f64)
+    fn statistic(&self) -> Statistic<'_> {
+        Statistic::of_pairs(|pairs| {
+            let sum: f64 = pairs.iter().map(self.0).sum();
+            (!pairs.is_empty()).then(|| sum / pairs.len() as f64)
+        })
     }
 }
 

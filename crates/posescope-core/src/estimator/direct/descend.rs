@@ -6,12 +6,12 @@ use image::GrayImage;
 use nalgebra::Point3;
 
 use super::Direct;
-use crate::cost::SmoothCost;
+use crate::cost::Statistic;
 use crate::descent::{Step, View, information, photometric};
 use crate::estimator::{CostSummary, Failure, Halt};
 use crate::event::{DescentStepped, Moment, PhaseSearched, Stage, ViewRendered};
 use crate::geometry::Pose;
-use crate::grid::{Lattice, Offset, Phase, least_covered};
+use crate::grid::{Lattice, Offset, Phase, Scored, least_covered};
 use crate::image::{FloatImage, gaussian_smoothed};
 use crate::problem::Problem;
 use crate::render::{ColoredCloud, Score, Scorer};
@@ -30,12 +30,11 @@ impl Direct {
     /// places.
     pub(super) fn descend(
         &self,
-        smooth: SmoothCost,
         problem: &Problem,
         trace: &mut Trace<'_>,
     ) -> Result<(Pose, CostSummary), Halt> {
-        let cloud = self.colored_and_told(problem, trace)?;
-        let scorer = self.scorer(problem, &cloud);
+        let cloud = self.color(problem, trace)?;
+        let scorer = self.scorer_of(problem);
         trace.checkpoint()?;
         let initial = scorer.score(&[Pose::identity()])[0];
         let mut standing =
@@ -77,11 +76,12 @@ impl Direct {
                 let copies = Copies::new(self, problem, level);
                 let view = copies.view(problem, &cloud, &start, self.descent.most_points);
                 let most_steps = self.descent.most_steps;
-                match smooth {
-                    SmoothCost::Differences => photometric::descend(&view, most_steps, told),
-                    SmoothCost::Information { bins } => {
+                match self.cost.statistic() {
+                    Statistic::Histogram { bins, .. } => {
                         information::descend(&view, bins, most_steps, told)
                     }
+                    // Of other costs, the one that looks at differences can be descended.
+                    _ => photometric::descend(&view, most_steps, told),
                 }?;
             }
             Ok::<_, Halt>(())
@@ -128,7 +128,7 @@ impl Direct {
         let lattice = lattice.map_err(Failure::from)?;
         trace.stage(Stage::Search(phase), |trace| {
             let least = least_covered(self.grid.coverage_floor, initial.covered);
-            let silently = |_, trace: &mut Trace<'_>| trace.checkpoint();
+            let silently = |_: &[Scored], trace: &mut Trace<'_>| trace.checkpoint();
             let surface = self.scored(problem, scorer, lattice, least, trace, silently)?;
             // It leads nowhere: the descent begins at the reference.
             trace.emit(|| PhaseSearched { surface: Arc::new(surface), best: None })?;

@@ -12,7 +12,7 @@ use crate::grid::{Lattice, Offset, ScoredLattice, least_covered, scan};
 use crate::judge::{Freedoms, Shrinking, Start, shrink};
 use crate::params::Params;
 use crate::problem::Problem;
-use crate::render::{ColoredCloud, Score, Scorer};
+use crate::render::{Score, Scorer};
 use crate::trace::{Cancelled, Trace};
 
 /// The estimator that searches the least cost over several references.
@@ -78,18 +78,13 @@ impl JointDirect {
         let lead = references[lead(references)].problem;
         let (grid, radius_m) = (&self.direct.grid, lead.uncertainty_radius_m);
         check_size(grid, radius_m)?;
-        let mut clouds = Vec::new();
-        for reference in references {
-            trace.checkpoint()?;
-            clouds.push(self.direct.colored(reference.problem).value);
-        }
         let mut members = Vec::new();
-        for (index, (reference, cloud)) in references.iter().zip(&clouds).enumerate() {
-            if cloud.points.is_empty() {
-                continue;
-            }
+        for (index, reference) in references.iter().enumerate() {
             trace.checkpoint()?;
-            members.push(self.member(index, reference.problem, lead, cloud));
+            if !self.direct.colored(reference.problem).value.points.is_empty() {
+                trace.checkpoint()?;
+                members.push(self.member(index, reference.problem, lead));
+            }
         }
         if members.is_empty() {
             let clouds = references.iter().map(|r| r.problem.reference.cloud.len());
@@ -127,14 +122,8 @@ impl JointDirect {
         Ok((lead.world_from_query(&lead_from_query), supports))
     }
 
-    fn member<'a>(
-        &'a self,
-        index: usize,
-        problem: &Problem,
-        lead: &Problem,
-        cloud: &'a ColoredCloud,
-    ) -> Member<'a> {
-        let scorer = self.direct.scorer(problem, cloud);
+    fn member(&self, index: usize, problem: &Problem, lead: &Problem) -> Member<'_> {
+        let scorer = self.direct.scorer_of(problem);
         let at_reference = scorer.score(&[Pose::identity()])[0];
         Member {
             index,

@@ -28,11 +28,6 @@ impl OnDevice {
     pub fn new(device: Option<Arc<dyn Device>>) -> Self {
         Self { device, loaded: OnceLock::new(), is_used: AtomicBool::new(false) }
     }
-
-    /// The same device, for another scorer.
-    pub fn unused(&self) -> Self {
-        Self::new(self.device.clone())
-    }
 }
 
 impl Scorer<'_> {
@@ -68,16 +63,19 @@ impl Scorer<'_> {
         let OnDevice { device, loaded, .. } = &self.on_device;
         let device = device.as_ref()?;
         device.batch(reference_from_camera.len())?;
-        let tallying = self.cost.tallying()?;
+        let statistic = &self.statistic;
+        if !statistic.is_counted() {
+            return None;
+        }
         let reach = self.splat_px / 2;
         let load = || {
             device.load(&Workload {
-                points: self.points,
+                points: &self.cloud.points,
                 query: &self.query,
                 width: self.intrinsics.width,
                 height: self.intrinsics.height,
                 reach: reach as u32,
-                tallying,
+                statistic,
             })
         };
         let loaded = loaded.get_or_init(load).as_ref()?;
@@ -85,7 +83,7 @@ impl Scorer<'_> {
             |pose: &Pose| Projection::new(&self.intrinsics, reach as i32, &pose.inverse()).rows();
         let projections: Vec<_> = reference_from_camera.iter().map(rows).collect();
         let tallies = loaded.tally(&projections)?;
-        let scored = tallies.par_iter().map(|tally| Some(tally.as_ref()?.score(&tallying)));
+        let scored = tallies.par_iter().map(|tally| Some(tally.as_ref()?.score(statistic)));
         let scored: Vec<Option<Score>> = scored.collect();
 
         let (places, again) = self.checked(reference_from_camera, &scored);
@@ -132,10 +130,12 @@ mod tests {
     use nalgebra::Point3;
 
     use super::*;
-    use crate::cost::{self, JointHistogram, Tallying};
+    use crate::cost::{self, JointHistogram, Statistic};
     use crate::image::FloatImage;
     use crate::method::Method;
-    use crate::render::{ColoredPoint, ProjectionRows, Rasterizer, Tally, small_camera};
+    use crate::render::{
+        ColoredCloud, ColoredPoint, ProjectionRows, Rasterizer, Tally, small_camera,
+    };
 
     /// A device that draws plainly, and perhaps tells a lie.
     #[derive(Debug, Default)]
@@ -158,7 +158,7 @@ mod tests {
         }
 
         fn load(&self, workload: &Workload<'_>) -> Option<Box<dyn Loaded>> {
-            let Tallying::Counts { bins, .. } = workload.tallying else {
+            let &Statistic::Histogram { bins, .. } = workload.statistic else {
                 return None;
             };
             Some(Box::new(PlainlyLoaded {
@@ -218,14 +218,14 @@ mod tests {
 
     #[test]
     fn a_device_gives_the_scores_of_the_threads_and_one_that_lies_is_not_asked_again() {
-        let points = points();
+        let cloud = Arc::new(ColoredCloud { points: points(), ..ColoredCloud::default() });
         let values = |x: u32, y: u32| image::Luma([(x * 29 + y * 31) as f32 % 256.0]);
         let query = Arc::new(FloatImage::from_fn(9, 7, values));
         let entry = cost::ALL.iter().find(|entry| entry.name == "mi");
-        let cost = (entry.expect("it is registered").params)().cost();
+        let cost = (entry.expect("it is registered").make)();
         let scorer = |device: Option<Arc<dyn Device>>| {
-            let query = Arc::clone(&query);
-            Scorer::new(&points, query, &small_camera(), 1, cost.as_ref()).on(device)
+            let (cloud, query) = (Arc::clone(&cloud), Arc::clone(&query));
+            Scorer::new(cloud, query, &small_camera(), 1, cost.as_ref()).on(device)
         };
         let poses: Vec<Pose> = (0..40)
             .map(|i| Pose::translation(f64::from(i % 8) / 4.0 - 1.0, 0.0, f64::from(i / 8) / 4.0))
