@@ -18,23 +18,23 @@ use crate::solver::Correspondence;
 use crate::stats::mean_and_squares;
 
 /// A result that is wrong, missing or perhaps uncertain.
-pub struct Case<'a, 'cost> {
+pub struct Case<'a> {
     pub(super) subject: &'a Subject<'a>,
     pub(super) family: Family,
     /// The method whose pose it is: of a hybrid the one that it took.
     pub(super) responsible: Method,
     /// The search on a grid, or what stands for one.
-    pub(super) search: Option<&'a Search<'a, 'cost>>,
+    pub(super) search: Option<&'a Search<'a>>,
     matches: OnceCell<Option<TrueMatches>>,
     starts: OnceCell<Option<Starts>>,
     contrast: OnceCell<f64>,
 }
 
-impl<'a, 'cost> Case<'a, 'cost> {
+impl<'a> Case<'a> {
     pub(super) fn new(
         subject: &'a Subject<'a>,
         family: Family,
-        search: Option<&'a Search<'a, 'cost>>,
+        search: Option<&'a Search<'a>>,
     ) -> Self {
         Self {
             subject,

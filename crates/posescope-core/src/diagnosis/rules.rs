@@ -140,7 +140,7 @@ impl Rule {
 #[derive(Clone, Copy, Debug)]
 pub enum Test {
     /// By what one method did with one reference.
-    Method(fn(&Case<'_, '_>) -> Option<Diagnosis>),
+    Method(fn(&Case<'_>) -> Option<Diagnosis>),
     /// By what each reference of a fusion gave.
     Fusion(fn(&FusionCase<'_>) -> Option<Diagnosis>),
     /// By how references were ranked.

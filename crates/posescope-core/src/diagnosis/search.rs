@@ -8,16 +8,17 @@
 
 use std::sync::{Mutex, OnceLock, PoisonError};
 
-use nalgebra::{Translation3, UnitQuaternion, Vector3};
 use rayon::prelude::*;
 
 use super::Subject;
 use super::confidence;
 use super::descent::compass_search;
+use super::family::Family;
 use crate::cost::shuffled;
-use crate::estimator;
+use crate::estimator::{self, Estimator};
 use crate::geometry::{Pose, PoseError, yaw};
 use crate::grid::{GridParams, Offset, Phase, least_covered};
+use crate::judge::moved;
 use crate::method::Method;
 use crate::render::{Score, Scorer};
 use crate::stats::mean_and_squares;
@@ -81,9 +82,9 @@ pub(super) struct Rivals {
 }
 
 /// A finished search, and the truth in the reference camera's frame.
-pub(super) struct Search<'a, 'cost> {
+pub(super) struct Search<'a> {
     pub(super) subject: &'a Subject<'a>,
-    pub(super) scorer: &'a Scorer<'cost>,
+    pub(super) scorer: Scorer<'a>,
     pub(super) grid: &'a GridParams,
     pub(super) truth: Pose,
     /// The pose that it ended in.
@@ -100,39 +101,41 @@ pub(super) struct Search<'a, 'cost> {
     against_chance: Mutex<Vec<(Offset, Option<AgainstChance>)>>,
 }
 
-impl Search<'_, '_> {
-    /// Hands `work` the search that the subject's method ended, or what stands for one; `None` where there
-    /// is none, or no truth to compare with.
-    pub(super) fn of<T>(
-        subject: &Subject<'_>,
-        is_given: bool,
-        work: impl FnOnce(Option<&Search<'_, '_>>) -> T,
-    ) -> T {
-        let responsible =
-            if is_given { JUDGE } else { confidence::responsible(subject.method, subject.outcome) };
-        let entry = estimator::find(responsible);
-        let (Some(truth), Some(entry)) = (subject.reference_from_truth(), entry) else {
-            return work(None);
-        };
-        let estimator = entry.make(subject.params);
-        let Some(scorer) = estimator.scorer(subject.problem) else {
-            return work(None);
-        };
+/// The estimator whose cost is compared at the result and the truth: that of the method, or of [`JUDGE`].
+pub(super) fn estimator_of(subject: &Subject<'_>, family: Family) -> Option<Box<dyn Estimator>> {
+    let method = match family {
+        Family::Grid => confidence::responsible(subject.method, subject.outcome),
+        Family::Given => JUDGE,
+        _ => return None,
+    };
+    Some(estimator::find(method)?.make(subject.params))
+}
+
+impl<'a> Search<'a> {
+    /// The search that the subject's method ended, or what stands for one; `None` without the truth.
+    pub(super) fn of(
+        subject: &'a Subject<'a>,
+        family: Family,
+        estimator: &'a dyn Estimator,
+    ) -> Option<Self> {
+        let truth = subject.reference_from_truth()?;
+        let scorer = estimator.scorer(subject.problem)?;
+        let is_given = family == Family::Given;
         let ended = if is_given { ended_as_given(subject, &scorer) } else { ended(subject) };
-        let search = ended.map(|ended| Search {
+        let (result, result_cost, least_covered) = ended?;
+        Some(Self {
             subject,
-            scorer: &scorer,
+            scorer,
             grid: &subject.params.grid,
             truth,
-            result: ended.offset,
-            result_cost: ended.cost,
-            least_covered: ended.least_covered,
+            result,
+            result_cost,
+            least_covered,
             judge: is_given.then_some(JUDGE),
             near_truth: OnceLock::new(),
             rivals: OnceLock::new(),
             against_chance: Mutex::default(),
-        });
-        work(search.as_ref())
+        })
     }
 
     /// What beat the truth; `None` where the truth is out of reach, or covers too little.
@@ -416,47 +419,24 @@ impl Search<'_, '_> {
     }
 }
 
-/// Where a search ended.
-struct Ended {
-    offset: Offset,
-    cost: Option<f64>,
-    least_covered: u32,
-}
+/// Where a search ended: the pose, its cost, and the pixels that a pose must cover.
+type Ended = (Offset, Option<f64>, u32);
 
 fn ended(subject: &Subject<'_>) -> Option<Ended> {
     subject.outcome.pose.as_ref().ok()?;
-    let minimum = subject.evidence.minimum?;
-    let surfaces = &subject.evidence.surfaces;
-    Some(Ended {
-        offset: minimum.offset,
-        cost: Some(subject.outcome.cost?.best),
-        least_covered: surfaces.first().map_or(0, |surface| surface.least_covered),
-    })
+    let offset = subject.evidence.minimum?.offset;
+    let surface = subject.evidence.surfaces.first();
+    let least_covered = surface.map_or(0, |surface| surface.least_covered);
+    Some((offset, Some(subject.outcome.cost?.best), least_covered))
 }
 
 /// What stands for a search that ended in another system's pose.
 fn ended_as_given(subject: &Subject<'_>, scorer: &Scorer<'_>) -> Option<Ended> {
-    let problem = subject.problem;
-    let pose = problem.reference_from_query(subject.outcome.pose.as_ref().ok()?);
+    let pose = subject.problem.reference_from_query(subject.outcome.pose.as_ref().ok()?);
     let start = Offset::default().reference_from_camera();
-    let [at_pose, at_reference] = scorer.score(&[pose, start])[..] else {
-        return None;
-    };
+    let [at_pose, at_reference] = scorer.score(&[pose, start]).try_into().ok()?;
     let least_covered = least_covered(subject.params.grid.coverage_floor, at_reference.covered);
-    Some(Ended {
-        offset: Offset::of(&pose),
-        cost: at_pose.eligible_cost(least_covered),
-        least_covered,
-    })
-}
-
-/// A camera moved along and turned about its own axes.
-fn moved(pose: &Pose, by: &[f64; 6]) -> Pose {
-    let [x, y, z, about_x, about_y, about_z] = *by;
-    pose * Pose::from_parts(
-        Translation3::new(x, y, z),
-        UnitQuaternion::from_scaled_axis(Vector3::new(about_x, about_y, about_z)),
-    )
+    Some((Offset::of(&pose), at_pose.eligible_cost(least_covered), least_covered))
 }
 
 /// The searched pose with the height, pitch and roll of the truth.

@@ -26,7 +26,7 @@ pub(super) const RULE: Rule = Rule {
     remedies,
 };
 
-fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
+fn test(case: &Case<'_>) -> Option<Diagnosis> {
     match case.search {
         Some(search) if search.result_cost.is_none() => Some(out_of_view(search)),
         Some(search) => too_few_pixels(search),
@@ -35,7 +35,7 @@ fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
 }
 
 /// At another system's pose, next to nothing of the reference's cloud is in view.
-fn out_of_view(search: &Search<'_, '_>) -> Diagnosis {
+fn out_of_view(search: &Search<'_>) -> Diagnosis {
     RULE.found(&OutOfView {
         judge: search.judge.map(|method| method.name()),
         covered: search.covered(&search.result),
@@ -49,7 +49,7 @@ evidence!(OutOfView { judge: Option<&'static str>, covered: usize, covered_at_re
 );
 
 /// So few pixels match by chance.
-fn too_few_pixels(search: &Search<'_, '_>) -> Option<Diagnosis> {
+fn too_few_pixels(search: &Search<'_>) -> Option<Diagnosis> {
     let rivals = search.rivals()?;
     let at_truth = search.covered(&rivals.near.offset);
     let at_result = search.covered(&rivals.winner.offset);
@@ -87,7 +87,7 @@ evidence!(TooFewPixels {
 );
 
 /// Of a pose that is more likely wrong than right, what speaks against it without the truth.
-fn next_to_nothing(case: &Case<'_, '_>) -> Option<Diagnosis> {
+fn next_to_nothing(case: &Case<'_>) -> Option<Diagnosis> {
     if case.subject.truth.is_some() || !case.subject.is_low() {
         return None;
     }

@@ -15,7 +15,7 @@ pub(super) const RULE: Rule = Rule {
     remedies,
 };
 
-fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
+fn test(case: &Case<'_>) -> Option<Diagnosis> {
     match case.family {
         Family::Starts => by_starts(case.starts()?),
         _ => by_grid(case.search?),
@@ -23,7 +23,7 @@ fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
 }
 
 /// Tried last of all causes, it holds wherever none of the others ended the list.
-fn by_grid(search: &Search<'_, '_>) -> Option<Diagnosis> {
+fn by_grid(search: &Search<'_>) -> Option<Diagnosis> {
     let judge = search.judge.map(|method| method.name());
     let cost_at_result = search.result_cost?;
     let Some(rivals) = search.rivals() else {

@@ -18,7 +18,7 @@ pub(super) const RULE: Rule = Rule {
     remedies,
 };
 
-fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
+fn test(case: &Case<'_>) -> Option<Diagnosis> {
     match case.family {
         Family::Starts => by_starts(case.starts()?),
         Family::Given => by_given(case.search?),
@@ -26,7 +26,7 @@ fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
     }
 }
 
-fn by_grid(search: &Search<'_, '_>) -> Option<Diagnosis> {
+fn by_grid(search: &Search<'_>) -> Option<Diagnosis> {
     let rivals = search.rivals().filter(|rivals| rivals.is_missed)?;
     let lost = lost_in(search, &rivals.near);
     Some(RULE.found(&Missed {
@@ -74,7 +74,7 @@ impl fmt::Display for Missed {
 }
 
 /// Another system's pose costs more than the truth.
-fn by_given(search: &Search<'_, '_>) -> Option<Diagnosis> {
+fn by_given(search: &Search<'_>) -> Option<Diagnosis> {
     let cost_at_result = search.result_cost?;
     let cost_near_truth = match search.rivals() {
         Some(rivals) => rivals.is_missed.then_some(rivals.near.cost)?,
@@ -147,7 +147,7 @@ struct Loss {
 }
 
 /// The phase that turned away from the truth.
-fn lost_in(search: &Search<'_, '_>, near: &Place) -> Loss {
+fn lost_in(search: &Search<'_>, near: &Place) -> Loss {
     let at = |phase: Phase| {
         let surface = search.subject.evidence.surface(phase)?;
         Some((surface, surface.lattice.offset(surface.minimum()?)?))

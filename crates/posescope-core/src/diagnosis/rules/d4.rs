@@ -15,7 +15,7 @@ pub(super) const RULE: Rule = Rule {
     remedies,
 };
 
-fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
+fn test(case: &Case<'_>) -> Option<Diagnosis> {
     let radius_m = case.subject.problem.uncertainty_radius_m;
     match case.family {
         Family::Starts => by_starts(case.starts()?, radius_m),
@@ -23,7 +23,7 @@ fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
     }
 }
 
-fn by_grid(search: &Search<'_, '_>, radius_m: f64) -> Option<Diagnosis> {
+fn by_grid(search: &Search<'_>, radius_m: f64) -> Option<Diagnosis> {
     let truth = search.truth_offset();
     let outside = |is_turned: bool| {
         RULE.found(&Outside {

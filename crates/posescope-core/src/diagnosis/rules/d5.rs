@@ -19,13 +19,13 @@ pub(super) const RULE: Rule = Rule {
 };
 
 /// Whether the query is the same everywhere: costs may differ, but by nothing that it shows.
-pub(super) fn is_textureless(case: &Case<'_, '_>) -> bool {
+pub(super) fn is_textureless(case: &Case<'_>) -> bool {
     Family::COSTED.contains(&case.family)
         && case.subject.outcome.pose.is_ok()
         && case.contrast() < TEXTURELESS
 }
 
-fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
+fn test(case: &Case<'_>) -> Option<Diagnosis> {
     is_textureless(case).then(|| RULE.found(&Textureless { deviation: case.contrast() }))
 }
 

@@ -16,7 +16,7 @@ pub(super) const RULE: Rule = Rule {
 };
 
 /// The images share nothing, even at the truth.
-fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
+fn test(case: &Case<'_>) -> Option<Diagnosis> {
     let search = case.search?;
     let rivals = search.rivals().filter(|rivals| rivals.is_changed)?;
     let against = search.against_chance(&rivals.near.offset)?;

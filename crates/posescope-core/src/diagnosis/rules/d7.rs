@@ -20,7 +20,7 @@ pub(super) const RULE: Rule = Rule {
     remedies: d2::remedies,
 };
 
-fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
+fn test(case: &Case<'_>) -> Option<Diagnosis> {
     let search = case.search?;
     let rivals = search.rivals()?;
     let frozen = search.off_the_plane();
@@ -39,7 +39,7 @@ fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
 }
 
 fn found(
-    search: &Search<'_, '_>,
+    search: &Search<'_>,
     frozen_error: PoseError,
     near: &Place,
     won: Option<(f64, f64)>,

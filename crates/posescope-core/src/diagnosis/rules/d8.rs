@@ -17,7 +17,7 @@ pub(super) const RULE: Rule = Rule {
 
 /// With the truth, where the minimum's basin goes on outside; without, of a pose that is more likely wrong
 /// than right.
-fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
+fn test(case: &Case<'_>) -> Option<Diagnosis> {
     match case.subject.truth {
         Some(_) => {
             let search = case.search?;
@@ -29,7 +29,7 @@ fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
     }
 }
 
-fn on_rim(case: &Case<'_, '_>) -> Option<Diagnosis> {
+fn on_rim(case: &Case<'_>) -> Option<Diagnosis> {
     case.subject.outcome.cost?;
     let offset = case.subject.evidence.minimum?.offset;
     let (grid, radius_m) = (&case.subject.params.grid, case.subject.problem.uncertainty_radius_m);

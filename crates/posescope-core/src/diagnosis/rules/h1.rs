@@ -16,7 +16,7 @@ pub(super) const RULE: Rule = Rule {
     remedies: no_remedy,
 };
 
-fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
+fn test(case: &Case<'_>) -> Option<Diagnosis> {
     match case.family {
         Family::Starts => passed_over(case),
         _ => kept_by_hybrid(case),
@@ -24,7 +24,7 @@ fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
 }
 
 /// A hybrid that kept its first method's pose answers for it.
-fn kept_by_hybrid(case: &Case<'_, '_>) -> Option<Diagnosis> {
+fn kept_by_hybrid(case: &Case<'_>) -> Option<Diagnosis> {
     let parts = case.hybrid()?;
     let error = case.subject.error()?;
     (case.responsible == parts.first).then(|| {
@@ -44,7 +44,7 @@ evidence!(Kept { hybrid: Method, kept: Method, not_asked: Method, error: PoseErr
 );
 
 /// A candidate was right, and another one was taken.
-fn passed_over(case: &Case<'_, '_>) -> Option<Diagnosis> {
+fn passed_over(case: &Case<'_>) -> Option<Diagnosis> {
     case.subject.evidence.settled.as_ref()?;
     let truth = case.subject.reference_from_truth()?;
     let candidates = case.subject.evidence.candidates.as_ref()?;

@@ -16,7 +16,7 @@ pub(super) const RULE: Rule = Rule {
     remedies: no_remedy,
 };
 
-fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
+fn test(case: &Case<'_>) -> Option<Diagnosis> {
     low(case.subject.confidence.as_ref())
 }
 

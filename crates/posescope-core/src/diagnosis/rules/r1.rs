@@ -21,7 +21,7 @@ pub(super) const RULE: Rule = Rule {
     remedies: no_remedy,
 };
 
-fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
+fn test(case: &Case<'_>) -> Option<Diagnosis> {
     case.matches()?;
     let query_from_reference = case.subject.reference_from_truth()?.inverse();
     let problem = case.subject.problem;

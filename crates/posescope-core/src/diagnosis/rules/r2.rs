@@ -18,7 +18,7 @@ pub(super) const RULE: Rule = Rule {
     remedies,
 };
 
-fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
+fn test(case: &Case<'_>) -> Option<Diagnosis> {
     case.matches()?;
     let counts = case.subject.outcome.counts?;
     let (query, reference) = (counts.query_keypoints, counts.reference_keypoints);

@@ -19,7 +19,7 @@ pub(super) const RULE: Rule = Rule {
     remedies,
 };
 
-fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
+fn test(case: &Case<'_>) -> Option<Diagnosis> {
     let matches = case.matches()?;
     let funnel = matches.funnel;
     let without_depth = if matches.many_without_depth() {

@@ -17,7 +17,7 @@ pub(super) const RULE: Rule = Rule {
 };
 
 /// True matches whose depth is missing or wrong.
-fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
+fn test(case: &Case<'_>) -> Option<Diagnosis> {
     let matches = case.matches()?;
     let right = matches.funnel.lifted;
     let (wrong, missing) = (matches.wrong_depth, matches.no_depth);

@@ -15,7 +15,7 @@ pub(super) const RULE: Rule = Rule {
     remedies: r3::remedies,
 };
 
-fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
+fn test(case: &Case<'_>) -> Option<Diagnosis> {
     case.matches()?;
     let failure = case.subject.outcome.pose.as_ref().err()?;
     let error = case.consensus_error()?;

@@ -15,7 +15,7 @@ pub(super) const RULE: Rule = Rule {
     remedies,
 };
 
-fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
+fn test(case: &Case<'_>) -> Option<Diagnosis> {
     let matches = case.matches()?;
     Some(RULE.found(&Accepted {
         error: case.subject.error()?,

@@ -17,7 +17,7 @@ pub(super) const RULE: Rule = Rule {
 };
 
 /// A pose was refused for its distance from the reference, or the right one would have been.
-fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
+fn test(case: &Case<'_>) -> Option<Diagnosis> {
     case.matches()?;
     if let Some(Failure::OutsideRadius { distance_m, radius_m }) =
         case.subject.outcome.pose.as_ref().err()

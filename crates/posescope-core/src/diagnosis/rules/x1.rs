@@ -25,7 +25,7 @@ pub(super) const RULE: Rule = Rule {
     remedies: no_remedy,
 };
 
-fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
+fn test(case: &Case<'_>) -> Option<Diagnosis> {
     if let Some(found) = units(case) {
         return Some(found);
     }
@@ -52,7 +52,7 @@ fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
 }
 
 /// The cloud is not in metres.
-fn units(case: &Case<'_, '_>) -> Option<Diagnosis> {
+fn units(case: &Case<'_>) -> Option<Diagnosis> {
     /// Median depths of a cloud that no scanner and no indoor depth camera has \[m\].
     const MIN_DEPTH_M: f64 = 0.1;
     const MAX_DEPTH_M: f64 = 400.0;
@@ -78,7 +78,7 @@ evidence!(Units { median_depth_m: f64, unit: &'static str, depth_in_unit_m: f64 
 /// The pose agrees with the truth if the poses of the scene are read in another way.
 ///
 /// Only for a pose that is more likely right than wrong: one of many poses agrees with something by chance.
-fn poses(case: &Case<'_, '_>) -> Option<Diagnosis> {
+fn poses(case: &Case<'_>) -> Option<Diagnosis> {
     const LIKELY: f64 = 0.5;
     /// How well another reading must agree with the estimate.
     const AGREEING_M: f64 = 0.5;
@@ -134,7 +134,7 @@ evidence!(Cloud { wrong_depth: usize, right_depth: usize } =>
 );
 
 /// A method without matches learns of another camera from those of FB.
-fn camera_by_fb(case: &Case<'_, '_>) -> Option<Diagnosis> {
+fn camera_by_fb(case: &Case<'_>) -> Option<Diagnosis> {
     // Where the truth is not searched, that alone explains the result.
     case.search?.near_truth()?;
     let subject = case.subject;
@@ -148,7 +148,7 @@ fn camera_by_fb(case: &Case<'_, '_>) -> Option<Diagnosis> {
 }
 
 /// From the true pose, another focal length and principal point explain far more matches.
-fn camera_by_matches(case: &Case<'_, '_>, matches: &TrueMatches) -> Option<Diagnosis> {
+fn camera_by_matches(case: &Case<'_>, matches: &TrueMatches) -> Option<Diagnosis> {
     let query_from_reference = case.subject.reference_from_truth()?.inverse();
     let stated = &case.subject.problem.query.intrinsics;
     let threshold_px = case.matching().mlesac.inlier_threshold_px;
@@ -262,7 +262,7 @@ fn likeliest_camera(
 }
 
 /// The photos agree on a pose as well as photos ever do, and it is not the stated truth.
-fn truth_by_matches(case: &Case<'_, '_>, matches: &TrueMatches) -> Option<Diagnosis> {
+fn truth_by_matches(case: &Case<'_>, matches: &TrueMatches) -> Option<Diagnosis> {
     const NEARLY_CERTAIN: f64 = -15.0;
     let error = case.subject.error().or_else(|| case.consensus_error())?;
     let judged = case.subject.evidence.judged.as_ref()?;
@@ -291,7 +291,7 @@ evidence!(TruthByMatches {
 
 /// The result is as certain as results ever are, and it is not the stated truth. Where the images agree at
 /// the truth too, though less, both are there, and the truth is not suspect.
-fn truth_by_cost(case: &Case<'_, '_>, search: &Search<'_, '_>) -> Option<Diagnosis> {
+fn truth_by_cost(case: &Case<'_>, search: &Search<'_>) -> Option<Diagnosis> {
     const NEARLY_CERTAIN: f64 = 0.97;
     const SUPPORTED: f64 = 0.5;
     let probability = case.subject.confidence.as_ref()?.probability;
