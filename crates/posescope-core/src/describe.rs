@@ -228,8 +228,8 @@ pub fn set(
     Some(field.set(text).ok_or(domain))
 }
 
-/// Declares a struct of parameters together with its [`Describe`]: each field with its kind, key,
-/// unit and range. What it means is the first paragraph of its doc comment.
+/// Declares a struct of parameters together with its [`Default`] and [`Describe`]: each field with its default,
+/// kind, key, unit and range. What it means is the first paragraph of its doc comment.
 ///
 /// ```text
 /// parameters! {
@@ -237,15 +237,15 @@ pub fn set(
 ///     #[derive(Clone, Debug, PartialEq)]
 ///     pub struct LookParams {
 ///         /// How far to look.
-///         pub reach_m: f64 = number("reach", "m", 0.1..=50.0),
+///         pub reach_m: f64 = 2.5 => number("reach", "m", 0.1..=50.0),
 ///         /// How often to look.
-///         pub rounds: usize = count("rounds", "", 1..=10),
+///         pub rounds: usize = 1 => count("rounds", "", 1..=10),
 ///         /// Whether to look back.
-///         pub back: bool = flag("back"),
+///         pub back: bool = false => flag("back"),
 ///         /// Where to begin.
-///         pub side: Side = choice("side"),
-///         /// What the struct inside says of itself.
-///         pub glasses: GlassesParams = group(),
+///         pub side: Side = Side::Left => choice("side"),
+///         /// The parameters of the struct inside.
+///         pub glasses: GlassesParams = GlassesParams::default() => group(),
 ///     }
 /// }
 /// ```
@@ -257,7 +257,7 @@ macro_rules! parameters {
         $visibility:vis struct $name:ident {
             $(
                 $(#[doc = $doc:literal])*
-                $field_visibility:vis $field:ident: $type:ty = $kind:ident $arguments:tt
+                $field_visibility:vis $field:ident: $type:ty = $default:expr => $kind:ident $arguments:tt
             ),* $(,)?
         }
     ) => {
@@ -268,6 +268,12 @@ macro_rules! parameters {
                 #[doc = $crate::describe::parameters!(@doc $kind $arguments)]
                 $field_visibility $field: $type,
             )*
+        }
+
+        impl Default for $name {
+            fn default() -> Self {
+                Self { $($field: $default),* }
+            }
         }
 
         impl $crate::describe::Describe for $name {
@@ -344,7 +350,7 @@ mod tests {
             /// at most.
             ///
             /// This is nobody's business.
-            rounds: usize = count("rounds", "", 1..=10),
+            rounds: usize = 3 => count("rounds", "", 1..=10),
         }
     }
 
@@ -352,20 +358,19 @@ mod tests {
         /// One of each kind.
         struct All {
             /// How far, as in [`std`].
-            reach_m: f64 = number("reach", "m", 0.5..=2.0),
+            reach_m: f64 = 1.5 => number("reach", "m", 0.5..=2.0),
             /// Whether at all.
-            is_on: bool = flag("on"),
+            is_on: bool = true => flag("on"),
             /// Inside.
-            inner: Inner = group(),
+            inner: Inner = Inner::default() => group(),
             /// Which side.
-            side: Side = choice("side"),
+            side: Side = Side::Right => choice("side"),
         }
     }
 
     #[test]
     fn every_field_is_shown_in_order_with_the_first_paragraph_of_its_doc_comment() {
-        let mut all =
-            All { reach_m: 1.5, is_on: true, inner: Inner { rounds: 3 }, side: Side::Right };
+        let mut all = All::default();
         let shown: Vec<String> = list(&mut all)
             .into_iter()
             .map(|Described { about, value, domain, .. }| {
