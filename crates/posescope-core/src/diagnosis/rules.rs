@@ -126,6 +126,22 @@ pub struct Rule {
 }
 
 impl Rule {
+    /// A rule with what most have in common; alone, one that the method itself reports.
+    const fn new(code: Code) -> Self {
+        Self {
+            code,
+            title: "",
+            advice: "",
+            applies_to: &[],
+            needs_truth: true,
+            is_conclusive: false,
+            test: Test::Reported,
+            decided_at: DecidedAt::End,
+            proof: Proof::DecidingStage,
+            remedies: |_| Vec::new(),
+        }
+    }
+
     /// A verdict of this rule. Its sentence is made from the evidence.
     pub(super) fn found(&self, evidence: &(impl Serialize + fmt::Display)) -> Diagnosis {
         Diagnosis {
@@ -156,11 +172,6 @@ pub enum DecidedAt {
     Stage(Stage),
     /// At the end of the method.
     End,
-}
-
-/// For rules that nothing helps against but another method or another reference.
-fn no_remedy(_: &Ask<'_>) -> Vec<Remedy> {
-    Vec::new()
 }
 
 impl Code {

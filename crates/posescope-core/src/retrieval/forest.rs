@@ -4,7 +4,7 @@
 //! Philbin et al. 2007, section 3.1 (the search of AKM); the trees are those of Silpa-Anan, Hartley,
 //! *Optimised KD-trees for fast image descriptor matching*, CVPR 2008.
 
-use std::cmp::{Ordering, Reverse};
+use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 use std::ops::Range;
 
@@ -64,35 +64,11 @@ pub struct Scratch {
     search: u32,
 }
 
-/// A side of a split that was not taken.
-struct Branch {
-    /// Sum of the squared distances to the splits on the way: small where the query is close by.
-    bound: f32,
-    tree: u32,
-    node: u32,
-}
-
-impl Ord for Branch {
-    fn cmp(&self, other: &Self) -> Ordering {
-        (self.bound.total_cmp(&other.bound))
-            .then(self.tree.cmp(&other.tree))
-            .then(self.node.cmp(&other.node))
-    }
-}
-
-impl PartialOrd for Branch {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-impl PartialEq for Branch {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other).is_eq()
-    }
-}
-
-impl Eq for Branch {}
+/// A side of a split that was not taken: the bits of its bound, its tree and its node.
+///
+/// The bound is the sum of the squared distances to the splits on the way, small where the query is close by. The
+/// bits of positive numbers are in their order.
+type Branch = (u32, u32, u32);
 
 impl Forest {
     /// `trees` trees over these points; the seed decides how they differ.
@@ -120,10 +96,9 @@ impl Forest {
             search.descend(tree, number as u32, 0, 0.0);
         }
         while search.checks_left > 0
-            && let Some(Reverse(branch)) = search.scratch.branches.pop()
+            && let Some(Reverse((bound, tree, node))) = search.scratch.branches.pop()
         {
-            let tree = &self.trees[branch.tree as usize];
-            search.descend(tree, branch.tree, branch.node, branch.bound);
+            search.descend(&self.trees[tree as usize], tree, node, f32::from_bits(bound));
         }
         search.best
     }
@@ -157,11 +132,8 @@ impl Search<'_> {
                     let beyond = self.query[usize::from(*dimension)] - threshold;
                     let (taken, other) =
                         if beyond < 0.0 { (*below, *above) } else { (*above, *below) };
-                    self.scratch.branches.push(Reverse(Branch {
-                        bound: bound + beyond * beyond,
-                        tree: number,
-                        node: other,
-                    }));
+                    let bound = bound + beyond * beyond;
+                    self.scratch.branches.push(Reverse((bound.to_bits(), number, other)));
                     node = taken;
                 }
                 Node::Leaf(range) => {

@@ -14,16 +14,15 @@ const MORE_GAIN: f64 = 0.02;
 const NEXT_TO_NOTHING: f64 = 0.15;
 
 pub(super) const RULE: Rule = Rule {
-    code: Code::D1,
     title: "the lowest cost covers too little",
     advice: "raise grid.coverage_floor",
     applies_to: &[Family::Grid, Family::Given],
     needs_truth: false,
-    is_conclusive: false,
     test: Test::Method(test),
     decided_at: DecidedAt::Stage(Stage::Search(Phase::PositionCoarse)),
     proof: Proof::CostMap(MapOverlay::Coverage),
     remedies,
+    ..Rule::new(Code::D1)
 };
 
 fn test(case: &Case<'_>) -> Option<Diagnosis> {

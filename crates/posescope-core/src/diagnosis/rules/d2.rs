@@ -3,16 +3,14 @@
 use super::*;
 
 pub(super) const RULE: Rule = Rule {
-    code: Code::D2,
     title: "the cost prefers another place",
     advice: "use another method or another reference",
     applies_to: Family::COSTED,
-    needs_truth: true,
-    is_conclusive: false,
     test: Test::Method(test),
     decided_at: DecidedAt::Stage(Stage::Search(Phase::PositionCoarse)),
     proof: Proof::CostMap(MapOverlay::Preference),
     remedies,
+    ..Rule::new(Code::D2)
 };
 
 fn test(case: &Case<'_>) -> Option<Diagnosis> {

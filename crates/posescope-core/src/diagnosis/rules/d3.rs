@@ -6,16 +6,15 @@ use crate::diagnosis::search::Place;
 use crate::grid::ScoredLattice;
 
 pub(super) const RULE: Rule = Rule {
-    code: Code::D3,
     title: "the search missed a lower cost near the truth",
     advice: "raise grid.rounds or mi6.starts, or lower grid.coarse_step; instead of search=descent, use search=grid",
     applies_to: Family::COSTED,
-    needs_truth: true,
     is_conclusive: true,
     test: Test::Method(test),
     decided_at: DecidedAt::Stage(Stage::Search(Phase::PositionCoarse)),
     proof: Proof::CostMap(MapOverlay::Ranks),
     remedies,
+    ..Rule::new(Code::D3)
 };
 
 fn test(case: &Case<'_>) -> Option<Diagnosis> {

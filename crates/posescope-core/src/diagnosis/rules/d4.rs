@@ -3,16 +3,15 @@
 use super::*;
 
 pub(super) const RULE: Rule = Rule {
-    code: Code::D4,
     title: "the truth is outside of what is searched",
     advice: "if the reference is wrong, use another; otherwise raise --radius or grid.yaw_range, or lower grid.coverage_floor",
     applies_to: Family::SEARCHING,
-    needs_truth: true,
     is_conclusive: true,
     test: Test::Method(test),
     decided_at: DecidedAt::Stage(Stage::Search(Phase::PositionCoarse)),
     proof: Proof::CostMap(MapOverlay::Reach),
     remedies,
+    ..Rule::new(Code::D4)
 };
 
 fn test(case: &Case<'_>) -> Option<Diagnosis> {

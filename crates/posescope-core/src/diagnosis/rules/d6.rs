@@ -3,16 +3,14 @@
 use super::*;
 
 pub(super) const RULE: Rule = Rule {
-    code: Code::D6,
     title: "the photos look too different",
     advice: "use another method, or a reference of similar light",
     applies_to: &[Family::Grid, Family::Given],
-    needs_truth: true,
-    is_conclusive: false,
     test: Test::Method(test),
     decided_at: DecidedAt::Stage(Stage::Assess),
     proof: Proof::CostMap(MapOverlay::Preference),
     remedies: d2::remedies,
+    ..Rule::new(Code::D6)
 };
 
 /// The images share nothing, even at the truth.

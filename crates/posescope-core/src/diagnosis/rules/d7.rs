@@ -8,16 +8,13 @@ const OFF_PLANE_M: f64 = 0.1;
 const OFF_PLANE_DEG: f64 = 0.5;
 
 pub(super) const RULE: Rule = Rule {
-    code: Code::D7,
     title: "height, pitch or roll are off, which are not searched",
     advice: "use mi6 or robust, which search all six freedoms",
     applies_to: &[Family::Grid, Family::Given],
-    needs_truth: true,
-    is_conclusive: false,
     test: Test::Method(test),
-    decided_at: DecidedAt::End,
     proof: Proof::FreedViews,
     remedies: d2::remedies,
+    ..Rule::new(Code::D7)
 };
 
 fn test(case: &Case<'_>) -> Option<Diagnosis> {

@@ -3,16 +3,15 @@
 use super::*;
 
 pub(super) const RULE: Rule = Rule {
-    code: Code::D8,
     title: "the search ended at its edge",
     advice: "raise --radius",
     applies_to: &[Family::Grid],
     needs_truth: false,
-    is_conclusive: false,
     test: Test::Method(test),
     decided_at: DecidedAt::Stage(Stage::Search(Phase::PositionCoarse)),
     proof: Proof::CostMap(MapOverlay::Rim),
     remedies: d1::remedies,
+    ..Rule::new(Code::D8)
 };
 
 /// With the truth, where the minimum's basin goes on outside; without, of a pose that is more likely wrong

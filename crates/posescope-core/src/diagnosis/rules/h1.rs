@@ -4,16 +4,11 @@ use super::*;
 use crate::method::Method;
 
 pub(super) const RULE: Rule = Rule {
-    code: Code::H1,
     title: "the wrong method's pose was kept",
     advice: "run the other method alone, or use robust",
     applies_to: Family::ALL,
-    needs_truth: true,
-    is_conclusive: false,
     test: Test::Method(test),
-    decided_at: DecidedAt::End,
-    proof: Proof::DecidingStage,
-    remedies: no_remedy,
+    ..Rule::new(Code::H1)
 };
 
 fn test(case: &Case<'_>) -> Option<Diagnosis> {

@@ -9,16 +9,13 @@ use crate::camera::Intrinsics;
 const MIN_OVERLAP: f64 = 0.05;
 
 pub(super) const RULE: Rule = Rule {
-    code: Code::R1,
     title: "the reference does not see the query's scene",
     advice: "use another reference",
     applies_to: Family::MATCHING,
-    needs_truth: true,
-    is_conclusive: false,
     test: Test::Method(test),
     decided_at: DecidedAt::Stage(Stage::Match),
     proof: Proof::CloudOnPhoto,
-    remedies: no_remedy,
+    ..Rule::new(Code::R1)
 };
 
 fn test(case: &Case<'_>) -> Option<Diagnosis> {

@@ -7,16 +7,14 @@ use crate::diagnosis::matches::Step;
 pub(super) const FEW_MATCHES: usize = 8;
 
 pub(super) const RULE: Rule = Rule {
-    code: Code::R3,
     title: "too few true matches",
     advice: "raise fb.ratio or get more keypoints; other light needs another method",
     applies_to: Family::MATCHING,
-    needs_truth: true,
-    is_conclusive: false,
     test: Test::Method(test),
     decided_at: DecidedAt::Stage(Stage::Match),
     proof: Proof::Matches,
     remedies,
+    ..Rule::new(Code::R3)
 };
 
 fn test(case: &Case<'_>) -> Option<Diagnosis> {

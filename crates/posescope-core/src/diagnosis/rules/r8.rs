@@ -3,16 +3,13 @@
 use super::*;
 
 pub(super) const RULE: Rule = Rule {
-    code: Code::R8,
     title: "a wrong pose was accepted",
     advice: "lower fb.ratio; something moved, or the place looks like another",
     applies_to: Family::MATCHING,
-    needs_truth: true,
-    is_conclusive: false,
     test: Test::Method(test),
-    decided_at: DecidedAt::End,
     proof: Proof::Matches,
     remedies,
+    ..Rule::new(Code::R8)
 };
 
 fn test(case: &Case<'_>) -> Option<Diagnosis> {

@@ -4,16 +4,13 @@ use super::*;
 use crate::estimator::Failure;
 
 pub(super) const RULE: Rule = Rule {
-    code: Code::R9,
     title: "the pose is outside the prior",
     advice: "raise --radius or fb.radius_slack",
     applies_to: Family::MATCHING,
-    needs_truth: true,
-    is_conclusive: false,
     test: Test::Method(test),
-    decided_at: DecidedAt::End,
     proof: Proof::PoseMap,
     remedies,
+    ..Rule::new(Code::R9)
 };
 
 /// A pose was refused for its distance from the reference, or the right one would have been.

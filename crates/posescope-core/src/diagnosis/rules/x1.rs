@@ -13,16 +13,13 @@ use crate::stats::median;
 use crate::trace::Trace;
 
 pub(super) const RULE: Rule = Rule {
-    code: Code::X1,
     title: "a calibration or the ground truth is suspect",
     advice: "check calibration, pose convention and units; `posescope doctor` does",
     applies_to: Family::ALL,
     needs_truth: false,
-    is_conclusive: false,
     test: Test::Method(test),
-    decided_at: DecidedAt::End,
     proof: Proof::CloudOnPhoto,
-    remedies: no_remedy,
+    ..Rule::new(Code::X1)
 };
 
 fn test(case: &Case<'_>) -> Option<Diagnosis> {
