@@ -19,7 +19,7 @@ mod robust;
 
 pub use direct::Direct;
 pub use failure::Failure;
-pub use fb2::{Guided, GuidedParams};
+pub use fb2::GuidedParams;
 pub use feature::{DepthRule, FeatureBased, FeatureParams, count_matches, projected_cloud};
 pub use given::Given;
 pub use hybrid::{Hybrid, HybridParts, hybrid_outcome};

@@ -9,7 +9,7 @@ use super::matches::{Matching, TrueMatches};
 use super::search::Search;
 use super::starts::Starts;
 use super::{Diagnosis, Subject, Tolerance};
-use crate::estimator::{self, Failure, FeatureBased, Guided, HybridParts};
+use crate::estimator::{self, Failure, FeatureBased, HybridParts};
 use crate::fusion::Share;
 use crate::geometry::{Pose, PoseError};
 use crate::method::Method;
@@ -99,10 +99,11 @@ impl<'a> Case<'a> {
     pub(super) fn would_accept(&self, matches: &TrueMatches, inliers: &[usize]) -> bool {
         let (params, camera) = (self.subject.params, &self.subject.problem.query.intrinsics);
         let correspondences: &[Correspondence] = &matches.correspondences;
-        match self.family {
-            Family::Guided => Guided::new(params).would_accept(correspondences, inliers, camera),
-            _ => FeatureBased::new(params).would_accept(correspondences, inliers, camera),
-        }
+        let estimator = match self.family {
+            Family::Guided => FeatureBased::guided(params),
+            _ => FeatureBased::new(params),
+        };
+        estimator.would_accept(correspondences, inliers, camera)
     }
 
     /// The error of the consensus, accepted or not.

@@ -8,6 +8,7 @@ use crate::camera::Intrinsics;
 use crate::estimator::projected_cloud;
 use crate::features::{Features, MatchVerdict};
 use crate::geometry::Pose;
+use crate::render::RenderParams;
 use crate::robust::MlesacParams;
 use crate::solver::{Correspondence, pose_covariance};
 
@@ -244,8 +245,8 @@ fn lifted_keypoints(
     reference: &Features,
 ) -> Vec<Option<Point3<f64>>> {
     let tuple = &subject.problem.reference;
-    let render = &subject.params.render;
-    let cloud = projected_cloud(tuple, matching.visible.then_some(render));
+    let render = RenderParams { visibility: true, ..subject.params.render.clone() };
+    let cloud = projected_cloud(tuple, matching.visible.then_some(&render));
     let radius_px = matching.depth_radius_px;
     reference
         .keypoints

@@ -13,16 +13,17 @@ pub use self::params::{DepthRule, FeatureParams};
 pub(super) use self::several::Gathered;
 use self::states::FeatureStates;
 use super::consensus::FoundConsensus;
+use super::fb2::{Guide, last_matches};
 use super::{Estimator, Failure, FeatureCounts, Halt, Outcome, separate_failure};
 use crate::cloud::Cloud;
-use crate::depth::LiftedMatch;
-use crate::depth::{DepthReading, ProjectedCloudIndex};
+use crate::depth::{DepthReading, LiftedMatch, ProjectedCloudIndex};
 use crate::event::{
     DepthsLifted, FeaturesClassified, FeaturesDetected, HypothesisTried, MatchesDecided,
-    PoseRefined, ProjectedCloud, Side, Stage,
+    MatchesGuided, PoseRefined, ProjectedCloud, Side, Stage,
 };
 use crate::features::{
-    self, Features, FoundMatches, Match, MatchVerdict, PairMatches, SurfParams, kept_surf,
+    Features, FoundMatches, Keypoint, Match, MatchVerdict, PairMatches, SiftFeatures, SiftParams,
+    SurfParams, best_matches, kept_surf, sift_interruptible,
 };
 use crate::geometry::Pose;
 use crate::memo::Recalled;
@@ -30,7 +31,7 @@ use crate::method::Method;
 use crate::params::Params;
 use crate::problem::{Problem, ReferenceTuple};
 use crate::render::RenderParams;
-use crate::robust::{Consensus, Trial, mlesac};
+use crate::robust::{Consensus, Trial, mlesac, residuals};
 use crate::solver::Correspondence;
 use crate::trace::{Cancelled, Trace};
 
@@ -49,9 +50,56 @@ const LIFTED_AT_A_TIME: usize = 256;
 
 /// The feature-based estimator.
 pub struct FeatureBased {
-    surf: SurfParams,
-    params: FeatureParams,
-    render: RenderParams,
+    pub(super) method: Method,
+    pub(super) detector: Detector,
+    pub(super) params: FeatureParams,
+    /// Which points lend their depth, where only visible ones do.
+    pub(super) render: RenderParams,
+    /// What the random samples are drawn for.
+    pub(super) purpose: &'static str,
+    /// How features are matched again where the first pose says that they are.
+    pub(super) guide: Option<Guide>,
+}
+
+/// What finds and describes features.
+#[derive(Debug)]
+pub(super) enum Detector {
+    /// SURF, or what somebody brought instead.
+    Surf(SurfParams),
+    Sift(SiftParams),
+}
+
+/// The features of one photo.
+#[derive(Clone)]
+pub(super) struct Described {
+    /// Without descriptors where these are SIFT's.
+    pub(super) features: Arc<Features>,
+    pub(super) sift: Option<Arc<SiftFeatures>>,
+    reused: bool,
+}
+
+/// The features of both photos.
+pub(super) struct Detected {
+    pub(super) query: Described,
+    pub(super) reference: Described,
+}
+
+/// A match and the pixels that it says belong together.
+#[derive(Clone, Copy)]
+pub(super) struct Pairing {
+    pub(super) query: usize,
+    pub(super) reference: usize,
+    pub(super) correspondence: Correspondence,
+}
+
+/// A pose with the matches that it was found among.
+pub(super) struct Posed {
+    /// `camera_from_reference`.
+    pub(super) pose: Pose,
+    pub(super) pairings: Vec<Pairing>,
+    pub(super) residuals_px: Vec<f64>,
+    pub(super) inliers: usize,
+    pub(super) trials: usize,
 }
 
 impl Estimator for FeatureBased {
@@ -76,9 +124,11 @@ pub(super) struct Agreed {
 }
 
 /// What is known of a run, up to where it stops.
-struct Found<'a> {
-    counts: &'a mut FeatureCounts,
-    agreed: &'a mut Option<Agreed>,
+#[derive(Default)]
+struct Progress {
+    counts: FeatureCounts,
+    agreed: Option<Agreed>,
+    states: FeatureStates,
 }
 
 /// What MLESAC found.
@@ -99,9 +149,16 @@ impl Solved {
 }
 
 impl FeatureBased {
-    /// The estimator with these parameters.
+    /// FB with these parameters.
     pub fn new(params: &Params) -> Self {
-        Self { surf: params.surf, params: params.fb.clone(), render: params.render.clone() }
+        Self {
+            method: Method::FB,
+            detector: Detector::Surf(params.surf),
+            params: params.fb.clone(),
+            render: RenderParams { visibility: true, ..params.render.clone() },
+            purpose: "mlesac",
+            guide: None,
+        }
     }
 
     /// What [`Estimator::estimate`] answers, with the consensus behind it.
@@ -110,59 +167,44 @@ impl FeatureBased {
         problem: &Problem,
         trace: &mut Trace<'_>,
     ) -> Result<Proposal, Cancelled> {
-        let mut counts = FeatureCounts::default();
-        let mut consensus = None;
-        let pose = trace.stage(Stage::Estimator(Method::FB), |trace| {
-            self.localize(problem, &mut counts, &mut consensus, trace)
+        let mut progress = Progress::default();
+        let pose = trace.stage(Stage::Estimator(self.method), |trace| {
+            let detected = trace.stage(Stage::Detect, |trace| {
+                let detected = self.detect(problem, trace)?;
+                trace.note_reuse(detected.query.reused && detected.reference.reused);
+                Ok::<_, Halt>(detected)
+            })?;
+            let pose = self.match_and_solve(problem, &detected, &mut progress, trace);
+            // The states are told for a failed query too: they show where its features went.
+            if !matches!(pose, Err(Halt::Cancelled)) {
+                trace.emit(|| FeaturesClassified { states: progress.states.shared() })?;
+            }
+            pose
         });
         Ok(Proposal {
             outcome: Outcome {
                 pose: separate_failure(pose)?,
-                counts: Some(counts),
+                counts: Some(progress.counts),
                 cost: None,
                 fell_back: false,
             },
-            consensus,
+            consensus: progress.agreed,
         })
     }
 
-    /// The four steps of the paper. `counts` and `agreed` are true up to where it stops.
-    fn localize(
-        &self,
-        problem: &Problem,
-        counts: &mut FeatureCounts,
-        agreed: &mut Option<Agreed>,
-        trace: &mut Trace<'_>,
-    ) -> Result<Pose, Halt> {
-        let (query, reference) = trace.stage(Stage::Detect, |trace| {
-            let query = self.detect(Side::Query, problem, trace)?;
-            let reference = self.detect(Side::Reference, problem, trace)?;
-            trace.note_reuse(query.reused && reference.reused);
-            let (query, reference) = (query.value, reference.value);
-            counts.query_keypoints = query.keypoints.len();
-            counts.reference_keypoints = reference.keypoints.len();
-            Ok::<_, Halt>((query, reference))
-        })?;
-        let mut states = FeatureStates::new(query.keypoints.len());
-        let found = Found { counts, agreed };
-        let outcome = self.match_and_solve(problem, &query, &reference, &mut states, found, trace);
-        // The states are told for a failed query too: they show where its features went.
-        if !matches!(outcome, Err(Halt::Cancelled)) {
-            trace.emit(|| FeaturesClassified { states: states.shared() })?;
-        }
-        outcome
-    }
-
+    /// The four steps of the paper, and a second look where there is a guide.
     fn match_and_solve(
         &self,
         problem: &Problem,
-        query: &Features,
-        reference: &Features,
-        states: &mut FeatureStates,
-        Found { counts, agreed }: Found<'_>,
+        detected: &Detected,
+        Progress { counts, agreed, states }: &mut Progress,
         trace: &mut Trace<'_>,
     ) -> Result<Pose, Halt> {
-        if query.keypoints.len() < MINIMUM || reference.keypoints.len() < MINIMUM {
+        let [query, reference] = [&detected.query, &detected.reference].map(|one| &one.features);
+        counts.query_keypoints = query.keypoints.len();
+        counts.reference_keypoints = reference.keypoints.len();
+        *states = FeatureStates::new(query.keypoints.len());
+        if detected.is_too_few() {
             return Err(Halt::from(Failure::TooFewFeatures {
                 query: query.keypoints.len(),
                 reference: reference.keypoints.len(),
@@ -170,7 +212,7 @@ impl FeatureBased {
         }
 
         let matches = trace.stage(Stage::Match, |trace| {
-            let decisions = self.best_matches(problem, query, reference, trace)?;
+            let decisions = self.best_matches(problem, detected, trace)?;
             trace.note_reuse(decisions.reused);
             let decisions = Arc::clone(&decisions.value);
             trace.emit(|| MatchesDecided { decisions: Arc::clone(&decisions) })?;
@@ -191,22 +233,17 @@ impl FeatureBased {
             Ok::<_, Halt>(lifted)
         })?;
         states.after_depth_lift(&lifted);
-        let (members, correspondences): (Vec<usize>, Vec<Correspondence>) = lifted
-            .iter()
-            .filter_map(|lifted| {
-                let pixel = query.keypoints[lifted.query].pixel();
-                let point = lifted.point?;
-                Some((lifted.query, Correspondence { pixel, point }))
-            })
-            .unzip();
-        counts.with_depth = correspondences.len();
-        if correspondences.len() < MINIMUM {
+        let pairings: Vec<Pairing> =
+            lifted.iter().filter_map(|lifted| Pairing::of(query, lifted)).collect();
+        counts.with_depth = pairings.len();
+        if pairings.len() < MINIMUM {
             return Err(Halt::from(Failure::TooFewDepths {
-                with_depth: correspondences.len(),
+                with_depth: pairings.len(),
                 unique: matches.len(),
             }));
         }
 
+        let (free, correspondences) = (pairings.clone(), correspondences(&pairings));
         let consensus = trace.stage(Stage::Consensus, |trace| {
             let consensus = self.consensus(problem, &correspondences, trace)?;
             trace.emit(|| PoseRefined {
@@ -217,52 +254,115 @@ impl FeatureBased {
             })?;
             Ok::<_, Halt>(consensus)
         })?;
-        states.after_consensus(&members, &consensus);
-        counts.inliers = consensus.inliers.len();
-        *agreed = Some(Agreed { reference_from_query: consensus.pose.inverse() });
-
-        trace
-            .stage(Stage::Accept, |trace| self.accept(problem, &correspondences, &consensus, trace))
+        // Acceptance uses the first matching only. Guided matches agree with the pose by construction and would
+        // accept half of all poses between unrelated streets.
+        let camera = &problem.query.intrinsics;
+        let mut beyond =
+            self.beyond_chance(&correspondences, &consensus.inliers, camera, f64::NEG_INFINITY);
+        let mut best = Posed {
+            pose: consensus.pose,
+            pairings,
+            residuals_px: consensus.residuals_px,
+            inliers: consensus.inliers.len(),
+            trials: consensus.trials,
+        };
+        let threshold_px = self.params.mlesac.inlier_threshold_px;
+        if let Some(guide) = &self.guide {
+            let all = self.lifted(&problem.reference, reference);
+            let (last, is_better) = guide.match_again(problem, detected, &all, best, trace)?;
+            if is_better {
+                beyond.tested = last.pairings.len();
+            }
+            let residuals_px = residuals(&correspondences, camera, &last.pose);
+            states.after_pose(&free, &residuals_px, threshold_px);
+            trace.emit(|| MatchesGuided { matches: last_matches(&free, &last.pairings, &all) })?;
+            best = last;
+        }
+        // A feature that was matched again ends in the state of its last match.
+        states.after_pose(&best.pairings, &best.residuals_px, threshold_px);
+        *counts = states.counts(reference.keypoints.len());
+        *agreed = Some(Agreed { reference_from_query: best.pose.inverse() });
+        trace.stage(Stage::Accept, |trace| {
+            let found = FoundConsensus {
+                reference_from_query: best.pose.inverse(),
+                acceptance: beyond.acceptance,
+                tested: beyond.tested,
+                counted: beyond.counted,
+                is_enough: self.accepts(&beyond.acceptance),
+                slack: self.slack(),
+            };
+            found.judged(problem, trace)
+        })
     }
 
-    fn detect(
+    fn detect(&self, problem: &Problem, trace: &mut Trace<'_>) -> Result<Detected, Halt> {
+        Ok(Detected {
+            query: self.describe(Side::Query, problem, trace)?,
+            reference: self.describe(Side::Reference, problem, trace)?,
+        })
+    }
+
+    fn describe(
         &self,
         side: Side,
         problem: &Problem,
         trace: &mut Trace<'_>,
-    ) -> Result<Recalled<Features>, Halt> {
+    ) -> Result<Described, Halt> {
         let (photo, memo) = match side {
             Side::Query => (&problem.query.photo, &problem.query.memo),
             Side::Reference => (&problem.reference.photo, &problem.reference.memo),
         };
-        let features = match found_elsewhere(problem)? {
-            Some(found) => Recalled::made(Arc::clone(match side {
-                Side::Query => &found.query,
-                Side::Reference => &found.reference,
-            })),
-            None => {
-                let checkpoint = || trace.checkpoint();
-                kept_surf(&photo.gray, memo, &self.surf, checkpoint)?
+        let described = match &self.detector {
+            Detector::Surf(surf) => {
+                let found = match found_elsewhere(problem)? {
+                    Some(found) => Recalled::made(Arc::clone(match side {
+                        Side::Query => &found.query,
+                        Side::Reference => &found.reference,
+                    })),
+                    None => kept_surf(&photo.gray, memo, surf, || trace.checkpoint())?,
+                };
+                Described { features: found.value, sift: None, reused: found.reused }
+            }
+            Detector::Sift(sift) => {
+                let found = memo.try_recall(sift, SiftFeatures::heap_bytes, || {
+                    sift_interruptible(&photo.gray, sift, || trace.checkpoint())
+                })?;
+                let (keypoints, descriptors) = (found.value.keypoints.clone(), Vec::new());
+                let features = Arc::new(Features { keypoints, descriptors });
+                Described { features, sift: Some(found.value), reused: found.reused }
             }
         };
-        trace.emit(|| FeaturesDetected { side, features: Arc::clone(&features.value) })?;
-        Ok(features)
+        let features = &described.features;
+        trace.emit(|| FeaturesDetected { side, features: Arc::clone(features) })?;
+        Ok(described)
     }
 
     fn best_matches(
         &self,
         problem: &Problem,
-        query: &Features,
-        reference: &Features,
+        Detected { query, reference }: &Detected,
         trace: &mut Trace<'_>,
     ) -> Result<Recalled<Decided>, Halt> {
-        if let Some(found) = found_elsewhere(problem)? {
+        if let Detector::Surf(_) = self.detector
+            && let Some(found) = found_elsewhere(problem)?
+        {
             return Ok(Recalled::made(Arc::new(Arc::clone(&found.decisions))));
         }
         let FeatureParams { ratio, unique, .. } = self.params;
         let bytes = |decided: &Decided| size_of_val(&**decided);
-        let found = problem.try_recall((self.surf, ratio, unique), bytes, || {
-            matches_of(query, reference, &self.params, || trace.checkpoint())
+        let found = problem.try_recall((&self.detector, ratio, unique), bytes, || {
+            let checkpoint = || trace.checkpoint();
+            match (&query.sift, &reference.sift) {
+                (Some(query), Some(reference)) => {
+                    let (query, reference) = (&query.descriptors, &reference.descriptors);
+                    decided(query, reference, &self.params, checkpoint)
+                }
+                _ => {
+                    let [query, reference] =
+                        [query, reference].map(|one| &one.features.descriptors);
+                    decided(query, reference, &self.params, checkpoint)
+                }
+            }
         });
         Ok(found?)
     }
@@ -277,22 +377,52 @@ impl FeatureBased {
     ) -> Result<Arc<[LiftedMatch]>, Cancelled> {
         let cloud = projected_cloud(tuple, self.params.visible.then_some(&self.render));
         trace.emit(|| ProjectedCloud { points: tuple.cloud.len(), in_view: cloud.len() })?;
+        let all = self.guide.as_ref().map(|_| self.lifted(tuple, reference));
         let mut lifted = Vec::with_capacity(matches.len());
         for matches in matches.chunks(LIFTED_AT_A_TIME) {
             trace.checkpoint()?;
-            lifted.extend(matches.iter().map(|&(query_index, reference_index)| {
-                let pixel: Point2<f64> = reference.keypoints[reference_index].pixel();
-                let reading = cloud.read(&pixel, self.params.depth_radius_px);
-                LiftedMatch {
-                    query: query_index,
-                    reference: reference_index,
-                    lidar_distance_px: reading.distance_px,
-                    depth_range_m: reading.within.map(|depths| (depths.least, depths.greatest)),
-                    point: self.depth(&reading).map(|z| tuple.intrinsics.unproject(&pixel, z)),
+            lifted.extend(matches.iter().map(|&(query, number)| match &all {
+                Some(all) => LiftedMatch { query, ..all[number] },
+                None => {
+                    let pixel = reference.keypoints[number].pixel();
+                    LiftedMatch { query, ..self.lifted_at(number, &pixel, &cloud, tuple) }
                 }
             }));
         }
         Ok(lifted.into())
+    }
+
+    /// The depth of every feature of a reference, whatever it matches.
+    fn lifted(&self, tuple: &ReferenceTuple, reference: &Features) -> Arc<Vec<LiftedMatch>> {
+        let FeatureParams { visible, depth_radius_px, depth, depth_spread, .. } = self.params;
+        let bytes = |lifted: &Vec<LiftedMatch>| size_of_val(lifted.as_slice());
+        let depth = (visible, &self.render, depth_radius_px, depth, depth_spread);
+        let lifted = tuple.memo.recall((&self.detector, depth), bytes, || {
+            let cloud = projected_cloud(tuple, visible.then_some(&self.render));
+            let keypoints = reference.keypoints.iter().enumerate();
+            let lift = |(number, keypoint): (usize, &Keypoint)| {
+                self.lifted_at(number, &keypoint.pixel(), &cloud, tuple)
+            };
+            keypoints.map(lift).collect()
+        });
+        lifted.value
+    }
+
+    fn lifted_at(
+        &self,
+        reference: usize,
+        pixel: &Point2<f64>,
+        cloud: &ProjectedCloudIndex,
+        tuple: &ReferenceTuple,
+    ) -> LiftedMatch {
+        let reading = cloud.read(pixel, self.params.depth_radius_px);
+        LiftedMatch {
+            query: 0,
+            reference,
+            lidar_distance_px: reading.distance_px,
+            depth_range_m: reading.within.map(|depths| (depths.least, depths.greatest)),
+            point: self.depth(&reading).map(|z| tuple.intrinsics.unproject(pixel, z)),
+        }
     }
 
     fn depth(&self, reading: &DepthReading) -> Option<f64> {
@@ -311,7 +441,7 @@ impl FeatureBased {
     ) -> Result<Consensus, Halt> {
         let intrinsics = &problem.query.intrinsics;
         let params = &self.params.mlesac;
-        let seed = problem.random_seed("mlesac");
+        let seed = problem.random_seed(self.purpose);
         // Whoever does not listen has no use for the trials.
         let is_heard = trace.wants::<HypothesisTried>();
         let inputs = (intrinsics, params, seed, correspondences, is_heard);
@@ -346,7 +476,7 @@ impl FeatureBased {
     ) -> Result<Solved, Cancelled> {
         let intrinsics = &problem.query.intrinsics;
         let params = &self.params.mlesac;
-        let seed = problem.random_seed("mlesac");
+        let seed = problem.random_seed(self.purpose);
         let found = mlesac(correspondences, intrinsics, params, seed, |trial| {
             trials.take_if(|trials| trials.len() == REMEMBERED_TRIALS);
             if let Some(trials) = &mut trials {
@@ -361,27 +491,27 @@ impl FeatureBased {
         };
         Ok(Solved { outcome, trials })
     }
+}
 
-    fn accept(
-        &self,
-        problem: &Problem,
-        correspondences: &[Correspondence],
-        consensus: &Consensus,
-        trace: &mut Trace<'_>,
-    ) -> Result<Pose, Halt> {
-        let intrinsics = &problem.query.intrinsics;
-        let beyond =
-            self.beyond_chance(correspondences, &consensus.inliers, intrinsics, f64::NEG_INFINITY);
-        let found = FoundConsensus {
-            reference_from_query: consensus.pose.inverse(),
-            acceptance: beyond.acceptance,
-            tested: beyond.tested,
-            counted: beyond.counted,
-            is_enough: self.accepts(&beyond.acceptance),
-            slack: self.slack(),
-        };
-        found.judged(problem, trace)
+impl Detected {
+    /// Whether no pose can come of so few.
+    fn is_too_few(&self) -> bool {
+        [&self.query, &self.reference].iter().any(|one| one.features.keypoints.len() < MINIMUM)
     }
+}
+
+impl Pairing {
+    /// That of a match; `None` where it has no depth.
+    pub(super) fn of(query: &Features, lifted: &LiftedMatch) -> Option<Self> {
+        let pixel = query.keypoints[lifted.query].pixel();
+        let correspondence = Correspondence { pixel, point: lifted.point? };
+        Some(Self { query: lifted.query, reference: lifted.reference, correspondence })
+    }
+}
+
+/// The correspondences of pairings, in their order.
+pub(super) fn correspondences(pairings: &[Pairing]) -> Vec<Correspondence> {
+    pairings.iter().map(|pairing| pairing.correspondence).collect()
 }
 
 /// The matches that somebody brought, if any: what finds and matches features else.
@@ -397,15 +527,14 @@ fn found_elsewhere(problem: &Problem) -> Result<Option<&FoundMatches>, Failure> 
 }
 
 /// The best match of each query feature, and whether it stands out.
-fn matches_of<E>(
-    query: &Features,
-    reference: &Features,
+fn decided<const N: usize, E>(
+    query: &[[f32; N]],
+    reference: &[[f32; N]],
     params: &FeatureParams,
     checkpoint: impl FnMut() -> Result<(), E>,
 ) -> Result<Decided, E> {
-    let (query, reference) = (&query.descriptors, &reference.descriptors);
     let ratio = params.ratio as f32;
-    let mut matches = features::best_matches(query, reference, ratio, checkpoint)?;
+    let mut matches = best_matches(query, reference, ratio, checkpoint)?;
     if !params.unique {
         for found in matches.iter_mut().flatten() {
             if let MatchVerdict::NotUnique { .. } = found.verdict {
@@ -416,15 +545,14 @@ fn matches_of<E>(
     Ok(matches.into())
 }
 
-/// The cloud of a reference tuple projected into its own photo, remembered with the tuple; where
-/// `visible` says how, without the points that something nearer hides from the camera, which the scanner
-/// beside it may have met all the same.
+/// The cloud of a reference tuple projected into its own photo, kept with the tuple; where `visible` says how,
+/// without the points that something nearer hides from the camera, which the scanner beside it may have met all
+/// the same.
 pub fn projected_cloud(
     tuple: &ReferenceTuple,
     visible: Option<&RenderParams>,
 ) -> Arc<ProjectedCloudIndex> {
-    let visible = visible.map(|render| RenderParams { visibility: true, ..render.clone() });
-    let cloud = tuple.memo.recall(&visible, ProjectedCloudIndex::heap_bytes, || match &visible {
+    let cloud = tuple.memo.recall(visible, ProjectedCloudIndex::heap_bytes, || match visible {
         None => ProjectedCloudIndex::new(&tuple.cloud, &tuple.intrinsics),
         Some(render) => {
             let points = tuple.visible_cloud(render).positions().collect();
@@ -440,6 +568,7 @@ pub fn count_matches(query: &Features, reference: &Features, params: &FeaturePar
     if query.keypoints.len() < MINIMUM || reference.keypoints.len() < MINIMUM {
         return 0;
     }
-    let Ok(matches) = matches_of(query, reference, params, || Ok::<_, Infallible>(()));
+    let (query, reference) = (&query.descriptors, &reference.descriptors);
+    let Ok(matches) = decided(query, reference, params, || Ok::<_, Infallible>(()));
     matches.iter().flatten().filter(|found| found.verdict == MatchVerdict::Candidate).count()
 }

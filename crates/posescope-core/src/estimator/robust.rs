@@ -15,7 +15,7 @@ pub use params::RobustParams;
 use super::feature::Agreed;
 use super::mi6::{Found, JUDGED};
 use super::{
-    CostSummary, Estimator, Failure, FeatureBased, Guided, Halt, Outcome, SixFreedoms, own,
+    CostSummary, Estimator, Failure, FeatureBased, Halt, Outcome, SixFreedoms, own,
     separate_failure,
 };
 use crate::event::{BranchTaken, CandidatesJudged, JudgedPose, Stage};
@@ -42,7 +42,7 @@ pub(super) const ENTRY: super::Entry = super::Entry {
 /// The estimator that takes the cheaper pose.
 pub struct Robust {
     feature: FeatureBased,
-    guided: Guided,
+    guided: FeatureBased,
     six: SixFreedoms,
     params: RobustParams,
 }
@@ -59,7 +59,7 @@ impl Robust {
     pub fn new(params: &Params) -> Self {
         Self {
             feature: FeatureBased::new(params),
-            guided: Guided::new(params),
+            guided: FeatureBased::guided(params),
             six: SixFreedoms::new(params),
             params: params.robust.clone(),
         }
@@ -182,10 +182,10 @@ impl Estimator for Robust {
         leave_out(ENTRY.method, JUDGED);
         trace.stage(Stage::Estimator(ENTRY.method), |trace| {
             let proposal = self.feature.propose(problem, trace)?;
-            let (guided, guided_agreed) = self.guided.propose(problem, trace)?;
+            let guided = self.guided.propose(problem, trace)?;
             let proposed: Vec<Proposed> = [
                 (Method::FB, proposal.consensus, &proposal.outcome),
-                (super::fb2::ENTRY.method, guided_agreed, &guided),
+                (super::fb2::ENTRY.method, guided.consensus, &guided.outcome),
             ]
             .into_iter()
             .filter_map(|(method, agreed, outcome)| {

@@ -1,14 +1,13 @@
 //! What an estimate from several references has in common with that from one.
 
 use super::states::FeatureStates;
-use super::{FeatureBased, MINIMUM};
+use super::{FeatureBased, Pairing};
 use crate::camera::Intrinsics;
-use crate::depth::LiftedMatch;
 use crate::estimator::{Failure, Halt};
-use crate::event::Side;
 use crate::problem::Problem;
 use crate::robust::{
-    Acceptance, AcceptanceRule, Counted, MlesacError, MlesacParams, Places, places_beyond_chance,
+    Acceptance, AcceptanceRule, Counted, MlesacError, MlesacParams, Places, effective_area_px,
+    inliers_beyond_chance, places_beyond_chance,
 };
 use crate::solver::Correspondence;
 use crate::trace::{Cancelled, Trace};
@@ -38,24 +37,20 @@ impl FeatureBased {
     pub(in crate::estimator) fn gather(&self, problem: &Problem) -> Result<Gathered, Failure> {
         let gathered = || {
             let trace = &mut Trace::off();
-            let query = self.detect(Side::Query, problem, trace)?.value;
-            let reference = self.detect(Side::Reference, problem, trace)?.value;
-            let mut states = FeatureStates::new(query.keypoints.len());
-            let matches = match query.keypoints.len().min(reference.keypoints.len()) {
-                0..MINIMUM => Vec::new(),
-                _ => {
-                    let decisions = self.best_matches(problem, &query, &reference, trace)?;
-                    states.after_matching(&decisions.value)
+            let detected = self.detect(problem, trace)?;
+            let query = &detected.query.features;
+            let matches = match detected.is_too_few() {
+                true => Vec::new(),
+                false => {
+                    let decisions = self.best_matches(problem, &detected, trace)?;
+                    FeatureStates::new(query.keypoints.len()).after_matching(&decisions.value)
                 }
             };
-            let lifted = self.lift(&matches, &reference, &problem.reference, trace)?;
-            let correspondence = |lifted: &LiftedMatch| {
-                let pixel = query.keypoints[lifted.query].pixel();
-                let point = lifted.point?;
-                Some(Correspondence { pixel, point })
-            };
+            let reference = &detected.reference.features;
+            let lifted = self.lift(&matches, reference, &problem.reference, trace)?;
+            let pairings = lifted.iter().filter_map(|lifted| Pairing::of(query, lifted));
             Ok::<_, Halt>(Gathered {
-                correspondences: lifted.iter().filter_map(correspondence).collect(),
+                correspondences: pairings.map(|pairing| pairing.correspondence).collect(),
                 unique: matches.len(),
                 query_keypoints: query.keypoints.len(),
             })
@@ -105,14 +100,22 @@ impl FeatureBased {
         // The paper's rule counts whatever there is.
         let is_once = self.params.once && self.params.accept == AcceptanceRule::Consensus;
         let reach_px = if is_once { threshold_px } else { least_reach_px };
-        let places = Places::of(correspondences.iter().map(|c| c.pixel), reach_px);
-        let area_px = intrinsics.area();
+        let (pixels, area_px) = (correspondences.iter().map(|c| c.pixel), intrinsics.area());
         // False matches gather where the texture is, so chance has less room than the whole image.
-        let acceptance = places_beyond_chance(inliers, &places, threshold_px, area_px);
+        if reach_px < 0.0 {
+            let area_px = effective_area_px(&pixels.collect::<Vec<_>>(), area_px);
+            let (inliers, tested) = (inliers.len(), correspondences.len());
+            return BeyondChance {
+                acceptance: inliers_beyond_chance(inliers, tested, threshold_px, area_px),
+                tested,
+                counted: Counted::Correspondences,
+            };
+        }
+        let places = Places::of(pixels, reach_px);
         BeyondChance {
-            acceptance,
+            acceptance: places_beyond_chance(inliers, &places, threshold_px, area_px),
             tested: places.count(),
-            counted: if reach_px >= 0.0 { Counted::Places } else { Counted::Correspondences },
+            counted: Counted::Places,
         }
     }
 

@@ -2,13 +2,14 @@
 
 use std::sync::Arc;
 
+use super::Pairing;
 use crate::depth::LiftedMatch;
 use crate::estimator::FeatureCounts;
 use crate::features::FeatureState;
 use crate::features::{Match, MatchVerdict};
-use crate::robust::Consensus;
 
 /// The state of each query feature, brought up to date by every stage until the one it ends in.
+#[derive(Default)]
 pub(in crate::estimator) struct FeatureStates {
     states: Vec<FeatureState>,
 }
@@ -53,28 +54,15 @@ impl FeatureStates {
         }
     }
 
-    pub(in crate::estimator) fn after_consensus(
-        &mut self,
-        members: &[usize],
-        consensus: &Consensus,
-    ) {
-        for (&query, &residual_px) in members.iter().zip(&consensus.residuals_px) {
-            self.states[query] = FeatureState::Outlier { residual_px };
-        }
-        for &inlier in &consensus.inliers {
-            self.states[members[inlier]] =
-                FeatureState::Inlier { residual_px: consensus.residuals_px[inlier] };
-        }
-    }
-
-    /// What a pose makes of matches, by query feature and residual \[px\]: inliers are within the threshold.
+    /// What a pose makes of matches, by their residuals \[px\]: inliers are within the threshold.
     pub(in crate::estimator) fn after_pose(
         &mut self,
-        residuals_px: impl Iterator<Item = (usize, f64)>,
+        pairings: &[Pairing],
+        residuals_px: &[f64],
         threshold_px: f64,
     ) {
-        for (query, residual_px) in residuals_px {
-            self.states[query] = if residual_px <= threshold_px {
+        for (pairing, &residual_px) in pairings.iter().zip(residuals_px) {
+            self.states[pairing.query] = if residual_px <= threshold_px {
                 FeatureState::Inlier { residual_px }
             } else {
                 FeatureState::Outlier { residual_px }
