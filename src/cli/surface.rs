@@ -83,8 +83,8 @@ fn method(is_named: bool, methods: &[Method]) -> Result<Method, CliError> {
         }
     };
     let entry = estimator::find(method);
-    match entry.map(|entry| &entry.parts) {
-        Some(estimator::Parts::Cost(_)) => Ok(method),
+    match entry.and_then(|entry| entry.family) {
+        Some(estimator::Family::Grid) => Ok(method),
         _ => Err(no_cost(method)),
     }
 }

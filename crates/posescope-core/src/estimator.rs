@@ -2,32 +2,32 @@
 //! what it does to a [`Trace`].
 //!
 //! A direct estimator is a registered [cost](crate::cost::ALL) with a search, so a new cost is a new
-//! method. Any other estimator is one file, its `mod` line, its [`Entry`] in [`all`], and its kind in
-//! [`Parts`] where it is made of something new.
+//! method. Any other estimator is one file, its `mod` line and its [`Entry`] in [`all`].
 
 mod consensus;
 mod direct;
 mod failure;
+mod family;
 mod fb2;
 mod feature;
 mod given;
 mod hybrid;
 mod joint;
 mod mi6;
-mod own;
 mod robust;
 
 pub use direct::Direct;
 pub use failure::Failure;
-pub use fb2::GuidedParams;
-pub use feature::{DepthRule, FeatureBased, FeatureParams, count_matches, projected_cloud};
+pub use family::Family;
+pub use feature::{
+    DepthRule, FeatureBased, FeatureParams, GuidedParams, count_matches, projected_cloud,
+};
 pub use given::Given;
 pub use hybrid::{Hybrid, HybridParts, hybrid_outcome};
 pub use joint::{
     JointDirect, JointEstimator, JointFeatures, JointHybrid, JointOutcome, JointReference,
 };
 pub use mi6::{SixFreedoms, SixParams};
-pub use own::Own;
 pub use robust::{Robust, RobustParams};
 
 use std::str::FromStr;
@@ -132,92 +132,112 @@ pub trait Estimator: Send + Sync {
     }
 }
 
-/// An estimator's place in the registry.
-#[derive(Debug)]
+/// Makes something with parameters.
+type Make<T> = Box<dyn Fn(&Params) -> T + Send + Sync>;
+
+/// An estimator's place in the registry. It states all that others need to know of the estimator.
 pub struct Entry {
     /// The method that it is.
     pub method: Method,
     /// What the estimator does, in one phrase.
     pub about: &'static str,
-    /// What it is made of.
-    pub parts: Parts,
-}
-
-/// What an estimator is made of. Whoever shows a run asks this, and not which method it is.
-#[derive(Debug)]
-pub enum Parts {
-    /// Features, matched and lifted to 3-D points.
-    Features,
-    /// A cost and a search for its minimum.
-    Cost(&'static cost::Entry),
-    /// The pose of one method, and of another where that has none.
-    Hybrid(HybridParts),
-    /// What is made of neither, and says so itself.
-    Own(Own),
+    /// How it finds its pose, which decides its confidence and its verdicts; `None` for a hybrid, whose poses are
+    /// those of its methods.
+    pub family: Option<Family>,
+    cost: Option<&'static cost::Entry>,
+    hybrid: Option<HybridParts>,
+    make: Make<Box<dyn Estimator>>,
+    joint: Make<Option<Box<dyn JointEstimator>>>,
+    least_probability: fn(&Params) -> f64,
 }
 
 impl Entry {
+    /// An estimator that takes one reference at a time, minimises no cost and lets every pose pass.
+    fn new(
+        method: Method,
+        about: &'static str,
+        make: impl Fn(&Params) -> Box<dyn Estimator> + Send + Sync + 'static,
+    ) -> Self {
+        Self {
+            method,
+            about,
+            family: None,
+            cost: None,
+            hybrid: None,
+            make: Box::new(make),
+            joint: Box::new(|_| None),
+            least_probability: |_| 0.0,
+        }
+    }
+
     /// The estimator with these parameters.
     pub fn make(&self, params: &Params) -> Box<dyn Estimator> {
-        match self.parts {
-            Parts::Features => Box::new(FeatureBased::new(params)),
-            Parts::Cost(cost) => Box::new(Direct::new(cost, params)),
-            Parts::Hybrid(parts) => Box::new(Hybrid::new(self.method, parts, params)),
-            Parts::Own(own) => (own.make)(params),
-        }
+        (self.make)(params)
+    }
+
+    /// The estimator that takes several references at once with these parameters; `None` for a method that takes
+    /// one at a time.
+    pub fn make_joint(&self, params: &Params) -> Option<Box<dyn JointEstimator>> {
+        (self.joint)(params)
     }
 
     /// The cost that it searches by itself, or by which its views are explained.
     pub fn cost(&self) -> Option<&'static cost::Entry> {
-        match self.parts {
-            Parts::Cost(cost) => Some(cost),
-            Parts::Own(own) => own.cost(),
-            Parts::Features | Parts::Hybrid(_) => None,
-        }
+        self.cost
     }
 
     /// The least probability of being within 1 m with which it lets a pose pass; 0 for those that judge
     /// their poses by nothing else than what they are found by, as the paper's do.
     pub fn least_probability(&self, params: &Params) -> f64 {
-        match self.parts {
-            Parts::Own(own) => (own.least_probability)(params).unwrap_or(0.0),
-            Parts::Features | Parts::Cost(_) | Parts::Hybrid(_) => 0.0,
-        }
+        (self.least_probability)(params)
     }
 
     /// The methods that it runs inside, if it is made of others.
     pub fn hybrid(&self) -> Option<HybridParts> {
-        match self.parts {
-            Parts::Hybrid(parts) => Some(parts),
-            Parts::Features | Parts::Cost(_) | Parts::Own(_) => None,
-        }
+        self.hybrid
     }
 }
 
-/// The paper's estimators that are no cost with a search.
-const FEATURE: Entry = Entry {
-    method: Method::FB,
-    about: "indirect: SURF, ratio match, depth from the cloud, P3P and MLESAC",
-    parts: Parts::Features,
-};
-const HYBRID: Entry = Entry {
-    method: Method::HY,
-    about: "the feature-based pose, and mutual information where that has none",
-    parts: Parts::Hybrid(HybridParts { first: Method::FB, second: Method::MI }),
-};
+/// FB.
+fn feature_based() -> Entry {
+    let about = "indirect: SURF, ratio match, depth from the cloud, P3P and MLESAC";
+    Entry {
+        family: Some(Family::Features),
+        joint: Box::new(|params| Some(Box::new(JointFeatures::new(params)))),
+        ..Entry::new(Method::FB, about, |params| Box::new(FeatureBased::new(params)))
+    }
+}
+
+/// HY.
+fn hybrid() -> Entry {
+    let parts = HybridParts { first: Method::FB, second: Method::MI };
+    let about = "the feature-based pose, and mutual information where that has none";
+    Entry {
+        hybrid: Some(parts),
+        joint: Box::new(move |params| Some(Box::new(JointHybrid::new(parts, params)?))),
+        ..Entry::new(Method::HY, about, move |params| {
+            Box::new(Hybrid::new(Method::HY, parts, params))
+        })
+    }
+}
+
+/// The search of a cost over the grid.
+fn direct(cost: &'static cost::Entry) -> Entry {
+    Entry {
+        family: Some(Family::Grid),
+        cost: Some(cost),
+        joint: Box::new(|params| Some(Box::new(JointDirect::new(cost, params)))),
+        ..Entry::new(Method::named(cost.name), cost.about, |params| {
+            Box::new(Direct::new(cost, params))
+        })
+    }
+}
 
 /// Every estimator: those of the paper in its order, then the others. Each registered cost is one.
 pub fn all() -> &'static [Entry] {
     static ALL: LazyLock<Vec<Entry>> = LazyLock::new(|| {
-        let direct = cost::ALL.iter().map(|cost| Entry {
-            method: Method::named(cost.name),
-            about: cost.about,
-            parts: Parts::Cost(cost),
-        });
-        let mut all: Vec<_> = [FEATURE, HYBRID, fb2::ENTRY, mi6::ENTRY, robust::ENTRY]
-            .into_iter()
-            .chain(direct)
-            .collect();
+        let others = [feature_based(), hybrid(), fb2::entry(), mi6::entry(), robust::entry()];
+        let mut all: Vec<Entry> = others.into_iter().chain(cost::ALL.iter().map(direct)).collect();
         all.sort_by_key(|entry| entry.method);
         all
     });

@@ -5,7 +5,7 @@ use nalgebra::Point3;
 use crate::app::ViewContext;
 use crate::camera::Intrinsics;
 use crate::depth::LiftedMatch;
-use crate::estimator::{self, Parts};
+use crate::estimator::{self, Family};
 use crate::event::{Event, Side};
 use crate::features::{FeatureState, Keypoint, Match, MatchVerdict};
 use crate::geometry::Pose;
@@ -59,7 +59,7 @@ impl<'a> FeatureProgress<'a> {
         let with_features = |method: Method| {
             estimator::find(method).is_some_and(|entry| match entry.hybrid() {
                 Some(parts) => parts.first == Method::FB,
-                None => matches!(entry.parts, Parts::Features),
+                None => entry.family == Some(Family::Features),
             })
         };
         let asked = context.setup.task.protocol.methods.iter().copied();

@@ -1,5 +1,6 @@
 //! FB, the indirect feature-based method (paper, section 2.1 and appendix A).
 
+mod guide;
 mod params;
 mod several;
 pub(super) mod states;
@@ -9,11 +10,13 @@ use std::sync::Arc;
 
 use nalgebra::Point2;
 
+pub(super) use self::guide::Guide;
+pub use self::guide::GuidedParams;
+use self::guide::last_matches;
 pub use self::params::{DepthRule, FeatureParams};
 pub(super) use self::several::Gathered;
 use self::states::FeatureStates;
 use super::consensus::FoundConsensus;
-use super::fb2::{Guide, last_matches};
 use super::{Estimator, Failure, FeatureCounts, Halt, Outcome, separate_failure};
 use crate::cloud::Cloud;
 use crate::depth::{DepthReading, LiftedMatch, ProjectedCloudIndex};

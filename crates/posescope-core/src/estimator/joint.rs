@@ -17,10 +17,9 @@ pub use hybrid::JointHybrid;
 
 use std::sync::Arc;
 
-use super::{Entry, Failure, Parts};
+use super::Failure;
 use crate::fusion::share::{Share, ShareOutcome, Support};
 use crate::geometry::{Pose, PoseError};
-use crate::params::Params;
 use crate::problem::Problem;
 use crate::trace::{Cancelled, Trace};
 
@@ -115,22 +114,5 @@ fn between(to: &Problem, from: &Problem) -> Pose {
         Pose::identity()
     } else {
         to.reference.world_from_camera.inverse() * from.reference.world_from_camera
-    }
-}
-
-impl Entry {
-    /// The estimator that takes several references at once with these parameters; `None` for a method
-    /// that takes one at a time.
-    pub fn make_joint(&self, params: &Params) -> Option<Box<dyn JointEstimator>> {
-        match self.parts {
-            Parts::Features => Some(Box::new(JointFeatures::new(params))),
-            Parts::Cost(cost) => Some(Box::new(JointDirect::new(cost, params))),
-            Parts::Hybrid(parts) => {
-                let part = |method| super::find(method)?.make_joint(params);
-                let (first, second) = (part(parts.first)?, part(parts.second)?);
-                Some(Box::new(JointHybrid::new(parts, first, second)))
-            }
-            Parts::Own(_) => None,
-        }
     }
 }

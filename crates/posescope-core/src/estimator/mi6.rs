@@ -20,8 +20,7 @@ use std::sync::Arc;
 pub use params::SixParams;
 
 use super::direct::Direct;
-use super::own;
-use super::{CostSummary, Estimator, Failure, Halt, Outcome, separate_failure};
+use super::{CostSummary, Entry, Estimator, Failure, Family, Halt, Outcome, separate_failure};
 use crate::cost;
 use crate::event::{Moment, PhaseSearched, PoseScored, Stage, StartsRefined, ViewRendered};
 use crate::geometry::{Pose, PoseError};
@@ -33,17 +32,24 @@ use crate::problem::Problem;
 use crate::render::{Comparison, RenderParams, Score, leave_out};
 use crate::trace::{Cancelled, Trace};
 
+/// The method.
+pub(super) const METHOD: Method = Method::named("mi6");
+
 /// The estimator in the registry.
-pub(super) const ENTRY: super::Entry = super::Entry {
-    method: Method::named("mi6"),
-    about: "mutual information in six freedoms: several yaws, starts and channels, refined",
-    parts: super::Parts::Own(own::Own {
-        make: |params| Box::new(SixFreedoms::new(params)),
-        shows: Some("mi"),
-        has_features: false,
-        least_probability: |_| None,
-    }),
-};
+pub(super) fn entry() -> Entry {
+    let about = "mutual information in six freedoms: several yaws, starts and channels, refined";
+    Entry {
+        family: Some(Family::Starts),
+        cost: Some(shown()),
+        ..Entry::new(METHOD, about, |params| Box::new(SixFreedoms::new(params)))
+    }
+}
+
+/// The registered cost by which the views are explained.
+pub(super) fn shown() -> &'static cost::Entry {
+    let shown = cost::ALL.iter().find(|entry| entry.name == Method::MI.name());
+    shown.expect("the paper's cost is registered")
+}
 
 /// The step below which the refinement of all starts ends, before the best go on in six freedoms \[m\].
 const PLANE_LAST_M: f64 = 0.05;
@@ -117,14 +123,13 @@ fn middle(values: &mut [f64]) -> f64 {
 impl SixFreedoms {
     /// The estimator with these parameters.
     pub fn new(params: &Params) -> Self {
-        let shown = cost::ALL.iter().find(|entry| entry.name == "mi");
         Self {
             params: params.mi6.clone(),
             grid: params.grid.clone(),
             render: params.render.clone(),
             judge: params.judge.clone(),
             radius_slack: params.fb.radius_slack,
-            view: Direct::new(shown.expect("the paper's cost is registered"), params),
+            view: Direct::new(shown(), params),
         }
     }
 
@@ -333,8 +338,8 @@ impl SixFreedoms {
 
 impl Estimator for SixFreedoms {
     fn estimate(&self, problem: &Problem, trace: &mut Trace<'_>) -> Result<Outcome, Cancelled> {
-        leave_out(ENTRY.method, JUDGED);
-        let found = trace.stage(Stage::Estimator(ENTRY.method), |trace| {
+        leave_out(METHOD, JUDGED);
+        let found = trace.stage(Stage::Estimator(METHOD), |trace| {
             let judge = self.judge(problem);
             self.search(problem, &judge, trace)
         });

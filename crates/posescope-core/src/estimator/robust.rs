@@ -13,9 +13,9 @@ use std::sync::Arc;
 pub use params::RobustParams;
 
 use super::feature::Agreed;
-use super::mi6::{Found, JUDGED};
+use super::mi6::{self, Found, JUDGED, shown};
 use super::{
-    CostSummary, Estimator, Failure, FeatureBased, Halt, Outcome, SixFreedoms, own,
+    CostSummary, Entry, Estimator, Failure, Family, FeatureBased, Halt, Outcome, SixFreedoms, fb2,
     separate_failure,
 };
 use crate::event::{BranchTaken, CandidatesJudged, JudgedPose, Stage};
@@ -27,17 +27,19 @@ use crate::problem::Problem;
 use crate::render::{Comparison, leave_out};
 use crate::trace::{Cancelled, Trace};
 
+/// The method.
+const METHOD: Method = Method::named("robust");
+
 /// The estimator in the registry.
-pub(super) const ENTRY: super::Entry = super::Entry {
-    method: Method::named("robust"),
-    about: "the cheapest of the poses of fb, fb2 and mi6, refined under one cost",
-    parts: super::Parts::Own(own::Own {
-        make: |params| Box::new(Robust::new(params)),
-        shows: Some("mi"),
-        has_features: true,
-        least_probability: |params| Some(params.robust.least_probability),
-    }),
-};
+pub(super) fn entry() -> Entry {
+    let about = "the cheapest of the poses of fb, fb2 and mi6, refined under one cost";
+    Entry {
+        family: Some(Family::Starts),
+        cost: Some(shown()),
+        least_probability: |params| params.robust.least_probability,
+        ..Entry::new(METHOD, about, |params| Box::new(Robust::new(params)))
+    }
+}
 
 /// The estimator that takes the cheaper pose.
 pub struct Robust {
@@ -72,9 +74,8 @@ impl Robust {
         trace: &mut Trace<'_>,
     ) -> Result<(Pose, Option<CostSummary>), Halt> {
         let judge = self.six.judge(problem);
-        let found = trace.stage(Stage::Estimator(super::mi6::ENTRY.method), |trace| {
-            self.six.search(problem, &judge, trace)
-        });
+        let found = trace
+            .stage(Stage::Estimator(mi6::METHOD), |trace| self.six.search(problem, &judge, trace));
         let found = separate_failure(found)?;
         trace.stage(Stage::Judge, |trace| {
             let Found { refined, summary, spread } = match found {
@@ -84,7 +85,7 @@ impl Robust {
             let mut candidates: Vec<JudgedPose> = refined
                 .iter()
                 .map(|&refined| JudgedPose {
-                    method: super::mi6::ENTRY.method,
+                    method: mi6::METHOD,
                     refined,
                     from_features: false,
                     accepted: true,
@@ -179,13 +180,13 @@ fn why(candidates: &[JudgedPose]) -> String {
 
 impl Estimator for Robust {
     fn estimate(&self, problem: &Problem, trace: &mut Trace<'_>) -> Result<Outcome, Cancelled> {
-        leave_out(ENTRY.method, JUDGED);
-        trace.stage(Stage::Estimator(ENTRY.method), |trace| {
+        leave_out(METHOD, JUDGED);
+        trace.stage(Stage::Estimator(METHOD), |trace| {
             let proposal = self.feature.propose(problem, trace)?;
             let guided = self.guided.propose(problem, trace)?;
             let proposed: Vec<Proposed> = [
                 (Method::FB, proposal.consensus, &proposal.outcome),
-                (super::fb2::ENTRY.method, guided.consensus, &guided.outcome),
+                (fb2::METHOD, guided.consensus, &guided.outcome),
             ]
             .into_iter()
             .filter_map(|(method, agreed, outcome)| {

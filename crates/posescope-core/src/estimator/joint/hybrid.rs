@@ -1,8 +1,9 @@
 //! The joint hybrid: the joint pose of one method, and of another where that has none.
 
 use super::{JointEstimator, JointOutcome, JointReference};
-use crate::estimator::HybridParts;
+use crate::estimator::{HybridParts, entry};
 use crate::event::BranchTaken;
+use crate::params::Params;
 use crate::trace::{Cancelled, Trace};
 
 /// The hybrid of two methods that each take several references at once.
@@ -13,13 +14,10 @@ pub struct JointHybrid {
 }
 
 impl JointHybrid {
-    /// The hybrid of these, which are the joint estimators of its methods.
-    pub fn new(
-        parts: HybridParts,
-        first: Box<dyn JointEstimator>,
-        second: Box<dyn JointEstimator>,
-    ) -> Self {
-        Self { parts, first, second }
+    /// The hybrid of both with these parameters; `None` if one takes one reference at a time.
+    pub fn new(parts: HybridParts, params: &Params) -> Option<Self> {
+        let part = |method| entry(method).make_joint(params);
+        Some(Self { parts, first: part(parts.first)?, second: part(parts.second)? })
     }
 }
 

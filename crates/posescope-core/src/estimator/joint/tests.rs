@@ -1,3 +1,4 @@
+use crate::params::Params;
 use std::sync::Arc;
 
 use super::*;
