@@ -11,8 +11,8 @@ use crate::localize::{ChoiceError, Ranking};
 use crate::params::Params;
 use crate::problem::Query;
 use crate::retrieval::{
-    BuildError, BuildProgress, BuildRequest, BuildSummary, Criterion, Index, IndexError, Ranked,
-    Retrieval, RetrievalParams, build,
+    BuildError, BuildProgress, BuildRequest, BuildSummary, Clustering, Criterion, Index,
+    IndexError, Ranked, Retrieval, RetrievalParams, build,
 };
 use crate::trace::Cancelled;
 use posescope_core::files::user_cache_folder;
@@ -94,6 +94,7 @@ impl Retriever {
             let content = format!("{} {:016x}", without.len(), xxh3_64(names.as_bytes()));
             recipe.insert("without".to_owned(), content);
         }
+        let RetrievalParams { sample, iterations, trees, checks, .. } = params.retrieval;
         BuildRequest {
             scene: scene.name().to_owned(),
             fingerprint: scene.fingerprint(),
@@ -101,12 +102,8 @@ impl Retriever {
                 .step_by(every.max(1))
                 .filter(|frame| !without.contains(frame))
                 .collect(),
-            words,
-            seed,
-            sample: params.retrieval.sample,
-            iterations: params.retrieval.iterations,
-            trees: params.retrieval.trees,
-            checks: params.retrieval.checks,
+            clustering: Clustering { words, iterations, trees, checks, seed },
+            sample,
             recipe,
         }
     }

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use cpu_time::ProcessTime;
 use posescope::features::{Descriptor, Features, Keypoint};
-use posescope::retrieval::{BuildRequest, Index, RetrievalParams, build};
+use posescope::retrieval::{BuildRequest, Clustering, Index, RetrievalParams, build};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_pcg::Pcg64;
 
@@ -92,17 +92,14 @@ fn cells<const N: usize>(numbers: [f64; N]) -> String {
 }
 
 fn built(path: &Path, frames: usize, options: &Options) -> Result<[f64; 6], Failure> {
-    let params = RetrievalParams::default();
+    let RetrievalParams { sample, iterations, trees, checks, .. } = RetrievalParams::default();
+    let words = options.words;
     let request = BuildRequest {
         scene: "synthetic".to_owned(),
         fingerprint: 0,
         frames: (0..frames).collect(),
-        words: options.words,
-        seed: 0,
-        sample: params.sample,
-        iterations: params.iterations,
-        trees: params.trees,
-        checks: params.checks,
+        clustering: Clustering { words, iterations, trees, checks, seed: 0 },
+        sample,
         recipe: BTreeMap::new(),
     };
     let (started, worked) = (Instant::now(), ProcessTime::now());

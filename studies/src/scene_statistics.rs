@@ -1,5 +1,7 @@
+use std::convert::Infallible;
+
 use posescope::estimator;
-use posescope::features::{MatchVerdict, SurfParams, classify, nearest_neighbours, surf};
+use posescope::features::{MatchVerdict, SurfParams, best_matches, surf};
 use posescope::geometry::PoseError;
 use posescope::image::GrayImage;
 use posescope::localize::localize;
@@ -175,8 +177,7 @@ fn pairs(
         let photo = scene.photo(reference)?;
         let [q, r] = [&query_frame.photo.gray, &photo.gray]
             .map(|gray| surf(gray, &SurfParams::default()).descriptors);
-        let [there, back] = [nearest_neighbours(&q, &r), nearest_neighbours(&r, &q)];
-        let matches = classify(&there, &back, MAX_RATIO);
+        let Ok(matches) = best_matches(&q, &r, MAX_RATIO, || Ok::<_, Infallible>(()));
         let kept = matches.iter().flatten();
         let kept = kept.filter(|found| found.verdict == MatchVerdict::Candidate);
         survivors.push(kept.count() as f64);

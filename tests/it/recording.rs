@@ -535,8 +535,8 @@ fn any_method_is_recorded_be_it_registered_or_not() {
     let mut recorder = open(&path, &[mine]);
     recorder.begin_query(0, std::slice::from_ref(&problem), None);
     recorder.begin_method(0, mine);
-    let cost = cost::ALL[0].params;
-    let estimator = Direct::searching("mine", cost().cost(), &Params::default());
+    let cost = (cost::ALL[0].make)();
+    let estimator = Direct::searching("mine", cost, &Params::default());
     localize_by(&estimator, &problem, &mut Trace::to(&mut recorder))
         .expect("a recorder never cancels")
         .pose

@@ -31,7 +31,7 @@ pub use orientation::Orientation;
 pub use photometric::Photometric;
 pub use statistic::{CostOfPairs, Explanation, ExplanationKind, PhotometricWeights, Statistic};
 
-use crate::describe::{About, Describe, ParamVisitor, choice};
+use crate::describe::{About, Describe, Field, choice};
 use crate::image::{FloatImage, GrayImage, cubic_interpolated};
 use crate::memo::{Key, key};
 
@@ -177,12 +177,14 @@ impl CostSetting {
 }
 
 impl Describe for CostSetting {
-    fn visit(&mut self, visitor: &mut dyn ParamVisitor) {
-        self.cost.visit(visitor);
+    fn fields(&mut self) -> Vec<Field<'_>> {
+        let mut fields = self.cost.fields();
         if self.is_smooth {
             let doc = "How the pose of least cost is found: over the grid, or from the reference pose downhill.";
-            visitor.choice(About { name: "search", unit: "", doc }, &mut self.search);
+            let about = About { name: "search", unit: "", doc };
+            fields.push(Field::choice(about, &mut self.search));
         }
+        fields
     }
 }
 

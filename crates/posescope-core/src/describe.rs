@@ -1,10 +1,11 @@
 //! How parameters describe themselves: name, unit, range, meaning.
 //!
-//! A struct of parameters is declared by `parameters!`, shows its fields to a [`ParamVisitor`] and
-//! knows nothing of the other structs; [`crate::params`] puts them together.
+//! `parameters!` declares a struct of parameters, which knows nothing of the other structs; [`crate::params`] puts
+//! them together.
 
 use std::fmt;
 use std::ops::RangeInclusive;
+use std::str::FromStr;
 
 /// What a parameter is called, measured in and good for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -39,22 +40,75 @@ pub trait Choice {
     fn choose(&mut self, index: usize);
 }
 
-/// Something that walks over parameters: a list, a setter, a panel of sliders.
-pub trait ParamVisitor {
-    /// Visits a real number.
-    fn number(&mut self, about: About, value: &mut f64, range: RangeInclusive<f64>);
-    /// Visits a whole number.
-    fn count(&mut self, about: About, value: &mut usize, range: RangeInclusive<usize>);
-    /// Visits a switch.
-    fn flag(&mut self, about: About, value: &mut bool);
-    /// One of a few names.
-    fn choice(&mut self, about: About, value: &mut dyn Choice);
+/// A parameter of a struct, and its place there.
+pub struct Field<'a> {
+    about: About,
+    place: Place<'a>,
 }
 
-/// A struct that shows its parameters to a visitor, in a fixed order.
+enum Place<'a> {
+    Number(&'a mut f64, RangeInclusive<f64>),
+    Count(&'a mut usize, RangeInclusive<usize>),
+    Flag(&'a mut bool),
+    Choice(&'a mut dyn Choice),
+}
+
+/// A struct that describes its parameters.
 pub trait Describe {
-    /// Shows each parameter once.
-    fn visit(&mut self, visitor: &mut dyn ParamVisitor);
+    /// Each parameter, in a fixed order.
+    fn fields(&mut self) -> Vec<Field<'_>>;
+}
+
+impl<'a> Field<'a> {
+    /// A real number.
+    pub fn number(about: About, value: &'a mut f64, range: RangeInclusive<f64>) -> Self {
+        Self { about, place: Place::Number(value, range) }
+    }
+
+    /// A whole number.
+    pub fn count(about: About, value: &'a mut usize, range: RangeInclusive<usize>) -> Self {
+        Self { about, place: Place::Count(value, range) }
+    }
+
+    /// A switch.
+    pub fn flag(about: About, value: &'a mut bool) -> Self {
+        Self { about, place: Place::Flag(value) }
+    }
+
+    /// One of a few names.
+    pub fn choice(about: About, value: &'a mut dyn Choice) -> Self {
+        Self { about, place: Place::Choice(value) }
+    }
+
+    fn described(&self) -> Described {
+        let (value, domain) = match &self.place {
+            Place::Number(value, range) => (Value::Number(**value), Domain::Number(range.clone())),
+            Place::Count(value, range) => (Value::Count(**value), Domain::Count(range.clone())),
+            Place::Flag(value) => (Value::Flag(**value), Domain::Flag),
+            Place::Choice(choice) => {
+                let names = choice.names();
+                (Value::Choice(names[choice.index()]), Domain::Choice(names))
+            }
+        };
+        Described { key: self.about.name.to_owned(), about: self.about, value, domain }
+    }
+
+    /// Sets the parameter; `None` where the text is no value of it.
+    fn set(self, text: &str) -> Option<()> {
+        match self.place {
+            Place::Number(value, range) => *value = parsed(text).filter(|v| range.contains(v))?,
+            Place::Count(value, range) => *value = parsed(text).filter(|v| range.contains(v))?,
+            Place::Flag(value) => *value = parsed(text)?,
+            Place::Choice(choice) => {
+                choice.choose(choice.names().iter().position(|name| *name == text)?);
+            }
+        }
+        Some(())
+    }
+}
+
+fn parsed<T: FromStr>(text: &str) -> Option<T> {
+    text.parse().ok()
 }
 
 /// The value of a parameter.
@@ -157,9 +211,7 @@ fn hint(nearest: &Option<String>) -> String {
 
 /// The parameters of a struct with their present values; keys are their bare names.
 pub fn list(params: &mut (impl Describe + ?Sized)) -> Vec<Described> {
-    let mut lister = ListVisitor::default();
-    params.visit(&mut lister);
-    lister.rows
+    params.fields().iter().map(Field::described).collect()
 }
 
 /// Sets a parameter of a struct from text; `None` where there is none of this name.
@@ -171,82 +223,13 @@ pub fn set(
     name: &str,
     text: &str,
 ) -> Option<Result<(), Domain>> {
-    let mut setter = SetVisitor { name, text, outcome: None };
-    params.visit(&mut setter);
-    setter.outcome
+    let field = params.fields().into_iter().find(|field| field.about.name == name)?;
+    let domain = field.described().domain;
+    Some(field.set(text).ok_or(domain))
 }
 
-#[derive(Default)]
-struct ListVisitor {
-    rows: Vec<Described>,
-}
-
-impl ListVisitor {
-    fn push(&mut self, about: About, value: Value, domain: Domain) {
-        self.rows.push(Described { key: about.name.to_owned(), about, value, domain });
-    }
-}
-
-impl ParamVisitor for ListVisitor {
-    fn number(&mut self, about: About, value: &mut f64, range: RangeInclusive<f64>) {
-        self.push(about, Value::Number(*value), Domain::Number(range));
-    }
-    fn count(&mut self, about: About, value: &mut usize, range: RangeInclusive<usize>) {
-        self.push(about, Value::Count(*value), Domain::Count(range));
-    }
-    fn flag(&mut self, about: About, value: &mut bool) {
-        self.push(about, Value::Flag(*value), Domain::Flag);
-    }
-    fn choice(&mut self, about: About, value: &mut dyn Choice) {
-        let names = value.names();
-        self.push(about, Value::Choice(names[value.index()]), Domain::Choice(names));
-    }
-}
-
-/// Sets the parameter `name` of the struct it is shown.
-struct SetVisitor<'a> {
-    name: &'a str,
-    text: &'a str,
-    outcome: Option<Result<(), Domain>>,
-}
-
-impl SetVisitor<'_> {
-    fn set<T>(&mut self, about: About, parsed: Option<T>, domain: Domain, place: &mut T) {
-        if about.name == self.name {
-            self.outcome = Some(match parsed {
-                Some(value) => {
-                    *place = value;
-                    Ok(())
-                }
-                None => Err(domain),
-            });
-        }
-    }
-}
-
-impl ParamVisitor for SetVisitor<'_> {
-    fn number(&mut self, about: About, value: &mut f64, range: RangeInclusive<f64>) {
-        let parsed = self.text.parse().ok().filter(|v| range.contains(v));
-        self.set(about, parsed, Domain::Number(range), value);
-    }
-    fn count(&mut self, about: About, value: &mut usize, range: RangeInclusive<usize>) {
-        let parsed = self.text.parse().ok().filter(|v| range.contains(v));
-        self.set(about, parsed, Domain::Count(range), value);
-    }
-    fn flag(&mut self, about: About, value: &mut bool) {
-        self.set(about, self.text.parse().ok(), Domain::Flag, value);
-    }
-    fn choice(&mut self, about: About, value: &mut dyn Choice) {
-        let names = value.names();
-        let mut index = value.index();
-        let parsed = names.iter().position(|name| *name == self.text);
-        self.set(about, parsed, Domain::Choice(names), &mut index);
-        value.choose(index);
-    }
-}
-
-/// Declares a struct of parameters together with its [`Describe`]: each field with its kind, key,
-/// unit and range. What it means is the first paragraph of its doc comment.
+/// Declares a struct of parameters together with its [`Default`] and [`Describe`]: each field with its default,
+/// kind, key, unit and range. What it means is the first paragraph of its doc comment.
 ///
 /// ```text
 /// parameters! {
@@ -254,15 +237,15 @@ impl ParamVisitor for SetVisitor<'_> {
 ///     #[derive(Clone, Debug, PartialEq)]
 ///     pub struct LookParams {
 ///         /// How far to look.
-///         pub reach_m: f64 = number("reach", "m", 0.1..=50.0),
+///         pub reach_m: f64 = 2.5 => number("reach", "m", 0.1..=50.0),
 ///         /// How often to look.
-///         pub rounds: usize = count("rounds", "", 1..=10),
+///         pub rounds: usize = 1 => count("rounds", "", 1..=10),
 ///         /// Whether to look back.
-///         pub back: bool = flag("back"),
+///         pub back: bool = false => flag("back"),
 ///         /// Where to begin.
-///         pub side: Side = choice("side"),
-///         /// What the struct inside says of itself.
-///         pub glasses: GlassesParams = group(),
+///         pub side: Side = Side::Left => choice("side"),
+///         /// The parameters of the struct inside.
+///         pub glasses: GlassesParams = GlassesParams::default() => group(),
 ///     }
 /// }
 /// ```
@@ -274,7 +257,7 @@ macro_rules! parameters {
         $visibility:vis struct $name:ident {
             $(
                 $(#[doc = $doc:literal])*
-                $field_visibility:vis $field:ident: $type:ty = $kind:ident $arguments:tt
+                $field_visibility:vis $field:ident: $type:ty = $default:expr => $kind:ident $arguments:tt
             ),* $(,)?
         }
     ) => {
@@ -287,13 +270,21 @@ macro_rules! parameters {
             )*
         }
 
+        impl Default for $name {
+            fn default() -> Self {
+                Self { $($field: $default),* }
+            }
+        }
+
         impl $crate::describe::Describe for $name {
-            fn visit(&mut self, visitor: &mut dyn $crate::describe::ParamVisitor) {
+            fn fields(&mut self) -> Vec<$crate::describe::Field<'_>> {
+                let mut fields = Vec::new();
                 $(
                     $crate::describe::parameters!(
-                        @show $kind $arguments, visitor, &mut self.$field, concat!($($doc, "\n"),*)
+                        @add $kind $arguments, fields, &mut self.$field, concat!($($doc, "\n"),*)
                     );
                 )*
+                fields
             }
         }
     };
@@ -308,20 +299,15 @@ macro_rules! parameters {
         concat!("\n`", stringify!($range), "` \\[", $unit, "\\]")
     };
 
-    (@show group (), $visitor:ident, $place:expr, $doc:expr) => {
-        $crate::describe::Describe::visit($place, $visitor)
+    (@add group (), $fields:ident, $place:expr, $doc:expr) => {
+        $fields.extend($crate::describe::Describe::fields($place))
     };
-    (@show $kind:ident ($key:literal), $visitor:ident, $place:expr, $doc:expr) => {
-        $visitor.$kind($crate::describe::About { name: $key, unit: "", doc: $doc }, $place)
-    };
-    (@show $kind:ident ($key:literal, $unit:literal, $range:expr),
-        $visitor:ident, $place:expr, $doc:expr) => {
-        $visitor.$kind(
-            $crate::describe::About { name: $key, unit: $unit, doc: $doc },
-            $place,
-            $range,
-        )
-    };
+    (@add $kind:ident ($key:literal $(, $unit:literal, $range:expr)?),
+        $fields:ident, $place:expr, $doc:expr) => {{
+        let unit = concat!("" $(, $unit)?);
+        let about = $crate::describe::About { name: $key, unit, doc: $doc };
+        $fields.push($crate::describe::Field::$kind(about, $place $(, $range)?))
+    }};
 }
 pub(crate) use parameters;
 
@@ -364,7 +350,7 @@ mod tests {
             /// at most.
             ///
             /// This is nobody's business.
-            rounds: usize = count("rounds", "", 1..=10),
+            rounds: usize = 3 => count("rounds", "", 1..=10),
         }
     }
 
@@ -372,57 +358,35 @@ mod tests {
         /// One of each kind.
         struct All {
             /// How far, as in [`std`].
-            reach_m: f64 = number("reach", "m", 0.5..=2.0),
+            reach_m: f64 = 1.5 => number("reach", "m", 0.5..=2.0),
             /// Whether at all.
-            is_on: bool = flag("on"),
+            is_on: bool = true => flag("on"),
             /// Inside.
-            inner: Inner = group(),
+            inner: Inner = Inner::default() => group(),
             /// Which side.
-            side: Side = choice("side"),
-        }
-    }
-
-    /// Writes down what it is shown.
-    #[derive(Default)]
-    struct RecordingVisitor(Vec<String>);
-
-    impl RecordingVisitor {
-        fn write(&mut self, about: About, rest: &str) {
-            let About { name, unit, .. } = about;
-            self.0.push(format!("{name} [{unit}] {}: {rest}", about.help()));
-        }
-    }
-
-    impl ParamVisitor for RecordingVisitor {
-        fn number(&mut self, about: About, value: &mut f64, range: RangeInclusive<f64>) {
-            self.write(about, &format!("{value} in {range:?}"));
-        }
-        fn count(&mut self, about: About, value: &mut usize, range: RangeInclusive<usize>) {
-            self.write(about, &format!("{value} in {range:?}"));
-        }
-        fn flag(&mut self, about: About, value: &mut bool) {
-            self.write(about, &format!("{value}"));
-        }
-        fn choice(&mut self, about: About, value: &mut dyn Choice) {
-            let chosen = value.names()[value.index()];
-            value.choose(0);
-            self.write(about, &format!("{chosen} of {:?}", value.names()));
+            side: Side = Side::Right => choice("side"),
         }
     }
 
     #[test]
     fn every_field_is_shown_in_order_with_the_first_paragraph_of_its_doc_comment() {
-        let mut all =
-            All { reach_m: 1.5, is_on: true, inner: Inner { rounds: 3 }, side: Side::Right };
-        let mut visitor = RecordingVisitor::default();
-        all.visit(&mut visitor);
-        let shown = [
-            "reach [m] How far, as in std: 1.5 in 0.5..=2.0",
-            "on [] Whether at all: true",
-            "rounds [] A number of times, at most: 3 in 1..=10",
-            "side [] Which side: right of [\"left\", \"right\"]",
+        let mut all = All::default();
+        let shown: Vec<String> = list(&mut all)
+            .into_iter()
+            .map(|Described { about, value, domain, .. }| {
+                format!("{} [{}] {}: {value} in {domain}", about.name, about.unit, about.help())
+            })
+            .collect();
+        let expected = [
+            "reach [m] How far, as in std: 1.5 in 0.5 … 2",
+            "on [] Whether at all: true in true | false",
+            "rounds [] A number of times, at most: 3 in 1 … 10",
+            "side [] Which side: right in left | right",
         ];
-        assert_eq!(visitor.0, shown);
-        assert_eq!(all.side, Side::Left);
+        assert_eq!(shown, expected);
+        assert_eq!(set(&mut all, "side", "left"), Some(Ok(())));
+        assert_eq!(set(&mut all, "rounds", "11"), Some(Err(Domain::Count(1..=10))));
+        assert_eq!(set(&mut all, "turns", "1"), None);
+        assert_eq!((all.side, all.inner.rounds), (Side::Left, 3));
     }
 }

@@ -107,7 +107,7 @@ impl<'a> Subject<'a> {
         }
     }
 
-    /// The same, compared with the truth: right is what is within the tolerance of it.
+    /// The same, compared with the truth: a pose within the tolerance of it is right.
     #[must_use]
     pub fn against(self, truth: Option<&'a Pose>, tolerance: Tolerance) -> Self {
         Self { truth, tolerance, ..self }
@@ -145,14 +145,9 @@ pub fn diagnose(subject: &Subject<'_>) -> Vec<Diagnosis> {
         let failure = subject.outcome.pose.as_ref().err();
         return failure.map(Diagnosis::of_failure).into_iter().collect();
     };
-    let is_searched = matches!(family, Family::Grid | Family::Given);
-    let mut found = if is_searched && grade != Grade::Right {
-        Search::of(subject, family == Family::Given, |search| {
-            tried(&Case::new(subject, family, search), grade)
-        })
-    } else {
-        tried(&Case::new(subject, family, None), grade)
-    };
+    let estimator = search::estimator_of(subject, family).filter(|_| grade != Grade::Right);
+    let search = estimator.as_ref().and_then(|one| Search::of(subject, family, one.as_ref()));
+    let mut found = tried(&Case::new(subject, family, search.as_ref()), grade);
     // A method's own failure, unless a rule says more than that something else is suspect.
     let is_explained = found.iter().any(|one| one.code.is_failure() && one.code != Code::X1);
     if let (Err(failure), false) = (&subject.outcome.pose, is_explained) {
@@ -169,7 +164,7 @@ pub fn diagnose(subject: &Subject<'_>) -> Vec<Diagnosis> {
 }
 
 /// The verdicts of all rules that apply, in their order.
-fn tried(case: &Case<'_, '_>, grade: Grade) -> Vec<Diagnosis> {
+fn tried(case: &Case<'_>, grade: Grade) -> Vec<Diagnosis> {
     let mut found = Vec::new();
     let mut is_concluded = false;
     for rule in RULES {

@@ -1,7 +1,7 @@
-//! What the estimators tell: one struct per event, one line in the list of kinds.
+//! The events of the estimators, one struct each.
 //!
-//! Large payloads are shared (`Arc`), so keeping an event is cheap. Written as data, an event has one array for
-//! each property of what it has many of, and of a picture or a cloud the number of its pixels or points.
+//! Large payloads are shared (`Arc`), so keeping an event is cheap. Written as data, an event has one array
+//! for each property of its items, and for a picture or a cloud the number of its pixels or points.
 
 mod columns;
 
@@ -119,7 +119,7 @@ pub struct KindSet(u32);
 impl KindSet {
     /// Every kind.
     pub const ALL: Self = Self(u32::MAX);
-    /// No kind; stages are told all the same.
+    /// No kind; stage events come all the same.
     pub const NONE: Self = Self(0);
 
     /// Just these kinds.
@@ -146,8 +146,14 @@ impl KindSet {
 }
 
 macro_rules! events {
-    ($($name:ident),+ $(,)?) => {
-        /// Anything that an estimator tells.
+    ($($(#[$attribute:meta])* pub struct $name:ident { $($fields:tt)+ })+) => {
+        $(
+            $(#[$attribute])*
+            #[derive(Clone, Debug, Serialize)]
+            pub struct $name { $($fields)+ }
+        )+
+
+        /// Any event of an estimator.
         #[derive(Clone, Debug, Serialize)]
         #[serde(tag = "kind")]
         #[allow(missing_docs, reason = "each variant is named after the struct it holds")]
@@ -183,64 +189,235 @@ macro_rules! events {
 }
 
 events! {
-    StageStarted,
-    StageEnded,
-    FeaturesDetected,
-    MatchesDecided,
-    ProjectedCloud,
-    DepthsLifted,
-    HypothesisTried,
-    PoseRefined,
-    ConsensusJudged,
-    FeaturesClassified,
-    MatchesGuided,
-    CloudColored,
-    PoseScored,
-    PhaseSearched,
-    ViewRendered,
-    MinimumAssessed,
-    BranchTaken,
-    ReferencesFused,
-    ReferencesRanked,
-    StartsRefined,
-    CandidatesJudged,
-    DescentStepped,
-}
+    /// A stage begins.
+    #[derive(Copy, PartialEq)]
+    pub struct StageStarted {
+        /// The stage.
+        pub stage: Stage,
+    }
 
-/// A stage begins.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct StageStarted {
-    /// The stage.
-    pub stage: Stage,
-}
+    /// A stage is over.
+    #[derive(Copy, PartialEq)]
+    pub struct StageEnded {
+        /// The stage.
+        pub stage: Stage,
+        /// Whether it did what it was for.
+        pub succeeded: bool,
+        /// Whether its result is from an earlier run.
+        pub reused: bool,
+    }
 
-/// A stage is over.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct StageEnded {
-    /// The stage.
-    pub stage: Stage,
-    /// Whether it did what it was for.
-    pub succeeded: bool,
-    /// Whether its result was remembered from an earlier run.
-    pub reused: bool,
-}
+    /// SURF features of one photo.
+    pub struct FeaturesDetected {
+        /// The photo that the features are of.
+        pub side: Side,
+        /// Keypoints and descriptors.
+        #[serde(flatten, serialize_with = "columns::features")]
+        pub features: Arc<Features>,
+    }
 
-/// SURF features of one photo.
-#[derive(Clone, Debug, Serialize)]
-pub struct FeaturesDetected {
-    /// The photo that the features are of.
-    pub side: Side,
-    /// Keypoints and descriptors.
-    #[serde(flatten, serialize_with = "columns::features")]
-    pub features: Arc<Features>,
-}
+    /// What matching decided about each query keypoint.
+    pub struct MatchesDecided {
+        /// One per query keypoint, in their order; `None` where the reference has no feature.
+        #[serde(flatten, serialize_with = "columns::decisions")]
+        pub decisions: Arc<[Option<Match>]>,
+    }
 
-/// What matching decided about each query keypoint.
-#[derive(Clone, Debug, Serialize)]
-pub struct MatchesDecided {
-    /// One per query keypoint, in their order; `None` where the reference has no feature.
-    #[serde(flatten, serialize_with = "columns::decisions")]
-    pub decisions: Arc<[Option<Match>]>,
+    /// The cloud was projected into the reference photo.
+    #[derive(Copy, PartialEq)]
+    pub struct ProjectedCloud {
+        /// Points of the scan.
+        pub points: usize,
+        /// Points that the reference camera has in view.
+        pub in_view: usize,
+    }
+
+    /// Depths of the unique matches.
+    pub struct DepthsLifted {
+        /// One per unique match, in the order of the query keypoints.
+        #[serde(flatten, serialize_with = "columns::lifted")]
+        pub matches: Arc<[LiftedMatch]>,
+    }
+
+    /// One trial of MLESAC.
+    pub struct HypothesisTried {
+        /// Sample, likelihood, support.
+        #[serde(flatten)]
+        pub trial: Trial,
+    }
+
+    /// The best hypothesis after refinement on its inliers.
+    pub struct PoseRefined {
+        /// The query camera in the reference camera's frame.
+        #[serde(serialize_with = "columns::rows")]
+        pub reference_from_query: Pose,
+        /// Correspondences with a residual within the threshold, for this pose.
+        pub inliers: usize,
+        /// Correspondences in all.
+        pub correspondences: usize,
+        /// Trials that MLESAC made.
+        pub trials: usize,
+    }
+
+    /// Whether the consensus was accepted, and why.
+    pub struct ConsensusJudged {
+        /// The test for more inliers than chance explains.
+        #[serde(flatten)]
+        pub acceptance: Acceptance,
+        /// What it counted.
+        pub counted: Counted,
+        /// Distance of the pose from the reference \[m\].
+        pub distance_m: f64,
+        /// Whether the pose is returned.
+        pub accepted: bool,
+    }
+
+    /// Every query feature with the state it ended in.
+    pub struct FeaturesClassified {
+        /// One per query keypoint, in their order.
+        #[serde(flatten, serialize_with = "columns::states")]
+        pub states: Arc<[FeatureState]>,
+    }
+
+    /// The matches that a pose is judged by after features were matched again where it says they must be.
+    pub struct MatchesGuided {
+        /// The last match with a depth of each query feature that has one, in the order of the features.
+        #[serde(flatten, serialize_with = "columns::lifted")]
+        pub matches: Arc<[LiftedMatch]>,
+    }
+
+    /// The cloud took the reference photo's grey values.
+    pub struct CloudColored {
+        /// The coloured points, and how many were left out and why.
+        #[serde(rename = "points", serialize_with = "columns::points")]
+        pub cloud: Arc<ColoredCloud>,
+    }
+
+    /// One hypothesis of the grid search.
+    #[derive(Copy, PartialEq)]
+    pub struct PoseScored {
+        /// Part of the search.
+        pub phase: Phase,
+        /// Number of this evaluation within the estimator's run.
+        pub evaluation: u64,
+        /// Where the hypothesis is.
+        pub offset: Offset,
+        /// Cost and covered pixels.
+        pub score: Score,
+        /// Covered pixels over those covered at the reference pose.
+        pub coverage: f64,
+        /// Whether it is the best of the phase so far.
+        pub is_best: bool,
+    }
+
+    /// One phase of the grid search is complete.
+    pub struct PhaseSearched {
+        /// The cost and coverage surfaces.
+        #[serde(flatten, serialize_with = "columns::surface")]
+        pub surface: Arc<ScoredLattice>,
+        /// The best offset, if any hypothesis had a cost.
+        pub best: Option<Offset>,
+    }
+
+    /// A synthetic view and its comparison with the query.
+    pub struct ViewRendered {
+        /// Why it was rendered.
+        pub moment: Moment,
+        /// The evaluation it belongs to.
+        pub evaluation: u64,
+        /// Where the camera is.
+        pub offset: Offset,
+        /// The view, its cost and what made it.
+        #[serde(flatten, serialize_with = "columns::comparison")]
+        pub comparison: Arc<Comparison>,
+    }
+
+    /// How the minimum of the search compares with other poses.
+    #[derive(Copy, PartialEq)]
+    pub struct MinimumAssessed {
+        /// Where the minimum is.
+        pub offset: Offset,
+        /// Cost at the reference pose.
+        pub initial: Option<f64>,
+        /// Cost at the minimum.
+        pub best: f64,
+        /// Cost at the minimum with the view's pixels shuffled: what no relation at all costs.
+        pub shuffled: Option<f64>,
+        /// Cost of the second-best local minimum of the coarse positions.
+        pub runner_up: Option<f64>,
+    }
+
+    /// Which way the hybrid went.
+    #[derive(PartialEq)]
+    pub struct BranchTaken {
+        /// The method whose pose the hybrid returns.
+        #[serde(rename = "taken")]
+        pub method: Method,
+        /// Why FB's pose was kept or not.
+        pub why: String,
+    }
+
+    /// Several references gave a pose each, and a fusion made one of them.
+    pub struct ReferencesFused {
+        /// The fusion's name.
+        pub fusion: &'static str,
+        /// What each reference alone gave, and its weight, in the order of the references.
+        #[serde(flatten, serialize_with = "columns::shares")]
+        pub shares: Arc<[Share]>,
+        /// The fused pose, `world_from_camera`; `None` where every reference with a weight failed.
+        #[serde(rename = "world_from_camera", serialize_with = "columns::rows_if_any")]
+        pub pose: Option<Pose>,
+    }
+
+    /// Frames were ranked by what they look like, and the first of them became references.
+    pub struct ReferencesRanked {
+        /// The best frames with their scores, and what verification made of them.
+        #[serde(flatten, serialize_with = "columns::ranking")]
+        pub ranking: Arc<ReferenceRanking>,
+        /// The photos of [`ReferenceRanking::pictured`], in that order; `None` for one that cannot be
+        /// read.
+        #[serde(skip)]
+        pub photos: Arc<[Option<Arc<Photo>>]>,
+    }
+
+    /// Several starts were refined side by side.
+    pub struct StartsRefined {
+        /// The directions in which they moved.
+        pub freedoms: Freedoms,
+        /// Where each started and ended, the best first: that of least cost, where none of those that cost
+        /// about as little is likelier.
+        #[serde(flatten, serialize_with = "columns::refinements")]
+        pub refinements: Arc<[Refined]>,
+    }
+
+    /// The poses of several methods were refined under one cost and compared.
+    pub struct CandidatesJudged {
+        /// The candidates, the answer first.
+        #[serde(flatten, serialize_with = "columns::candidates")]
+        pub candidates: Arc<[JudgedPose]>,
+        /// How far the answer is below the costs of the coarse positions, in robust standard deviations.
+        pub deviations: f64,
+        /// How far it must be below them to be the answer.
+        pub needed: f64,
+        /// What the best candidate of each method costs, in words.
+        pub why: String,
+    }
+
+    /// A step downhill by the derivatives of a smooth cost.
+    #[derive(Copy, PartialEq)]
+    pub struct DescentStepped {
+        /// The copy of the photos, 0 the finest; each is twice as coarse as the one below.
+        pub level: usize,
+        /// Number of the step on this level, from 1.
+        pub step: usize,
+        /// The query camera in the reference camera's frame, after the step.
+        #[serde(serialize_with = "columns::rows")]
+        pub reference_from_camera: Pose,
+        /// The smooth cost there.
+        pub smooth_cost: f64,
+        /// The method's own cost there, and the pixels that it is of.
+        pub score: Score,
+    }
 }
 
 impl MatchesDecided {
@@ -251,106 +428,12 @@ impl MatchesDecided {
     }
 }
 
-/// The cloud was projected into the reference photo.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct ProjectedCloud {
-    /// Points of the scan.
-    pub points: usize,
-    /// Points that the reference camera has in view.
-    pub in_view: usize,
-}
-
-/// Depths of the unique matches.
-#[derive(Clone, Debug, Serialize)]
-pub struct DepthsLifted {
-    /// One per unique match, in the order of the query keypoints.
-    #[serde(flatten, serialize_with = "columns::lifted")]
-    pub matches: Arc<[LiftedMatch]>,
-}
-
 impl DepthsLifted {
     /// Number of matches with a depth.
     pub fn with_depth(&self) -> usize {
         let matches = self.matches.iter();
         matches.filter(|lifted| lifted.point.is_some()).count()
     }
-}
-
-/// One trial of MLESAC.
-#[derive(Clone, Debug, Serialize)]
-pub struct HypothesisTried {
-    /// Sample, likelihood, support.
-    #[serde(flatten)]
-    pub trial: Trial,
-}
-
-/// The best hypothesis after refinement on its inliers.
-#[derive(Clone, Debug, Serialize)]
-pub struct PoseRefined {
-    /// The query camera in the reference camera's frame.
-    #[serde(serialize_with = "columns::rows")]
-    pub reference_from_query: Pose,
-    /// Correspondences with a residual within the threshold, for this pose.
-    pub inliers: usize,
-    /// Correspondences in all.
-    pub correspondences: usize,
-    /// Trials that MLESAC made.
-    pub trials: usize,
-}
-
-/// Whether the consensus was accepted, and why.
-#[derive(Clone, Debug, Serialize)]
-pub struct ConsensusJudged {
-    /// The test for more inliers than chance explains.
-    #[serde(flatten)]
-    pub acceptance: Acceptance,
-    /// What it counted.
-    pub counted: Counted,
-    /// Distance of the pose from the reference \[m\].
-    pub distance_m: f64,
-    /// Whether the pose is returned.
-    pub accepted: bool,
-}
-
-/// Every query feature with the state it ended in.
-#[derive(Clone, Debug, Serialize)]
-pub struct FeaturesClassified {
-    /// One per query keypoint, in their order.
-    #[serde(flatten, serialize_with = "columns::states")]
-    pub states: Arc<[FeatureState]>,
-}
-
-/// The matches that a pose is judged by after features were matched again where it says they must be.
-#[derive(Clone, Debug, Serialize)]
-pub struct MatchesGuided {
-    /// The last match with a depth of each query feature that has one, in the order of the features.
-    #[serde(flatten, serialize_with = "columns::lifted")]
-    pub matches: Arc<[LiftedMatch]>,
-}
-
-/// The cloud took the reference photo's grey values.
-#[derive(Clone, Debug, Serialize)]
-pub struct CloudColored {
-    /// The coloured points, and how many were left out and why.
-    #[serde(rename = "points", serialize_with = "columns::points")]
-    pub cloud: Arc<ColoredCloud>,
-}
-
-/// One hypothesis of the grid search.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct PoseScored {
-    /// Part of the search.
-    pub phase: Phase,
-    /// Number of this evaluation within the estimator's run.
-    pub evaluation: u64,
-    /// Where the hypothesis is.
-    pub offset: Offset,
-    /// Cost and covered pixels.
-    pub score: Score,
-    /// Covered pixels over those covered at the reference pose.
-    pub coverage: f64,
-    /// Whether it is the best of the phase so far.
-    pub is_best: bool,
 }
 
 impl PoseScored {
@@ -360,16 +443,6 @@ impl PoseScored {
         let coverage = f64::from(score.covered) / f64::from(covered_at_reference.max(1));
         Self { phase, evaluation, offset, score, coverage, is_best }
     }
-}
-
-/// One phase of the grid search is complete.
-#[derive(Clone, Debug, Serialize)]
-pub struct PhaseSearched {
-    /// The cost and coverage surfaces.
-    #[serde(flatten, serialize_with = "columns::surface")]
-    pub surface: Arc<ScoredLattice>,
-    /// The best offset, if any hypothesis had a cost.
-    pub best: Option<Offset>,
 }
 
 /// Why a synthetic view was rendered.
@@ -382,111 +455,6 @@ pub enum Moment {
     NewBest,
     /// It is the view at the result.
     End,
-}
-
-/// A synthetic view and its comparison with the query.
-#[derive(Clone, Debug, Serialize)]
-pub struct ViewRendered {
-    /// Why it was rendered.
-    pub moment: Moment,
-    /// The evaluation it belongs to.
-    pub evaluation: u64,
-    /// Where the camera is.
-    pub offset: Offset,
-    /// The view, its cost and what made it.
-    #[serde(flatten, serialize_with = "columns::comparison")]
-    pub comparison: Arc<Comparison>,
-}
-
-/// How the minimum of the search compares with other poses.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct MinimumAssessed {
-    /// Where the minimum is.
-    pub offset: Offset,
-    /// Cost at the reference pose.
-    pub initial: Option<f64>,
-    /// Cost at the minimum.
-    pub best: f64,
-    /// Cost at the minimum with the view's pixels shuffled: what no relation at all costs.
-    pub shuffled: Option<f64>,
-    /// Cost of the second-best local minimum of the coarse positions.
-    pub runner_up: Option<f64>,
-}
-
-/// Which way the hybrid went.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct BranchTaken {
-    /// The method whose pose the hybrid returns.
-    #[serde(rename = "taken")]
-    pub method: Method,
-    /// Why FB's pose was kept or not.
-    pub why: String,
-}
-
-/// Several references gave a pose each, and a fusion made one of them.
-#[derive(Clone, Debug, Serialize)]
-pub struct ReferencesFused {
-    /// The fusion's name.
-    pub fusion: &'static str,
-    /// What each reference alone gave, and its weight, in the order of the references.
-    #[serde(flatten, serialize_with = "columns::shares")]
-    pub shares: Arc<[Share]>,
-    /// The fused pose, `world_from_camera`; `None` where every reference with a weight failed.
-    #[serde(rename = "world_from_camera", serialize_with = "columns::rows_if_any")]
-    pub pose: Option<Pose>,
-}
-
-/// Frames were ranked by what they look like, and the first of them became references.
-#[derive(Clone, Debug, Serialize)]
-pub struct ReferencesRanked {
-    /// The best frames with their scores, and what verification made of them.
-    #[serde(flatten, serialize_with = "columns::ranking")]
-    pub ranking: Arc<ReferenceRanking>,
-    /// The photos of [`ReferenceRanking::pictured`], in that order; `None` for one that cannot be
-    /// read.
-    #[serde(skip)]
-    pub photos: Arc<[Option<Arc<Photo>>]>,
-}
-
-/// A step downhill by the derivatives of a smooth cost.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct DescentStepped {
-    /// The copy of the photos, 0 the finest; each is twice as coarse as the one below.
-    pub level: usize,
-    /// Number of the step on this level, from 1.
-    pub step: usize,
-    /// The query camera in the reference camera's frame, after the step.
-    #[serde(serialize_with = "columns::rows")]
-    pub reference_from_camera: Pose,
-    /// The smooth cost there.
-    pub smooth_cost: f64,
-    /// The method's own cost there, and the pixels that it is of.
-    pub score: Score,
-}
-
-/// Several starts were refined side by side.
-#[derive(Clone, Debug, Serialize)]
-pub struct StartsRefined {
-    /// The directions in which they moved.
-    pub freedoms: Freedoms,
-    /// Where each started and ended, the best first: that of least cost, where none of those that cost
-    /// about as little is likelier.
-    #[serde(flatten, serialize_with = "columns::refinements")]
-    pub refinements: Arc<[Refined]>,
-}
-
-/// The poses of several methods were refined under one cost and compared.
-#[derive(Clone, Debug, Serialize)]
-pub struct CandidatesJudged {
-    /// The candidates, the answer first.
-    #[serde(flatten, serialize_with = "columns::candidates")]
-    pub candidates: Arc<[JudgedPose]>,
-    /// How far the answer is below the costs of the coarse positions, in robust standard deviations.
-    pub deviations: f64,
-    /// How far it must be below them to be the answer.
-    pub needed: f64,
-    /// What the best candidate of each method costs, in words.
-    pub why: String,
 }
 
 /// A pose among several that were compared.

@@ -14,8 +14,8 @@
 //! [`sift`] is another: Lowe, *Distinctive Image Features from Scale-Invariant Keypoints*, IJCV 60(2), 2004.
 //!
 //! `nearest` and `matching` then compare the descriptors of two images: [`nearest_neighbours`] finds
-//! the two nearest of every descriptor, and [`classify`] says of each whether its best match
-//! is distinct, mutual, or neither; [`best_matches_interruptible`] does both.
+//! the two nearest of every descriptor, and [`best_matches`] says of each whether its best match is distinct,
+//! mutual, or neither.
 //!
 //! All of it runs on all threads of the current [`rayon`] pool and gives the same result
 //! on any number of them. [`surf_interruptible`] and [`nearest_neighbours_interruptible`] can be
@@ -41,7 +41,7 @@ mod surf;
 use nalgebra::Point2;
 
 pub use found::{FoundMatches, PairMatches};
-pub use matching::{Match, MatchVerdict, best_matches_interruptible, classify};
+pub use matching::{Match, MatchVerdict, best_matches};
 pub use nearest::{Neighbours, nearest_neighbours, nearest_neighbours_interruptible};
 pub use params::SurfParams;
 pub use sift::{SiftDescriptor, SiftFeatures, SiftParams, sift, sift_interruptible};
@@ -91,7 +91,7 @@ pub struct Features {
 }
 
 impl Features {
-    /// The `count` strongest: what is found where [`SurfParams::max_keypoints`] is so many.
+    /// The `count` strongest, as [`SurfParams::max_keypoints`] keeps them.
     #[must_use]
     pub fn strongest(&self, count: usize) -> Self {
         let first = |length: usize| ..count.min(length);

@@ -17,7 +17,7 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> io::Result<()> {
     write_whole_with(path, |file| file.write_all(bytes))
 }
 
-/// Writes a file as [`write_whole`] does, from what is not in memory.
+/// Writes a file as [`write_whole`] does, piece by piece.
 ///
 /// # Errors
 /// The error of the system or of `write`.

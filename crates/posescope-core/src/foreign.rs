@@ -1,8 +1,8 @@
-//! What other systems answered: poses of queries, and matches of photos.
+//! Answers of other systems: poses of queries, and matches of photos.
 //!
-//! A pose that somebody else found is a method beside ours ([`Foreign::with_estimates`]): it runs nothing,
-//! and is measured, diagnosed and recorded as the others are. Matches that somebody else found
-//! ([`Foreign::with_matches`]) take the place of those of SURF; all that follows them stays.
+//! Poses become a method ([`Foreign::with_estimates`]) that runs nothing, and is measured, diagnosed and
+//! recorded as the others are. Matches ([`Foreign::with_matches`]) replace those of SURF; the steps after
+//! matching stay.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -51,8 +51,8 @@ impl Foreign {
         self.estimates.get(&method)
     }
 
-    /// The matches of a query with a reference, both by name; `None` where nobody brought any, so that
-    /// features are found and matched.
+    /// The matches of a query with a reference, both by name; `None` without a source, so that features are
+    /// detected and matched.
     ///
     /// # Errors
     /// When they cannot be read.

@@ -1,23 +1,17 @@
 //! Fusion: one pose from several references, each of which gave a candidate (paper, section 3.2).
 //!
-//! Every reference is localised against by itself first. A fusion of the paper then decides how much each
-//! of them has to say, from nothing but the number of feature matches between the query and the
-//! reference: matches that passed the ratio test and are mutually best, before any depth is looked up. The
-//! direct methods take their weights from the same matches. *joint* averages nothing: it asks the
-//! estimator for one pose from all references at once.
+//! First, the query is localised against each reference alone. A fusion of the paper then weighs the references
+//! by one number each: the feature matches with the query that pass the ratio test and are mutually best, before
+//! any depth is looked up. The weights of the direct methods are the same. *joint* averages nothing: the estimator
+//! takes all references at once.
 //!
-//! A new fusion is one file, its `mod` line and its entry in [`ALL`].
+//! A new fusion is an entry in [`ALL`].
 
 mod average;
-mod avg;
 mod joint;
-mod maxf;
-mod r_wavg;
 pub mod share;
-mod wavg;
 
 use std::fmt;
-use std::ops::Deref;
 use std::str::FromStr;
 use std::sync::Arc;
 
@@ -31,9 +25,9 @@ use crate::geometry::Pose;
 use crate::text::UnknownWord;
 use crate::trace::{Cancelled, Trace};
 
-/// A fusion's place in the registry.
-#[derive(Debug)]
-pub struct Entry {
+/// A way to one pose from several references. Two are equal that have the same name.
+#[derive(Clone, Copy, Debug)]
+pub struct Fusion {
     /// The name on the command line, in results and in tables.
     pub name: &'static str,
     /// What the fusion does, in one phrase.
@@ -42,7 +36,7 @@ pub struct Entry {
     pub way: Way,
 }
 
-/// What each reference has to say, given the number of its matches: not negative, 0 leaves it out, any
+/// The weight of each reference, given the number of its matches: not negative, 0 leaves it out, any
 /// common factor does not matter. At least one is positive where there is a reference.
 pub type Weigh = fn(&[usize]) -> Vec<f64>;
 
@@ -56,29 +50,67 @@ pub enum Way {
 }
 
 /// Every fusion, those of the paper in its order first.
-pub const ALL: &[Entry] = &[maxf::ENTRY, avg::ENTRY, wavg::ENTRY, r_wavg::ENTRY, joint::ENTRY];
+pub const ALL: &[Fusion] = &[
+    Fusion {
+        name: "maxf",
+        about: "the reference with the most matches alone",
+        way: Way::Weighed(most_matches),
+    },
+    Fusion {
+        name: "avg",
+        about: "the average over all references",
+        way: Way::Weighed(|matches| vec![1.0; matches.len()]),
+    },
+    Fusion {
+        name: "wavg",
+        about: "the average over all references, weighted by their matches",
+        way: Way::Weighed(by_matches),
+    },
+    Fusion {
+        name: "r-wavg",
+        about: "as wavg, over references with at least half of the most matches",
+        way: Way::Weighed(by_many_matches),
+    },
+    Fusion {
+        name: JOINT,
+        about: "no poses: the matches of all references in one consensus, the costs of all added up",
+        way: Way::Joint,
+    },
+];
 
-/// A fusion of the registry, to be handed around. Two are equal that have the same name.
-#[derive(Clone, Copy)]
-pub struct Fusion(&'static Entry);
+const JOINT: &str = "joint";
+
+/// All weight for the most matches; the first of equals wins.
+fn most_matches(matches: &[usize]) -> Vec<f64> {
+    let most = matches.iter().max();
+    let winner = matches.iter().position(|count| Some(count) == most);
+    (0..matches.len()).map(|index| if Some(index) == winner { 1.0 } else { 0.0 }).collect()
+}
+
+/// Where no reference has a match, none is better than another.
+fn by_matches(matches: &[usize]) -> Vec<f64> {
+    if matches.iter().all(|count| *count == 0) {
+        return vec![1.0; matches.len()];
+    }
+    matches.iter().map(|&count| count as f64).collect()
+}
+
+/// With K the most matches of any reference, those with at least K/2 stay.
+fn by_many_matches(matches: &[usize]) -> Vec<f64> {
+    let most = matches.iter().max().copied().unwrap_or_default();
+    let weighed = by_matches(matches).into_iter().zip(matches);
+    weighed.map(|(weight, &count)| if 2 * count >= most { weight } else { 0.0 }).collect()
+}
 
 impl Fusion {
     /// Every fusion, in the order of [`ALL`].
     pub fn all() -> impl Iterator<Item = Self> {
-        ALL.iter().map(Self)
+        ALL.iter().copied()
     }
 
     /// The four of the paper, which average poses.
     pub fn of_the_paper() -> impl Iterator<Item = Self> {
         Self::all().filter(|fusion| matches!(fusion.way, Way::Weighed(_)))
-    }
-}
-
-impl Deref for Fusion {
-    type Target = Entry;
-
-    fn deref(&self) -> &Entry {
-        self.0
     }
 }
 
@@ -90,12 +122,6 @@ impl PartialEq for Fusion {
 
 impl Eq for Fusion {}
 
-impl fmt::Debug for Fusion {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_tuple("Fusion").field(&self.name).finish()
-    }
-}
-
 impl fmt::Display for Fusion {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.pad(self.name)
@@ -106,9 +132,8 @@ impl FromStr for Fusion {
     type Err = UnknownWord;
 
     fn from_str(name: &str) -> Result<Self, UnknownWord> {
-        let names = ALL.iter().map(|entry| entry.name);
         let found = Self::all().find(|fusion| fusion.name == name);
-        found.ok_or_else(|| UnknownWord::among(name, "fusion", names))
+        found.ok_or_else(|| UnknownWord::among(name, "fusion", ALL.iter().map(|one| one.name)))
     }
 }
 
@@ -129,14 +154,14 @@ pub struct Candidate<'a> {
 
 /// Fuses what the references gave each for itself.
 ///
-/// Candidates without a pose are left out and the weights of the others grow in proportion; where
-/// all those with a weight failed, so does the fusion: a reference that was left out for its few
-/// matches does not come back.
+/// Candidates without a pose are left out and the weights of the others grow in proportion. Where all those
+/// with a weight failed, so does the fusion: a reference that was left out for its few matches does not come
+/// back.
 ///
-/// A hybrid falls back for the query, not for each reference: its second method's poses count only
-/// where no reference with a weight has one of the first, so that fused it is never behind that.
+/// HY falls back for the query, not for each reference: if any weighted reference has an FB pose, MI poses are
+/// ignored.
 ///
-/// Beside the pose, what each candidate had to say in it, in their order.
+/// Returns the share of each candidate too, in their order.
 ///
 /// # Errors
 /// Only [`Cancelled`].
@@ -269,7 +294,7 @@ mod tests {
         (pose, told)
     }
 
-    fn weigh(entry: &Entry) -> Weigh {
+    fn weigh(entry: &Fusion) -> Weigh {
         match entry.way {
             Way::Weighed(weigh) => weigh,
             Way::Joint => panic!("{} weighs no poses", entry.name),
@@ -374,7 +399,7 @@ mod tests {
         }
     }
 
-    fn fused_nothing(entry: &Entry) -> Failure {
+    fn fused_nothing(entry: &Fusion) -> Failure {
         fuse(entry.name, weigh(entry), &[], &mut Trace::off())
             .expect("not cancelled")
             .0

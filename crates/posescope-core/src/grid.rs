@@ -28,28 +28,28 @@ parameters! {
     #[derive(Clone, Debug, PartialEq)]
     pub struct GridParams {
         /// Step of the coarse positions.
-        pub coarse_step_m: f64 = number("coarse_step", "m", 0.05..=10.0),
+        pub coarse_step_m: f64 = 1.0 => number("coarse_step", "m", 0.05..=10.0),
         /// Half width of the square of fine positions.
-        pub fine_range_m: f64 = number("fine_range", "m", 0.0..=10.0),
+        pub fine_range_m: f64 = 1.0 => number("fine_range", "m", 0.0..=10.0),
         /// Step of the fine positions.
-        pub fine_step_m: f64 = number("fine_step", "m", 0.01..=5.0),
+        pub fine_step_m: f64 = 0.2 => number("fine_step", "m", 0.01..=5.0),
         /// Half range of the coarse yaw angles.
-        pub yaw_range_deg: f64 = number("yaw_range", "°", 0.0..=180.0),
+        pub yaw_range_deg: f64 = 10.0 => number("yaw_range", "°", 0.0..=180.0),
         /// Step of the coarse yaw angles.
-        pub yaw_step_deg: f64 = number("yaw_step", "°", 0.05..=45.0),
+        pub yaw_step_deg: f64 = 1.0 => number("yaw_step", "°", 0.05..=45.0),
         /// Half range of the fine yaw angles.
-        pub yaw_fine_range_deg: f64 = number("yaw_fine_range", "°", 0.0..=45.0),
+        pub yaw_fine_range_deg: f64 = 1.0 => number("yaw_fine_range", "°", 0.0..=45.0),
         /// Step of the fine yaw angles.
-        pub yaw_fine_step_deg: f64 = number("yaw_fine_step", "°", 0.01..=10.0),
+        pub yaw_fine_step_deg: f64 = 0.1 => number("yaw_fine_step", "°", 0.01..=10.0),
         /// Rounds of searching position, then yaw; the paper has one.
-        pub rounds: usize = count("rounds", "", 1..=10),
+        pub rounds: usize = 1 => count("rounds", "", 1..=10),
         /// Least coverage of an eligible hypothesis, as a share of the pixels covered at the
         /// reference pose.
         ///
         /// Fewer pixels make lower costs: without a floor both costs have their global minimum where
         /// less than 1 % is covered. At 0.15 and above the right basin is cut off when the query is
         /// 8 to 10 m ahead.
-        pub coverage_floor: f64 = number("coverage_floor", "", 0.0..=1.0),
+        pub coverage_floor: f64 = 0.05 => number("coverage_floor", "", 0.0..=1.0),
     }
 }
 
@@ -58,15 +58,9 @@ parameters! {
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct SurfaceParams {
         /// Step of the positions within the uncertainty radius.
-        pub step_m: f64 = number("step", "m", 0.001..=100.0),
+        pub step_m: f64 = 0.1 => number("step", "m", 0.001..=100.0),
         /// Step of the headings within `grid.yaw_range`.
-        pub yaw_step_deg: f64 = number("yaw_step", "°", 0.01..=90.0),
-    }
-}
-
-impl Default for SurfaceParams {
-    fn default() -> Self {
-        Self { step_m: 0.1, yaw_step_deg: 0.5 }
+        pub yaw_step_deg: f64 = 0.5 => number("yaw_step", "°", 0.01..=90.0),
     }
 }
 
@@ -78,22 +72,6 @@ impl GridParams {
         let yaw_deg = offset.yaw_rad.to_degrees().abs();
         distance_m > radius_m - 0.5 * self.coarse_step_m
             || yaw_deg > self.yaw_range_deg - 0.5 * self.yaw_step_deg
-    }
-}
-
-impl Default for GridParams {
-    fn default() -> Self {
-        Self {
-            coarse_step_m: 1.0,
-            fine_range_m: 1.0,
-            fine_step_m: 0.2,
-            yaw_range_deg: 10.0,
-            yaw_step_deg: 1.0,
-            yaw_fine_range_deg: 1.0,
-            yaw_fine_step_deg: 0.1,
-            rounds: 1,
-            coverage_floor: 0.05,
-        }
     }
 }
 

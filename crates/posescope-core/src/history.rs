@@ -1,4 +1,4 @@
-//! Keeps what an estimator told, so that looking back needs no second run.
+//! Keeps the events of a run.
 
 use crate::event::{DebugEvent, Event};
 use crate::trace::{Cancelled, Record, Sink};
@@ -39,7 +39,7 @@ impl History {
         self.latest(usize::MAX)
     }
 
-    /// The kinds of event in the order in which they were told.
+    /// The events, in order.
     pub fn events(&self) -> impl Iterator<Item = &Event> {
         self.records.iter().map(|record| &record.event)
     }

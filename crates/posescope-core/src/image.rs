@@ -75,8 +75,8 @@ impl Photo {
 
 /// The image convolved with a Gaussian of `sigma` \[px\]; `sigma` 0 returns it as it is.
 pub fn gaussian_smoothed(image: &GrayImage, sigma: f64) -> FloatImage {
-    /// Times the rows that a band needs around it: bands of many rows are worked out less often twice, those
-    /// of few stay in the second-level cache and take memory that is there already.
+    /// Rows of a band as a multiple of those it needs around it: large bands compute fewer rows twice,
+    /// small ones stay in the second-level cache.
     const ROWS_A_BAND: usize = 12;
     let rows = ROWS_A_BAND * rows_around(sigma);
     let bands = (image.height() as usize).div_ceil(rows);
@@ -88,8 +88,8 @@ fn rows_around(sigma: f64) -> usize {
     (4.0 * sigma).ceil() as usize + 2
 }
 
-/// As [`gaussian_smoothed`], so many bands of rows at once: each with the rows around it that it depends on, so that
-/// nothing depends on their number.
+/// As [`gaussian_smoothed`], in bands of rows. Each is computed with the rows around it that it depends on,
+/// so the result does not depend on their number.
 fn smoothed_in_bands(image: &GrayImage, sigma: f64, bands: usize) -> FloatImage {
     let [width, height] = [image.width(), image.height()].map(|side| side as usize);
     let some_rows = |rows: Range<usize>| {

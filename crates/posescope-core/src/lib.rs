@@ -64,6 +64,7 @@ pub mod retrieval;
 pub mod robust;
 pub mod scene;
 pub mod solver;
+mod stats;
 pub mod text;
 pub mod trace;
 

@@ -7,9 +7,8 @@ use std::sync::{Mutex, PoisonError};
 
 /// A method by its short name, which is the same on the command line, in results and in recordings.
 ///
-/// Which methods there are says the registry of the estimators ([`crate::estimator::all`]): the four
-/// of the paper are known by name here, any other is a line in a registry. A method that is in none is
-/// another system, whose answers somebody brought ([`Self::called`]).
+/// [`crate::estimator::all`] lists the methods. A name that is not registered is another system's
+/// ([`Self::called`]).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Method(&'static str);
 
@@ -23,8 +22,8 @@ impl Method {
     /// HY, the hybrid of FB and MI.
     pub const HY: Self = Self("hy");
 
-    /// The methods of the paper, in the order in which they run and are listed. Every command takes
-    /// these where it is not told which.
+    /// The methods of the paper, in the order in which they run and are listed; the default of every
+    /// command.
     pub const PAPER: [Self; 4] = [Self::FB, Self::PM, Self::MI, Self::HY];
 
     /// The method of a name that a registry gives.
@@ -32,8 +31,7 @@ impl Method {
         Self(name)
     }
 
-    /// The method that goes by a name which somebody chose: another system, whose answers stand beside
-    /// ours. Names are kept until the program ends; there are as many as somebody gives.
+    /// Another system as a method, by a name of the user's. Names are kept until the program ends.
     ///
     /// # Errors
     /// [`MethodNameError`] where the name could not stand in a list of methods or an entity path.
@@ -95,7 +93,7 @@ impl PartialOrd for Method {
     }
 }
 
-/// The names that somebody chose.
+/// The names of other systems.
 static NAMES: Mutex<BTreeSet<&'static str>> = Mutex::new(BTreeSet::new());
 
 /// Characters of a name at most; tables have columns of about this width.

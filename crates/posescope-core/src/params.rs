@@ -58,7 +58,7 @@ impl FromStr for Params {
 }
 
 impl Params {
-    /// Shows every parameter of every group to `visitor`; `group` is told before each group.
+    /// Calls `visit` with each group and its parameters.
     pub fn visit_groups(&mut self, mut visit: impl FnMut(&'static str, &mut dyn Describe)) {
         visit("surf", &mut self.surf);
         visit("fb", &mut self.fb);

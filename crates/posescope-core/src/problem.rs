@@ -1,4 +1,4 @@
-//! What an estimator is asked: one query photo, one reference tuple. No ground truth in here.
+//! The input of an estimator: one query photo, one reference tuple, and no ground truth.
 
 use std::convert::Infallible;
 use std::fmt;
@@ -110,7 +110,7 @@ impl ReferenceTuple {
         features_of(&self.photo, &self.memo, params)
     }
 
-    /// What the reference camera sees of the cloud, remembered: all methods ask for it.
+    /// The points that the reference camera sees, cached: all methods use them.
     pub fn visible_cloud(&self, render: &RenderParams) -> Arc<VisibleCloud> {
         let visible = || VisibleCloud::new(&self.cloud, &self.intrinsics, render);
         self.memo.recall(render, VisibleCloud::heap_bytes, visible).value
@@ -187,7 +187,7 @@ impl Problem {
         })
     }
 
-    /// How far from the reference a pose is to be believed \[m\].
+    /// The greatest plausible distance of the query from the reference \[m\].
     pub fn believed_within_m(&self) -> f64 {
         self.prior_m.unwrap_or(self.uncertainty_radius_m)
     }

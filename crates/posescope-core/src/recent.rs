@@ -12,15 +12,14 @@ pub struct Limit {
     pub bytes: usize,
 }
 
-/// Values within a [`Limit`]; the one that was not asked for the longest makes room.
+/// Values within a [`Limit`]; the least recently used makes room.
 ///
-/// A few dozen, so that searching takes no time. Handing out a value clones it: values are cheap to
-/// clone, as an [`Arc`](std::sync::Arc) is.
+/// For a few dozen values that are cheap to clone, as an [`Arc`](std::sync::Arc) is.
 pub struct Recent<K, V> {
     limit: Limit,
     /// What a value takes \[bytes\].
     bytes: fn(&V) -> usize,
-    /// Whether somebody else holds the value, so that letting it go would free nothing.
+    /// Whether the value is held elsewhere, so that dropping it would free nothing.
     is_held: fn(&V) -> bool,
     /// From the least to the most recently used.
     entries: Mutex<Vec<(K, V)>>,
@@ -33,8 +32,7 @@ impl<K: Eq, V: Clone> Recent<K, V> {
         Self::within(Limit { count, bytes }, |_| 0, |_| false)
     }
 
-    /// Values within the limit, as far as they are not held by others. `bytes` says what a value
-    /// takes, `is_held` whether somebody else holds it, so that letting it go would free nothing.
+    /// Values within the limit, but for those held elsewhere. `bytes` is what a value takes.
     pub fn within(limit: Limit, bytes: fn(&V) -> usize, is_held: fn(&V) -> bool) -> Self {
         Self { limit, bytes, is_held, entries: Mutex::default() }
     }
@@ -55,7 +53,7 @@ impl<K: Eq, V: Clone> Recent<K, V> {
         entries.last().map(|(_, value)| value.clone())
     }
 
-    /// Keeps the value, and hands out what is kept now: where two threads made it, the first one's.
+    /// Keeps the value, and returns the one kept: where two threads made it, the first.
     pub fn insert(&self, key: K, value: V) -> V {
         let mut entries = self.entries();
         let kept = match entries.iter().position(|(known, _)| *known == key) {
@@ -72,7 +70,7 @@ impl<K: Eq, V: Clone> Recent<K, V> {
         kept.unwrap_or(value)
     }
 
-    /// Keeps to the limit again after values have grown, or were let go by others.
+    /// Keeps to the limit again after values have grown or are no longer held elsewhere.
     pub fn trim(&self) {
         self.make_room(&mut self.entries());
     }
@@ -92,7 +90,7 @@ impl<K: Eq, V: Clone> Recent<K, V> {
         entries.iter().map(|(_, value)| (self.bytes)(value)).sum()
     }
 
-    /// Of one value the bytes do not matter: the latest stays, however large it is.
+    /// The newest value is kept even if it alone exceeds the byte limit.
     fn make_room(&self, entries: &mut Vec<(K, V)>) {
         let mut bytes = self.sum(entries);
         let mut at = 0;

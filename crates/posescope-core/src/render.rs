@@ -33,20 +33,14 @@ parameters! {
         ///
         /// One pixel is the default: over 40 real pairs 10 m apart it served the photometric cost
         /// best (30 of 30 within 2 m, 28 for 3 px) and mutual information equally.
-        pub splat_px: usize = count("splat_px", "px", 1..=15),
+        pub splat_px: usize = 1 => count("splat_px", "px", 1..=15),
         /// Whether points that the reference camera cannot see are left uncoloured.
-        pub visibility: bool = flag("visibility"),
+        pub visibility: bool = true => flag("visibility"),
         /// A point counts as hidden when a surface nearer by more than this share of its depth lies
         /// before it.
-        pub visibility_margin: f64 = number("visibility_margin", "", 0.0..=1.0),
+        pub visibility_margin: f64 = 0.10 => number("visibility_margin", "", 0.0..=1.0),
         /// Side of the window in which a nearer surface hides a point, odd.
-        pub visibility_window_px: usize = count("visibility_window_px", "px", 1..=31),
-    }
-}
-
-impl Default for RenderParams {
-    fn default() -> Self {
-        Self { splat_px: 1, visibility: true, visibility_margin: 0.10, visibility_window_px: 5 }
+        pub visibility_window_px: usize = 5 => count("visibility_window_px", "px", 1..=31),
     }
 }
 

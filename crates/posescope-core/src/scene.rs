@@ -35,8 +35,8 @@ pub trait Scene: Send + Sync {
     /// `world_from_camera`, where it is known.
     fn pose(&self, frame: usize) -> Option<Pose>;
 
-    /// Where references of the frame are sought \[m\], in the world: at its pose, where that is known,
-    /// unless something else says roughly where it was taken.
+    /// Where references of the frame are sought, in the world \[m\]: at its pose, or at a rough position
+    /// such as that of a GPS.
     fn position(&self, frame: usize) -> Option<Point3<f64>> {
         self.pose(frame).map(|pose| Point3::from(pose.translation.vector))
     }
@@ -71,8 +71,7 @@ pub trait Scene: Send + Sync {
         )))
     }
 
-    /// The frame as a reference tuple: the photo of [`Scene::query`], with which it remembers, and
-    /// pose and cloud. A scene that has these need not have its own.
+    /// The frame as a reference tuple: the photo of [`Scene::query`], and pose and cloud.
     ///
     /// # Errors
     /// The errors of [`Scene::photo`] and [`Scene::cloud`], and [`SceneError::NoPose`].
@@ -87,8 +86,8 @@ pub trait Scene: Send + Sync {
         None
     }
 
-    /// A number that changes with the photos, as far as can be told without reading them: what was
-    /// made from them before is stale then.
+    /// A hash that changes with the photos, as far as is known without reading them. What was made from
+    /// other photos is stale.
     fn fingerprint(&self) -> u64 {
         fingerprint(self, &[])
     }
@@ -118,10 +117,8 @@ fn reference_of(
     }))
 }
 
-/// A number for what a scene is and holds, and whatever else its format knows.
-///
-/// The first frame's camera stands for all, and those that differ from the one before follow the
-/// names: an index that was built when scenes had one camera each is still valid.
+/// Hash of a scene's name, frames and cameras, and of `more`. Only cameras that change are hashed, which
+/// keeps old indices valid.
 pub fn fingerprint(scene: &(impl Scene + ?Sized), more: &[u8]) -> u64 {
     let mut sum = Xxh3::new();
     let mut add = |part: &str| {

@@ -1,4 +1,4 @@
-//! What is written as a word: on the command line, in files, in tables.
+//! Words on the command line, in files and in tables.
 
 use std::fmt;
 use std::marker::PhantomData;
@@ -35,6 +35,40 @@ impl UnknownWord {
     }
 }
 
+/// An enum each of whose values is one word, on the command line, in files and in tables.
+macro_rules! words {
+    ($type:ident, $kind:literal: $($variant:ident = $word:literal),+ $(,)?) => {
+        impl $type {
+            /// All of them, in order.
+            pub const ALL: [Self; [$($word),+].len()] = [$(Self::$variant),+];
+
+            /// The word, the same everywhere.
+            pub fn word(self) -> &'static str {
+                match self { $(Self::$variant => $word),+ }
+            }
+        }
+
+        impl std::fmt::Display for $type {
+            fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                f.pad(self.word())
+            }
+        }
+
+        impl std::str::FromStr for $type {
+            type Err = $crate::text::UnknownWord;
+
+            fn from_str(word: &str) -> Result<Self, Self::Err> {
+                let found = Self::ALL.into_iter().find(|one| one.word() == word);
+                let unknown = || Self::Err::among(word, $kind, Self::ALL.map(Self::word));
+                found.ok_or_else(unknown)
+            }
+        }
+
+        $crate::serde_as_text!($type);
+    };
+}
+pub(crate) use words;
+
 /// The first sentence of a text, and the rest. A point inside a number ends no sentence.
 pub fn first_sentence(text: &str) -> (&str, &str) {
     match text.find(". ") {
@@ -53,7 +87,7 @@ pub fn similar<'a>(word: &str, names: impl IntoIterator<Item = &'a str>) -> Opti
         .map(|(_, name)| name)
 }
 
-/// What is wrong with a piece of JSON, without the line, which its reader counts in the whole file.
+/// The message of a JSON error, without the line, which its reader counts in the whole file.
 pub fn json_message(error: &serde_json::Error) -> String {
     let text = error.to_string();
     let place = format!(" at line {} column {}", error.line(), error.column());

@@ -36,10 +36,10 @@ use crate::method::Method;
 pub struct Cancelled;
 
 /// Estimators within each other that a [`Record`] knows of: a hybrid and its part are two.
-const MOST_METHODS: usize = 3;
+const MAX_METHODS: usize = 3;
 
 /// The estimators that run within each other, the outermost first.
-pub type OpenMethods = ArrayVec<Method, MOST_METHODS>;
+pub type OpenMethods = ArrayVec<Method, MAX_METHODS>;
 
 /// One event with its place in the run.
 #[derive(Clone, Debug, serde::Serialize)]
@@ -56,7 +56,7 @@ pub struct Record {
     pub event: Event,
 }
 
-/// Somebody who watches a run.
+/// A listener of a run.
 pub trait Sink {
     /// The kinds of event this sink wants now. Stage events come in any case.
     ///
@@ -93,29 +93,24 @@ struct Observer<'a> {
     next: u64,
     depth: usize,
     methods: OpenMethods,
-    /// Whether the stage that is open and innermost used a remembered result.
+    /// Whether the innermost open stage used a result of an earlier run.
     reused: bool,
 }
 
 impl<'a> Trace<'a> {
-    /// Nobody watches: no sink, no thread, no allocation.
+    /// No sink, no thread, no allocation.
     pub const fn off() -> Self {
         Self { observer: None }
     }
 
     /// Every wanted event goes to `sink`, on the caller's thread.
     pub fn to(sink: &'a mut dyn Sink) -> Self {
-        Self::new(sink, None)
+        Self::watched(sink, None)
     }
 
-    /// A trace as [`Self::to`] makes it; whenever `attention` is raised, the sink's
-    /// [`Sink::attend`] is called at the next event or checkpoint, wanted or not, and the flag is
-    /// lowered.
-    pub fn watched(sink: &'a mut dyn Sink, attention: &'a AtomicBool) -> Self {
-        Self::new(sink, Some(attention))
-    }
-
-    fn new(sink: &'a mut dyn Sink, attention: Option<&'a AtomicBool>) -> Self {
+    /// A trace as [`Self::to`] makes it. While `attention` is raised, the next event or checkpoint calls
+    /// [`Sink::attend`], wanted or not, and lowers the flag.
+    pub fn watched(sink: &'a mut dyn Sink, attention: Option<&'a AtomicBool>) -> Self {
         let wanted = sink.wanted();
         Self {
             observer: Some(Observer {
@@ -130,7 +125,7 @@ impl<'a> Trace<'a> {
         }
     }
 
-    /// Tells one event, if anybody wants its kind.
+    /// Emits one event, if a sink wants its kind.
     ///
     /// # Errors
     /// [`Cancelled`] when the observer asked the run to stop.
@@ -148,13 +143,13 @@ impl<'a> Trace<'a> {
         Ok(())
     }
 
-    /// Whether anybody wants this kind of event now. For what is kept to be told again: what is told
-    /// at once asks [`Self::emit`], which runs its closure only then.
+    /// Whether a sink wants this kind of event now. For events that are kept to be emitted again;
+    /// [`Self::emit`] asks by itself.
     pub fn wants<E: DebugEvent>(&self) -> bool {
         self.observer.as_ref().is_some_and(|observer| observer.wanted.contains(E::KIND))
     }
 
-    /// For long loops that tell nothing: lets the observer pause or stop the run.
+    /// Lets the observer pause or stop the run in long loops without events.
     ///
     /// # Errors
     /// [`Cancelled`] when the observer asked the run to stop.
@@ -166,7 +161,7 @@ impl<'a> Trace<'a> {
         }
     }
 
-    /// Says where the stage's result comes from: whether it was remembered from an earlier run.
+    /// Says whether the stage's result is from an earlier run.
     pub fn note_reuse(&mut self, reused: bool) {
         if let Some(observer) = &mut self.observer {
             observer.reused = reused;
@@ -219,7 +214,7 @@ impl<'a> Trace<'a> {
         let first = observer.next;
         let mut onward = Onward { observer, first };
         let mut both = Fanout::new(vec![second, &mut onward]);
-        let mut inner = Trace::new(&mut both, attention);
+        let mut inner = Trace::watched(&mut both, attention);
         let outcome = body(&mut inner);
         let emitted = inner.observer.map_or(0, |inner| inner.next);
         observer.next = first + emitted;
@@ -245,7 +240,7 @@ impl Sink for Onward<'_, '_> {
         sink.accept(&Record {
             index: self.first + record.index,
             depth: *depth + record.depth,
-            methods: methods.take(MOST_METHODS).collect(),
+            methods: methods.take(MAX_METHODS).collect(),
             event: record.event.clone(),
         })
     }
@@ -283,8 +278,8 @@ impl Observer<'_> {
         }
     }
 
-    /// Tells the end of the innermost stage, and closes it whatever the sink says. That many estimators are
-    /// open `around` it.
+    /// Emits the end of the innermost stage, and closes it whatever the sink says. `around` counts the
+    /// estimators that are open around it.
     fn end_stage(&mut self, stage: Stage, succeeded: bool, around: usize) -> Result<(), Cancelled> {
         let ended = StageEnded { stage, succeeded, reused: std::mem::take(&mut self.reused) };
         let delivered = self.deliver(ended.into());
@@ -410,7 +405,7 @@ mod tests {
     fn raised_attention_reaches_the_sink_once_even_without_a_wanted_event() {
         let mut sink = RecordingSink::wanting(KindSet::NONE);
         let attention = AtomicBool::new(true);
-        let mut trace = Trace::watched(&mut sink, &attention);
+        let mut trace = Trace::watched(&mut sink, Some(&attention));
         for _ in 0..3 {
             trace.checkpoint().expect("not cancelled");
         }

@@ -20,17 +20,11 @@ parameters! {
     #[derive(Clone, Debug, PartialEq)]
     pub struct MutualInformation {
         /// Standard deviation of the Gaussian that smooths the query.
-        pub sigma_px: f64 = number("sigma", "px", 0.0..=20.0),
+        pub sigma_px: f64 = 1.5 => number("sigma", "px", 0.0..=20.0),
         /// Bins per axis of the joint histogram, over 0 … 255.
         ///
         /// 8 to 32 are equal on real pairs; 64 is unstable where few pixels are covered.
-        pub bins: usize = count("bins", "", 2..=256),
-    }
-}
-
-impl Default for MutualInformation {
-    fn default() -> Self {
-        Self { sigma_px: 1.5, bins: 16 }
+        pub bins: usize = 16 => count("bins", "", 2..=256),
     }
 }
 

@@ -30,17 +30,11 @@ parameters! {
     pub struct Orientation {
         /// Standard deviation of the Gaussian that smooths both photos before they are
         /// differentiated.
-        pub sigma_px: f64 = number("sigma", "px", 0.0..=20.0),
+        pub sigma_px: f64 = 1.5 => number("sigma", "px", 0.0..=20.0),
         /// Bins per axis of the joint histogram. The first one holds what has no orientation.
-        pub bins: usize = count("bins", "", 3..=64),
+        pub bins: usize = 9 => count("bins", "", 3..=64),
         /// Least gradient that has an orientation.
-        pub least_gradient: f64 = number("least_gradient", "grey values per px", 0.0..=100.0),
-    }
-}
-
-impl Default for Orientation {
-    fn default() -> Self {
-        Self { sigma_px: 1.5, bins: 9, least_gradient: 2.0 }
+        pub least_gradient: f64 = 2.0 => number("least_gradient", "grey values per px", 0.0..=100.0),
     }
 }
 

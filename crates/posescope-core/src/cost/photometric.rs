@@ -20,16 +20,10 @@ parameters! {
     #[derive(Clone, Debug, PartialEq)]
     pub struct Photometric {
         /// Standard deviation of the Gaussian that smooths the query.
-        pub sigma_px: f64 = number("sigma", "px", 0.0..=20.0),
+        pub sigma_px: f64 = 1.5 => number("sigma", "px", 0.0..=20.0),
         /// The power of the squared difference E in the weighted mean: 1 averages it; 2 is the
         /// paper's literal formula, which squares E once more.
-        pub power: usize = count("power", "", 1..=2),
-    }
-}
-
-impl Default for Photometric {
-    fn default() -> Self {
-        Self { sigma_px: 1.5, power: 1 }
+        pub power: usize = 1 => count("power", "", 1..=2),
     }
 }
 

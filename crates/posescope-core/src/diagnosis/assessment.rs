@@ -1,13 +1,10 @@
 //! What a result is worth.
 
-use std::fmt;
-use std::str::FromStr;
-
 use super::{Diagnosis, PoseConfidence, Subject, Tolerance, diagnose};
 use crate::geometry::PoseError;
-use crate::text::UnknownWord;
+use crate::text::words;
 
-/// What a result is worth, by the truth where that is known.
+/// What a result is worth, by the truth where that is known; from the best.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Grade {
     /// The pose is within the tolerance of the truth.
@@ -21,9 +18,6 @@ pub enum Grade {
 }
 
 impl Grade {
-    /// All of them, from the best.
-    pub const ALL: [Self; 4] = [Self::Right, Self::Unmeasured, Self::Wrong, Self::NoPose];
-
     /// The grade of a result with or without a pose, whose error is known or not. An error that is no number
     /// is not within any tolerance.
     pub fn of(has_pose: bool, error: Option<&PoseError>, right: Tolerance) -> Self {
@@ -48,16 +42,6 @@ impl Grade {
         matches!(self, Self::Wrong | Self::NoPose)
     }
 
-    /// The word, the same everywhere.
-    pub fn word(self) -> &'static str {
-        match self {
-            Self::Right => "right",
-            Self::Wrong => "wrong",
-            Self::NoPose => "no pose",
-            Self::Unmeasured => "unmeasured",
-        }
-    }
-
     /// The glyph, the same everywhere: a shape of its own, for those who do not see its colour.
     pub fn glyph(self) -> &'static str {
         match self {
@@ -69,22 +53,7 @@ impl Grade {
     }
 }
 
-impl fmt::Display for Grade {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(self.word())
-    }
-}
-
-impl FromStr for Grade {
-    type Err = UnknownWord;
-
-    fn from_str(word: &str) -> Result<Self, UnknownWord> {
-        let found = Self::ALL.into_iter().find(|grade| grade.word() == word);
-        found.ok_or_else(|| UnknownWord::among(word, "grade", Self::ALL.map(Self::word)))
-    }
-}
-
-crate::serde_as_text!(Grade);
+words!(Grade, "grade": Right = "right", Unmeasured = "unmeasured", Wrong = "wrong", NoPose = "no pose");
 
 /// What a result is worth, and why: made once, and used by all that show it.
 #[derive(Clone, Debug, PartialEq)]

@@ -15,25 +15,26 @@ use crate::geometry::{Pose, PoseError};
 use crate::method::Method;
 use crate::retrieval::ReferenceRanking;
 use crate::solver::Correspondence;
+use crate::stats::mean_and_squares;
 
 /// A result that is wrong, missing or perhaps uncertain.
-pub struct Case<'a, 'cost> {
+pub struct Case<'a> {
     pub(super) subject: &'a Subject<'a>,
     pub(super) family: Family,
     /// The method whose pose it is: of a hybrid the one that it took.
     pub(super) responsible: Method,
     /// The search on a grid, or what stands for one.
-    pub(super) search: Option<&'a Search<'a, 'cost>>,
+    pub(super) search: Option<&'a Search<'a>>,
     matches: OnceCell<Option<TrueMatches>>,
     starts: OnceCell<Option<Starts>>,
     contrast: OnceCell<f64>,
 }
 
-impl<'a, 'cost> Case<'a, 'cost> {
+impl<'a> Case<'a> {
     pub(super) fn new(
         subject: &'a Subject<'a>,
         family: Family,
-        search: Option<&'a Search<'a, 'cost>>,
+        search: Option<&'a Search<'a>>,
     ) -> Self {
         Self {
             subject,
@@ -69,10 +70,9 @@ impl<'a, 'cost> Case<'a, 'cost> {
         *self.contrast.get_or_init(|| {
             let photo = &self.subject.problem.query.photo.gray;
             let values = photo.as_raw().iter().step_by(STRIDE);
-            let values = values.map(|&value| f64::from(value));
-            let count = values.len() as f64;
-            let mean = values.clone().sum::<f64>() / count;
-            (values.map(|value| (value - mean).powi(2)).sum::<f64>() / count).sqrt()
+            let values: Vec<f64> = values.map(|&value| f64::from(value)).collect();
+            let squares = mean_and_squares(&values).map_or(f64::NAN, |(_, squares)| squares);
+            (squares / values.len() as f64).sqrt()
         })
     }
 

@@ -14,9 +14,6 @@ mod inliers;
 mod minimum;
 mod settled;
 
-use std::fmt;
-use std::str::FromStr;
-
 use serde::{Deserialize, Serialize};
 
 pub use coefficients::probability;
@@ -24,11 +21,11 @@ pub use coefficients::probability;
 use super::family::Family;
 use super::{Evidence, Subject};
 use crate::estimator::{self, Failure, Outcome};
-use crate::grid::{Phase, ScoredLattice};
+use crate::grid::ScoredLattice;
 use crate::method::Method;
 use crate::params::Params;
 use crate::problem::Problem;
-use crate::text::UnknownWord;
+use crate::text::words;
 use appearance::Look;
 use inliers::Inliers;
 use minimum::Minimum;
@@ -43,7 +40,7 @@ pub const TRUSTED_FROM: f64 = 0.95;
 /// Below this probability, confidence is low: the pose is more likely wrong than right.
 pub const LOW_BELOW: f64 = 0.5;
 
-/// How likely a pose is right, as a word.
+/// How likely a pose is right, as a word; from the best.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Confidence {
     /// At least [`TRUSTED_FROM`].
@@ -55,24 +52,12 @@ pub enum Confidence {
 }
 
 impl Confidence {
-    /// All of them, from the best.
-    pub const ALL: [Self; 3] = [Self::Trusted, Self::Unsure, Self::Low];
-
     /// That of a probability.
     pub fn of(probability: f64) -> Self {
         match probability {
             p if p >= TRUSTED_FROM => Self::Trusted,
             p if p >= LOW_BELOW => Self::Unsure,
             _ => Self::Low,
-        }
-    }
-
-    /// The word, the same everywhere.
-    pub fn word(self) -> &'static str {
-        match self {
-            Self::Trusted => "trusted",
-            Self::Unsure => "unsure",
-            Self::Low => "low",
         }
     }
 
@@ -86,22 +71,7 @@ impl Confidence {
     }
 }
 
-impl fmt::Display for Confidence {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(self.word())
-    }
-}
-
-impl FromStr for Confidence {
-    type Err = UnknownWord;
-
-    fn from_str(word: &str) -> Result<Self, UnknownWord> {
-        let found = Self::ALL.into_iter().find(|one| one.word() == word);
-        found.ok_or_else(|| UnknownWord::among(word, "confidence", Self::ALL.map(Self::word)))
-    }
-}
-
-crate::serde_as_text!(Confidence);
+words!(Confidence, "confidence": Trusted = "trusted", Unsure = "unsure", Low = "low");
 
 /// What the coefficients of a probability were fitted on.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -186,15 +156,9 @@ impl PoseConfidence {
         outcome: &Outcome,
         evidence: &Evidence,
     ) -> Option<Self> {
-        outcome.pose.as_ref().ok()?;
-        let method = responsible(method, outcome);
-        match Family::of(method)? {
-            Family::Features => of_features(problem, method, params, evidence, Look::QUICK),
-            Family::Guided => of_features(problem, method, params, evidence, Look::THOROUGH),
-            Family::Grid => of_search(method, outcome, evidence),
-            Family::Starts => of_settled(method, outcome, evidence),
-            Family::Given => None,
-        }
+        let (signals, rest) = left_behind(problem, method, params, outcome, evidence)?;
+        let probability = probability(responsible(method, outcome), &signals.values)?;
+        Some(Self { probability, word: Confidence::of(probability), ..rest })
     }
 }
 
@@ -235,63 +199,55 @@ pub fn signals(
     outcome: &Outcome,
     evidence: &Evidence,
 ) -> Option<Signals> {
-    outcome.pose.as_ref().ok()?;
-    let method = responsible(method, outcome);
-    match Family::of(method)? {
-        family @ (Family::Features | Family::Guided) => {
-            let look = match family {
-                Family::Guided => Look::THOROUGH,
-                _ => Look::QUICK,
-            };
-            let consensus = Inliers::of(problem, params, evidence, look)?;
-            Some(consensus.signals(evidence))
-        }
-        Family::Grid => Some(Minimum::of(outcome, evidence)?.signals()),
-        Family::Starts => Some(Settled::of(outcome, evidence)?.signals()),
-        Family::Given => None,
-    }
+    Some(left_behind(problem, method, params, outcome, evidence)?.0)
 }
 
-fn of_features(
+/// The signals of an outcome with a pose, and its confidence but for the probability.
+fn left_behind(
     problem: &Problem,
     method: Method,
     params: &Params,
+    outcome: &Outcome,
     evidence: &Evidence,
-    look: Look,
-) -> Option<PoseConfidence> {
-    let inliers = Inliers::of(problem, params, evidence, look)?;
-    let signals = inliers.signals(evidence);
-    let covariance = inliers.covariance;
-    let deviation = |first: usize| {
-        covariance.map(|c| std::array::from_fn(|axis| c[(first + axis, first + axis)].sqrt()))
-    };
-    Some(PoseConfidence {
-        position_std_m: deviation(3),
-        rotation_std_deg: deviation(0).map(|d: [f64; 3]| d.map(f64::to_degrees)),
-        inlier_spread: Some(inliers.spread),
-        chance_level: evidence.judged.as_ref().map(|j| j.acceptance.log10_nfa),
-        ..PoseConfidence::new(probability(method, &signals.values)?)
-    })
-}
-
-fn of_search(method: Method, outcome: &Outcome, evidence: &Evidence) -> Option<PoseConfidence> {
-    let minimum = Minimum::of(outcome, evidence)?;
-    let deviations = minimum.deviations(evidence);
-    Some(PoseConfidence {
-        position_std_m: deviations.map(|[right, forward, _]| [right, 0.0, forward]),
-        rotation_std_deg: deviations.map(|[.., yaw]| [0.0, yaw.to_degrees(), 0.0]),
-        runner_up_margin: minimum.runner_up_margin,
-        chance_level: outcome.cost.as_ref()?.shuffled,
-        ..PoseConfidence::new(probability(method, &minimum.signals().values)?)
-    })
-}
-
-fn of_settled(method: Method, outcome: &Outcome, evidence: &Evidence) -> Option<PoseConfidence> {
-    let settled = Settled::of(outcome, evidence)?;
-    Some(PoseConfidence {
-        runner_up_margin: settled.runner_up_margin,
-        chance_level: outcome.cost.as_ref()?.shuffled,
-        ..PoseConfidence::new(probability(method, &settled.signals().values)?)
+) -> Option<(Signals, PoseConfidence)> {
+    outcome.pose.as_ref().ok()?;
+    let rest = PoseConfidence::new(f64::NAN);
+    let chance_level = outcome.cost.and_then(|cost| cost.shuffled);
+    Some(match Family::of(responsible(method, outcome))? {
+        family @ (Family::Features | Family::Guided) => {
+            let look = if family == Family::Guided { Look::THOROUGH } else { Look::QUICK };
+            let inliers = Inliers::of(problem, params, evidence, look)?;
+            let deviation = |first: usize| {
+                let covariance = inliers.covariance?;
+                Some([0, 1, 2].map(|axis| covariance[(first + axis, first + axis)].sqrt()))
+            };
+            let confidence = PoseConfidence {
+                position_std_m: deviation(3),
+                rotation_std_deg: deviation(0).map(|d| d.map(f64::to_degrees)),
+                inlier_spread: Some(inliers.spread),
+                chance_level: evidence.judged.as_ref().map(|j| j.acceptance.log10_nfa),
+                ..rest
+            };
+            (inliers.signals(evidence), confidence)
+        }
+        Family::Grid => {
+            let minimum = Minimum::of(outcome, evidence)?;
+            let deviations = minimum.deviations(evidence);
+            let confidence = PoseConfidence {
+                position_std_m: deviations.map(|[right, forward, _]| [right, 0.0, forward]),
+                rotation_std_deg: deviations.map(|[.., yaw]| [0.0, yaw.to_degrees(), 0.0]),
+                runner_up_margin: minimum.runner_up_margin,
+                chance_level,
+                ..rest
+            };
+            (minimum.signals(), confidence)
+        }
+        Family::Starts => {
+            let settled = Settled::of(outcome, evidence)?;
+            let runner_up_margin = settled.runner_up_margin;
+            (settled.signals(), PoseConfidence { runner_up_margin, chance_level, ..rest })
+        }
+        Family::Given => return None,
     })
 }
 
@@ -300,27 +256,8 @@ fn tamed(value: f64) -> f64 {
     value.signum() * value.abs().ln_1p()
 }
 
-fn surface(evidence: &Evidence, phase: Phase) -> Option<&ScoredLattice> {
-    let found = |surface: &&std::sync::Arc<ScoredLattice>| surface.lattice.phase == phase;
-    evidence.surfaces.iter().find(found).map(AsRef::as_ref)
-}
-
 fn eligible_costs(surface: &ScoredLattice) -> Vec<f64> {
     (0..surface.scores.len()).filter_map(|cell| surface.eligible_cost(cell)).collect()
-}
-
-/// The median, and the standard deviation that a normal distribution of the same median absolute
-/// deviation has.
-fn centre_and_deviation(values: &mut [f64]) -> Option<(f64, f64)> {
-    let centre = median(values)?;
-    let mut deviations: Vec<f64> = values.iter().map(|value| (value - centre).abs()).collect();
-    let deviation = 1.4826 * median(&mut deviations)?;
-    Some((centre, deviation.max(1e-9)))
-}
-
-fn median(values: &mut [f64]) -> Option<f64> {
-    let middle = values.len().checked_sub(1)? / 2;
-    Some(*values.select_nth_unstable_by(middle, f64::total_cmp).1)
 }
 
 #[cfg(test)]

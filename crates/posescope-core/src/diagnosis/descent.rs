@@ -9,11 +9,11 @@ pub(super) struct Descended<const N: usize> {
     pub(super) cost: f64,
 }
 
-/// Compass search (Kolda, Lewis, Torczon, *Optimization by Direct Search*, SIAM Review 45(3), 2003):
-/// goes to the best of the 2 N neighbours at `steps` as long as that is cheaper, then halves the steps,
+/// Compass search (Kolda, Lewis, Torczon, *Optimization by Direct Search*, SIAM Review 45(3), 2003): goes
+/// to the best of the 2 N neighbours at `steps` as long as its cost is lower, then halves the steps,
 /// `halvings` times.
 ///
-/// `costs` are those of many places at once; one that has none, or NaN, is not gone to. `None` where
+/// `costs` scores many places at once; places without a cost, or with NaN, are never taken. `None` where
 /// the start has no cost.
 pub(super) fn compass_search<const N: usize>(
     start: [f64; N],
@@ -22,12 +22,12 @@ pub(super) fn compass_search<const N: usize>(
     mut costs: impl FnMut(&[[f64; N]]) -> Vec<Option<f64>>,
 ) -> Option<Descended<N>> {
     /// A valley that is longer than this many steps is not followed to its end.
-    const MOST_STEPS: usize = 24;
+    const MAX_STEPS: usize = 24;
     let mut best = Descended { at: start, cost: costs(&[start]).first().copied()?? };
     for _ in 0..=halvings {
-        // The way back leads to what was dearer.
+        // The way back leads to a higher cost.
         let mut back = None;
-        for _ in 0..MOST_STEPS {
+        for _ in 0..MAX_STEPS {
             let ways: Vec<(usize, f64)> = (0..N)
                 .filter(|&axis| steps[axis] > 0.0)
                 .flat_map(|axis| [(axis, steps[axis]), (axis, -steps[axis])])

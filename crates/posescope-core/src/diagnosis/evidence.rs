@@ -1,4 +1,4 @@
-//! What an estimator told that a verdict is drawn from.
+//! The events of an estimator from which verdicts are drawn.
 
 use std::sync::Arc;
 
@@ -42,14 +42,13 @@ pub struct Evidence {
 }
 
 impl Evidence {
-    /// The first lattice of positions.
-    pub fn coarse(&self) -> Option<&ScoredLattice> {
-        let is_coarse =
-            |surface: &&Arc<ScoredLattice>| surface.lattice.phase == Phase::PositionCoarse;
-        self.surfaces.iter().find(is_coarse).map(AsRef::as_ref)
+    /// The first scored lattice of a phase.
+    pub fn surface(&self, phase: Phase) -> Option<&ScoredLattice> {
+        let found = self.surfaces.iter().find(|surface| surface.lattice.phase == phase);
+        found.map(AsRef::as_ref)
     }
 
-    /// What a hybrid of two methods would have told that fell back to the second.
+    /// The evidence of a hybrid that fell back from this method to a second.
     #[must_use]
     pub fn followed_by(&self, second: &Self) -> Self {
         Self {

@@ -33,7 +33,7 @@ pub fn diagnose_fusion(
             _ => None,
         }));
     }
-    // Without the truth a joint pose has nothing to do with what is wrong with one alone.
+    // Without the truth, verdicts on single references say nothing about a joint pose.
     let is_of_members = !is_right && (!is_joint || pose.is_ok() && truth.is_some());
     if is_of_members {
         let verdicts = heaviest(members).map_or(&[][..], |member| member.verdicts);

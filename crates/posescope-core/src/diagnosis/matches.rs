@@ -101,7 +101,7 @@ pub(super) struct TrueMatches {
 }
 
 impl TrueMatches {
-    /// `None` where the method did not come to matching, or nobody knows the truth.
+    /// `None` where the method did not reach matching, or the truth is unknown.
     pub(super) fn of(subject: &Subject<'_>, matching: &Matching<'_>) -> Option<Self> {
         let evidence = subject.evidence;
         let (query, reference) = (evidence.query.as_ref()?, evidence.reference.as_ref()?);
@@ -292,17 +292,10 @@ impl Epipolar {
         let essential = query_from_reference.translation.vector.cross_matrix()
             * query_from_reference.rotation.to_rotation_matrix();
         let inverse = |camera: &Intrinsics| {
-            Matrix3::new(
-                1.0 / camera.fx,
-                0.0,
-                -camera.cx / camera.fx,
-                0.0,
-                1.0 / camera.fy,
-                -camera.cy / camera.fy,
-                0.0,
-                0.0,
-                1.0,
-            )
+            let Intrinsics { fx, fy, cx, cy, .. } = *camera;
+            let mut inverse = Matrix3::from_diagonal(&Vector3::new(1.0 / fx, 1.0 / fy, 1.0));
+            (inverse[(0, 2)], inverse[(1, 2)]) = (-cx / fx, -cy / fy);
+            inverse
         };
         Self {
             fundamental: inverse(query).transpose() * essential * inverse(reference),

@@ -11,8 +11,8 @@ use crate::params::Params;
 
 pub use super::ask::{Ask, Change, Remedy};
 
-/// What might help a method against its primary verdict, what is likeliest to help first. Of a hybrid the
-/// method counts whose pose it took.
+/// What might help a method against its primary verdict, the likeliest first. For a hybrid, the method
+/// whose pose it took counts.
 pub fn remedies(
     code: Code,
     method: Method,

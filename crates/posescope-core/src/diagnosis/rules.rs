@@ -121,11 +121,27 @@ pub struct Rule {
     pub decided_at: DecidedAt,
     /// The kind of picture that proves it.
     pub proof: Proof,
-    /// What may help a method against it, what is likeliest to help first.
+    /// What may help a method against it, the likeliest first.
     pub remedies: fn(&Ask<'_>) -> Vec<Remedy>,
 }
 
 impl Rule {
+    /// A rule with what most have in common; alone, one that the method itself reports.
+    const fn new(code: Code) -> Self {
+        Self {
+            code,
+            title: "",
+            advice: "",
+            applies_to: &[],
+            needs_truth: true,
+            is_conclusive: false,
+            test: Test::Reported,
+            decided_at: DecidedAt::End,
+            proof: Proof::DecidingStage,
+            remedies: |_| Vec::new(),
+        }
+    }
+
     /// A verdict of this rule. Its sentence is made from the evidence.
     pub(super) fn found(&self, evidence: &(impl Serialize + fmt::Display)) -> Diagnosis {
         Diagnosis {
@@ -140,7 +156,7 @@ impl Rule {
 #[derive(Clone, Copy, Debug)]
 pub enum Test {
     /// By what one method did with one reference.
-    Method(fn(&Case<'_, '_>) -> Option<Diagnosis>),
+    Method(fn(&Case<'_>) -> Option<Diagnosis>),
     /// By what each reference of a fusion gave.
     Fusion(fn(&FusionCase<'_>) -> Option<Diagnosis>),
     /// By how references were ranked.
@@ -156,11 +172,6 @@ pub enum DecidedAt {
     Stage(Stage),
     /// At the end of the method.
     End,
-}
-
-/// For rules that nothing helps against but another method or another reference.
-fn no_remedy(_: &Ask<'_>) -> Vec<Remedy> {
-    Vec::new()
 }
 
 impl Code {

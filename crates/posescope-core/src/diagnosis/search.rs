@@ -6,20 +6,22 @@
 //!
 //! Another system's pose is looked at in the same way, as if a search by the cost of MI had ended there.
 
-use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+use std::sync::{Mutex, OnceLock, PoisonError};
 
-use nalgebra::{Translation3, UnitQuaternion, Vector3};
 use rayon::prelude::*;
 
 use super::Subject;
 use super::confidence;
 use super::descent::compass_search;
+use super::family::Family;
 use crate::cost::shuffled;
-use crate::estimator;
+use crate::estimator::{self, Estimator};
 use crate::geometry::{Pose, PoseError, yaw};
-use crate::grid::{GridParams, Offset, Phase, ScoredLattice, least_covered};
+use crate::grid::{GridParams, Offset, Phase, least_covered};
+use crate::judge::moved;
 use crate::method::Method;
 use crate::render::{Score, Scorer};
+use crate::stats::mean_and_squares;
 
 /// The method whose cost judges the poses of other systems: it bears the greatest changes of appearance.
 pub(super) const JUDGE: Method = Method::MI;
@@ -32,7 +34,7 @@ const OTHER_PLACES: usize = 4;
 /// to do with each other.
 pub(super) const BEYOND_CHANCE: f64 = 6.0;
 
-/// Fewer pixels do not tell whether images have anything to do with each other.
+/// With fewer pixels, a low cost can be chance.
 pub(super) const TELLING_PIXELS: usize = 500;
 
 /// How often pixels are shuffled to see what chance gives.
@@ -80,17 +82,15 @@ pub(super) struct Rivals {
 }
 
 /// A finished search, and the truth in the reference camera's frame.
-pub(super) struct Search<'a, 'cost> {
+pub(super) struct Search<'a> {
     pub(super) subject: &'a Subject<'a>,
-    pub(super) scorer: &'a Scorer<'cost>,
+    pub(super) scorer: Scorer<'a>,
     pub(super) grid: &'a GridParams,
     pub(super) truth: Pose,
     /// The pose that it ended in.
     pub(super) result: Offset,
     /// The cost there; `None` where too little is covered.
     pub(super) result_cost: Option<f64>,
-    /// The cost there with the view's pixels shuffled.
-    pub(super) shuffled_cost: Option<f64>,
     /// Pixels that a pose must cover.
     pub(super) least_covered: u32,
     /// The method whose cost judges another system's pose.
@@ -101,40 +101,41 @@ pub(super) struct Search<'a, 'cost> {
     against_chance: Mutex<Vec<(Offset, Option<AgainstChance>)>>,
 }
 
-impl Search<'_, '_> {
-    /// Hands `work` the search that the subject's method ended, or what stands for one; `None` where there
-    /// is none, or no truth to compare with.
-    pub(super) fn of<T>(
-        subject: &Subject<'_>,
-        is_given: bool,
-        work: impl FnOnce(Option<&Search<'_, '_>>) -> T,
-    ) -> T {
-        let responsible =
-            if is_given { JUDGE } else { confidence::responsible(subject.method, subject.outcome) };
-        let entry = estimator::find(responsible);
-        let (Some(truth), Some(entry)) = (subject.reference_from_truth(), entry) else {
-            return work(None);
-        };
-        let estimator = entry.make(subject.params);
-        let Some(scorer) = estimator.scorer(subject.problem) else {
-            return work(None);
-        };
+/// The estimator whose cost is compared at the result and the truth: that of the method, or of [`JUDGE`].
+pub(super) fn estimator_of(subject: &Subject<'_>, family: Family) -> Option<Box<dyn Estimator>> {
+    let method = match family {
+        Family::Grid => confidence::responsible(subject.method, subject.outcome),
+        Family::Given => JUDGE,
+        _ => return None,
+    };
+    Some(estimator::find(method)?.make(subject.params))
+}
+
+impl<'a> Search<'a> {
+    /// The search that the subject's method ended, or what stands for one; `None` without the truth.
+    pub(super) fn of(
+        subject: &'a Subject<'a>,
+        family: Family,
+        estimator: &'a dyn Estimator,
+    ) -> Option<Self> {
+        let truth = subject.reference_from_truth()?;
+        let scorer = estimator.scorer(subject.problem)?;
+        let is_given = family == Family::Given;
         let ended = if is_given { ended_as_given(subject, &scorer) } else { ended(subject) };
-        let search = ended.map(|ended| Search {
+        let (result, result_cost, least_covered) = ended?;
+        Some(Self {
             subject,
-            scorer: &scorer,
+            scorer,
             grid: &subject.params.grid,
             truth,
-            result: ended.offset,
-            result_cost: ended.cost,
-            shuffled_cost: ended.shuffled,
-            least_covered: ended.least_covered,
+            result,
+            result_cost,
+            least_covered,
             judge: is_given.then_some(JUDGE),
             near_truth: OnceLock::new(),
             rivals: OnceLock::new(),
             against_chance: Mutex::default(),
-        });
-        work(search.as_ref())
+        })
     }
 
     /// What beat the truth; `None` where the truth is out of reach, or covers too little.
@@ -310,7 +311,7 @@ impl Search<'_, '_> {
             lowest.filter(|place| place.cost < than)
         };
         lower(&[self.result]).or_else(|| {
-            let coarse = self.surface(Phase::PositionCoarse)?;
+            let coarse = self.subject.evidence.surface(Phase::PositionCoarse)?;
             let minima: Vec<Offset> = coarse
                 .local_minima()
                 .into_iter()
@@ -320,13 +321,6 @@ impl Search<'_, '_> {
                 .collect();
             lower(&minima)
         })
-    }
-
-    /// The scored lattice of a phase. Nothing was searched for another system's pose.
-    pub(super) fn surface(&self, phase: Phase) -> Option<&ScoredLattice> {
-        let mut surfaces = self.subject.evidence.surfaces.iter();
-        let found = surfaces.find(|surface| surface.lattice.phase == phase);
-        found.map(Arc::as_ref)
     }
 
     pub(super) fn distance_from_truth(&self, offset: &Offset) -> f64 {
@@ -354,17 +348,13 @@ impl Search<'_, '_> {
         if let Some((_, against)) = found {
             return against;
         }
-        let against = self.against_chance_of(self.scorer, &offset.reference_from_camera());
+        let against = self.against_chance_of(&offset.reference_from_camera());
         known().push((*offset, against));
         against
     }
 
-    pub(super) fn against_chance_of(
-        &self,
-        scorer: &Scorer<'_>,
-        pose: &Pose,
-    ) -> Option<AgainstChance> {
-        let pairs = scorer.pairs(pose);
+    fn against_chance_of(&self, pose: &Pose) -> Option<AgainstChance> {
+        let pairs = self.scorer.pairs(pose);
         let measure = self.scorer.statistic();
         let seed = self.subject.problem.random_seed("shuffled truth");
         let costs: Vec<Option<f64>> = (0..SHUFFLES)
@@ -372,16 +362,10 @@ impl Search<'_, '_> {
             .map(|k| measure.cost(&shuffled(&pairs, seed.wrapping_add(k))))
             .collect();
         let costs: Vec<f64> = costs.into_iter().flatten().collect();
-        let count = costs.len() as f64;
-        let mean = costs.iter().sum::<f64>() / count;
-        let squared: f64 = costs.iter().map(|cost| (cost - mean).powi(2)).sum();
-        Some(AgainstChance {
-            pixels: pairs.len(),
-            cost: measure.cost(&pairs)?,
-            mean,
-            deviation: (squared / (count - 1.0)).sqrt(),
-        })
-        .filter(|_| costs.len() > 1)
+        let (mean, squares) = mean_and_squares(&costs)?;
+        let deviation = (squares / (costs.len() as f64 - 1.0)).sqrt();
+        let cost = measure.cost(&pairs)?;
+        (costs.len() > 1).then_some(AgainstChance { pixels: pairs.len(), cost, mean, deviation })
     }
 
     pub(super) fn gain(&self, offset: &Offset) -> Option<f64> {
@@ -435,52 +419,24 @@ impl Search<'_, '_> {
     }
 }
 
-/// Where a search ended.
-struct Ended {
-    offset: Offset,
-    cost: Option<f64>,
-    shuffled: Option<f64>,
-    least_covered: u32,
-}
+/// Where a search ended: the pose, its cost, and the pixels that a pose must cover.
+type Ended = (Offset, Option<f64>, u32);
 
 fn ended(subject: &Subject<'_>) -> Option<Ended> {
     subject.outcome.pose.as_ref().ok()?;
-    let minimum = subject.evidence.minimum?;
-    let surfaces = &subject.evidence.surfaces;
-    Some(Ended {
-        offset: minimum.offset,
-        cost: Some(subject.outcome.cost?.best),
-        shuffled: subject.outcome.cost?.shuffled,
-        least_covered: surfaces.first().map_or(0, |surface| surface.least_covered),
-    })
+    let offset = subject.evidence.minimum?.offset;
+    let surface = subject.evidence.surfaces.first();
+    let least_covered = surface.map_or(0, |surface| surface.least_covered);
+    Some((offset, Some(subject.outcome.cost?.best), least_covered))
 }
 
 /// What stands for a search that ended in another system's pose.
 fn ended_as_given(subject: &Subject<'_>, scorer: &Scorer<'_>) -> Option<Ended> {
-    let problem = subject.problem;
-    let pose = problem.reference_from_query(subject.outcome.pose.as_ref().ok()?);
+    let pose = subject.problem.reference_from_query(subject.outcome.pose.as_ref().ok()?);
     let start = Offset::default().reference_from_camera();
-    let [at_pose, at_reference] = scorer.score(&[pose, start])[..] else {
-        return None;
-    };
-    let pairs = scorer.compare(&pose).pairs;
-    let pairs = shuffled(&pairs, problem.random_seed("shuffled pixels"));
+    let [at_pose, at_reference] = scorer.score(&[pose, start]).try_into().ok()?;
     let least_covered = least_covered(subject.params.grid.coverage_floor, at_reference.covered);
-    Some(Ended {
-        offset: Offset::of(&pose),
-        cost: at_pose.eligible_cost(least_covered),
-        shuffled: scorer.statistic().cost(&pairs),
-        least_covered,
-    })
-}
-
-/// A camera moved along and turned about its own axes.
-fn moved(pose: &Pose, by: &[f64; 6]) -> Pose {
-    let [x, y, z, about_x, about_y, about_z] = *by;
-    pose * Pose::from_parts(
-        Translation3::new(x, y, z),
-        UnitQuaternion::from_scaled_axis(Vector3::new(about_x, about_y, about_z)),
-    )
+    Some((Offset::of(&pose), at_pose.eligible_cost(least_covered), least_covered))
 }
 
 /// The searched pose with the height, pitch and roll of the truth.

@@ -26,7 +26,7 @@ use crate::event::{
 };
 use crate::features::{
     Features, FoundMatches, Keypoint, Match, MatchVerdict, PairMatches, SiftFeatures, SiftParams,
-    SurfParams, best_matches_interruptible, kept_surf, sift_interruptible,
+    SurfParams, best_matches, kept_surf, sift_interruptible,
 };
 use crate::geometry::Pose;
 use crate::memo::Recalled;
@@ -358,12 +358,12 @@ impl FeatureBased {
             match (&query.sift, &reference.sift) {
                 (Some(query), Some(reference)) => {
                     let (query, reference) = (&query.descriptors, &reference.descriptors);
-                    best_matches(query, reference, &self.params, checkpoint)
+                    decided(query, reference, &self.params, checkpoint)
                 }
                 _ => {
                     let [query, reference] =
                         [query, reference].map(|one| &one.features.descriptors);
-                    best_matches(query, reference, &self.params, checkpoint)
+                    decided(query, reference, &self.params, checkpoint)
                 }
             }
         });
@@ -530,14 +530,14 @@ fn found_elsewhere(problem: &Problem) -> Result<Option<&FoundMatches>, Failure> 
 }
 
 /// The best match of each query feature, and whether it stands out.
-fn best_matches<const N: usize, E>(
+fn decided<const N: usize, E>(
     query: &[[f32; N]],
     reference: &[[f32; N]],
     params: &FeatureParams,
     checkpoint: impl FnMut() -> Result<(), E>,
 ) -> Result<Decided, E> {
     let ratio = params.ratio as f32;
-    let mut matches = best_matches_interruptible(query, reference, ratio, checkpoint)?;
+    let mut matches = best_matches(query, reference, ratio, checkpoint)?;
     if !params.unique {
         for found in matches.iter_mut().flatten() {
             if let MatchVerdict::NotUnique { .. } = found.verdict {
@@ -572,6 +572,6 @@ pub fn count_matches(query: &Features, reference: &Features, params: &FeaturePar
         return 0;
     }
     let (query, reference) = (&query.descriptors, &reference.descriptors);
-    let Ok(matches) = best_matches(query, reference, params, || Ok::<_, Infallible>(()));
+    let Ok(matches) = decided(query, reference, params, || Ok::<_, Infallible>(()));
     matches.iter().flatten().filter(|found| found.verdict == MatchVerdict::Candidate).count()
 }

@@ -1,8 +1,8 @@
-//! Sums over grids of boxes, those of a whole grid from shared differences.
+//! Sums over grids of boxes, from shared differences.
 //!
-//! Where the grid lies along the axes of the image, the boxes of one row are cut by the same rows of
-//! pixels. What those add up to is worked out once along the row, many pixels at a time, by the
-//! operations of a single box in their order: the sums are the same to the last bit.
+//! In a grid along the image axes, the same rows of pixels cut all boxes of a row. They are added up once
+//! along the row, many pixels at a time, in the order of operations of a single box: the sums are the same
+//! to the last bit.
 
 use super::integral::{IntegralImage, Span};
 

@@ -1,4 +1,4 @@
-//! Matches that somebody else found.
+//! Matches of another system.
 
 use std::sync::Arc;
 
@@ -42,7 +42,7 @@ impl FoundMatches {
             Some(Match {
                 query,
                 reference,
-                // What told the match from others stayed with who found it.
+                // The other system keeps its distances to itself.
                 distance: 0.0,
                 ratio: 0.0,
                 verdict: match rival {
@@ -66,7 +66,7 @@ impl FoundMatches {
 }
 
 fn features(positions: &[[f32; 2]]) -> Features {
-    /// What is drawn of a keypoint whose size nobody told \[px\].
+    /// Drawn size of a keypoint without one \[px\].
     const SCALE_PX: f32 = 1.2;
     let keypoint = |&[x, y]: &[f32; 2]| Keypoint {
         x,

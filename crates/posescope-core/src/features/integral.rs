@@ -4,7 +4,7 @@ use image::GrayImage;
 use rayon::prelude::*;
 
 /// Fewer rows are not worth a thread.
-const LEAST_BAND: usize = 64;
+const MIN_BAND: usize = 64;
 
 /// The integral image of a grey image (section 3.1, equation 1).
 ///
@@ -24,7 +24,7 @@ impl IntegralImage {
         let stride = width + 1;
         let mut sums = vec![0u32; stride * (height + 1)];
         // A band of rows for each thread, as if nothing were above it; then what is above it is added.
-        let rows = height.div_ceil(rayon::current_num_threads()).max(LEAST_BAND);
+        let rows = height.div_ceil(rayon::current_num_threads()).max(MIN_BAND);
         let (_, table) = sums.split_at_mut(stride);
         let pixels = image.as_raw().par_chunks((rows * width).max(1));
         let bands = table.par_chunks_mut(rows * stride).zip(pixels);

@@ -31,36 +31,16 @@ pub enum MatchVerdict {
     Candidate,
 }
 
-/// Judges the best match of every query descriptor.
+/// The best match of every query descriptor, and which tests it passes. None for queries without neighbours.
 ///
-/// `forward` are the neighbours of the query descriptors among the reference descriptors,
-/// `backward` those of the reference descriptors among the query descriptors. A match passes the
-/// ratio test if its ratio is below `max_ratio`; 0.8 is customary, 1 lets all but exact ties pass.
-/// None for queries without neighbours.
-///
-/// # Panics
-///
-/// If `forward` and `backward` do not belong to the same two sets.
-pub fn classify(
-    forward: &[Option<Neighbours>],
-    backward: &[Option<Neighbours>],
-    max_ratio: f32,
-) -> Vec<Option<Match>> {
-    judge(forward, max_ratio, |reference| {
-        backward[reference]
-            .expect("a reference descriptor has neighbours if there are queries")
-            .nearest
-    })
-}
-
-/// Finds and judges the best match of every query descriptor: what [`classify`] says of the neighbours
-/// both ways. Only those reference descriptors are compared with all of the query that a distinct match
+/// A match passes the ratio test if its ratio is below `max_ratio`; 0.8 is customary, 1 lets all but exact
+/// ties pass. Only those reference descriptors are compared with all of the query that a distinct match
 /// chose, in photos of a street one of five. `checkpoint` is called as in
 /// [`nearest_neighbours_interruptible`].
 ///
 /// # Errors
 /// The errors of `checkpoint`.
-pub fn best_matches_interruptible<const N: usize, E>(
+pub fn best_matches<const N: usize, E>(
     query: &[[f32; N]],
     reference: &[[f32; N]],
     max_ratio: f32,
@@ -130,9 +110,9 @@ mod tests {
     fn both_ways(query: &[Descriptor], reference: &[Descriptor]) -> Vec<Option<Match>> {
         let forward = nearest_neighbours(query, reference);
         let backward = nearest_neighbours(reference, query);
-        let matches = classify(&forward, &backward, 0.8);
-        let Ok(found) =
-            best_matches_interruptible(query, reference, 0.8, || Ok::<_, Infallible>(()));
+        let nearest_query = |reference: usize| backward[reference].expect("queries").nearest;
+        let matches = judge(&forward, 0.8, nearest_query);
+        let Ok(found) = best_matches(query, reference, 0.8, || Ok::<_, Infallible>(()));
         assert_eq!(found, matches);
         matches
     }

@@ -8,8 +8,8 @@ use rayon::prelude::*;
 /// References compared at a time, one in each lane of two vectors.
 const LANES: usize = 16;
 
-/// Queries compared at a time. Their sums with all lanes stay in registers, and what is loaded of a
-/// reference serves all of them.
+/// Queries compared at a time. Their sums with all lanes stay in registers, and each load of a reference
+/// serves all of them.
 const QUERIES: usize = 6;
 
 /// Groups of queries that go through the references together. With sixteen references, 20 KiB of
@@ -167,7 +167,7 @@ struct Group<const N: usize> {
 }
 
 impl<const N: usize> Group<N> {
-    /// A group of at most six; the others are zero, and nobody asks what is near them.
+    /// A group of at most six; the rest is zero and unused.
     fn new(queries: &[[f32; N]], margin: f32) -> Self {
         let mut group = Self {
             queries: [[0.0; N]; QUERIES],

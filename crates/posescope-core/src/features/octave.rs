@@ -14,7 +14,7 @@ use super::integral::IntegralImage;
 use super::responses::Responses;
 
 /// Fewer rows in a band are not worth the rows that it shares with its neighbours.
-const LEAST_BAND: usize = 16;
+const MIN_BAND: usize = 16;
 /// Two bands for each thread, so that none waits long for another, and few rows are filtered twice.
 const BANDS_PER_THREAD: usize = 2;
 
@@ -59,7 +59,7 @@ impl Octave<'_> {
 
         let bands = BANDS_PER_THREAD * rayon::current_num_threads();
         // Even, so that no row that is kept belongs to two bands.
-        let height = rows.div_ceil(bands).max(LEAST_BAND).next_multiple_of(2);
+        let height = rows.div_ceil(bands).max(MIN_BAND).next_multiple_of(2);
         let firsts = (0..rows).step_by(height);
         let kept_of_bands = kept.bands_mut(height / 2);
         let kept_of_bands = kept_of_bands.chain(std::iter::repeat_with(<&mut [f32]>::default));

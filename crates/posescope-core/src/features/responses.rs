@@ -27,7 +27,7 @@ impl Responses {
         &mut self.samples[start..][..self.columns]
     }
 
-    /// All rows of all layers, so many rows at a time, one row of a layer after the other.
+    /// All rows of all layers in bands of `rows`, of each row layer by layer.
     pub(super) fn bands_mut(&mut self, rows: usize) -> impl Iterator<Item = &mut [f32]> {
         let band = rows * self.layers * self.columns;
         self.samples.chunks_mut(band.max(1))

@@ -22,30 +22,17 @@ parameters! {
     pub struct SiftParams {
         /// Smallest contrast of a feature: the magnitude of the difference of Gaussians, of grey values
         /// from 0 to 1.
-        pub contrast: f64 = number("contrast", "", 0.0..=1.0),
+        pub contrast: f64 = 0.012 => number("contrast", "", 0.0..=1.0),
         /// Largest ratio of the principal curvatures of a feature; points on edges have a larger one.
-        pub edge_ratio: f64 = number("edge_ratio", "", 1.0..=1000.0),
+        pub edge_ratio: f64 = 10.0 => number("edge_ratio", "", 1.0..=1000.0),
         /// Scales per octave.
-        pub intervals: usize = count("intervals", "", 1..=8),
+        pub intervals: usize = 3 => count("intervals", "", 1..=8),
         /// Whether to double the size of the image first, which finds the smallest features.
-        pub enlarge: bool = flag("enlarge"),
+        pub enlarge: bool = true => flag("enlarge"),
         /// Whether features are upright, for cameras that do not roll.
-        pub upright: bool = flag("upright"),
+        pub upright: bool = true => flag("upright"),
         /// Largest number of features to keep, the strongest; 0 keeps all.
-        pub max_keypoints: usize = count("max_keypoints", "", 0..=1_000_000),
-    }
-}
-
-impl Default for SiftParams {
-    fn default() -> Self {
-        Self {
-            contrast: 0.012,
-            edge_ratio: 10.0,
-            intervals: 3,
-            enlarge: true,
-            upright: true,
-            max_keypoints: 4000,
-        }
+        pub max_keypoints: usize = 4000 => count("max_keypoints", "", 0..=1_000_000),
     }
 }
 
@@ -129,7 +116,7 @@ pub fn sift_interruptible<E>(
     Ok(features)
 }
 
-/// The image as the first octave wants it, 0 … 1, and the size of its pixels in those of the photo.
+/// The base image of the first octave, 0 … 1, and the size of its pixels in those of the photo.
 fn base(image: &GrayImage, params: &SiftParams) -> (FloatImage, f32) {
     let value = |x: u32, y: u32| f32::from(image.get_pixel(x, y).0[0]) / 255.0;
     if image.width() == 0 || image.height() == 0 {

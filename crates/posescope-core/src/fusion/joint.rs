@@ -2,19 +2,13 @@
 
 use std::sync::Arc;
 
-use super::{Entry, Share, Way};
+use super::{JOINT, Share};
 use crate::estimator::{self, Failure, JointOutcome, JointReference};
 use crate::event::{ReferencesFused, Stage};
 use crate::geometry::Pose;
 use crate::method::Method;
 use crate::params::Params;
 use crate::trace::{Cancelled, Trace};
-
-pub(super) const ENTRY: Entry = Entry {
-    name: "joint",
-    about: "no poses: the matches of all references in one consensus, the costs of all added up",
-    way: Way::Joint,
-};
 
 /// The pose that several references give together, and what each has to do with it, in their order.
 ///
@@ -39,7 +33,7 @@ pub fn fuse_jointly(
         };
         let shares = outcome.shares(references);
         trace.emit(|| ReferencesFused {
-            fusion: ENTRY.name,
+            fusion: JOINT,
             shares: Arc::from(shares.as_slice()),
             pose: outcome.pose.as_ref().ok().copied(),
         })?;

@@ -1,4 +1,4 @@
-//! What each reference has to do with the fused pose.
+//! The share of each reference in the fused pose.
 
 use crate::geometry::Pose;
 
@@ -33,7 +33,7 @@ pub enum Support {
     },
     /// By its view of the query.
     Cost {
-        /// Its own cost at the pose; `None` where it covers too little to have a say.
+        /// Its own cost at the pose; `None` where it covers too little.
         cost: Option<f64>,
         /// Share of the image that it covers.
         coverage: f64,
@@ -41,7 +41,7 @@ pub enum Support {
 }
 
 impl Support {
-    /// What weights are shared out by: inliers, or the part of the image that has a say.
+    /// What the weight is proportional to: inliers, or the share of the image that is covered.
     pub fn amount(&self) -> f64 {
         match *self {
             Self::Inliers { inliers, .. } => inliers as f64,
@@ -84,7 +84,7 @@ pub struct Share {
 }
 
 impl Share {
-    /// What it has to say, in few words: its weight, or why it has none.
+    /// In a few words: its weight, or why it has none.
     pub fn words(&self) -> String {
         let weight = format!("{:.3}", self.weight);
         match self.outcome {

@@ -36,30 +36,17 @@ parameters! {
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct Degradation {
         /// Fog: share of the light that comes from a uniform grey (204) instead of the scene.
-        pub fog: f64 = number("fog", "", 0.0..=1.0),
+        pub fog: f64 = 0.0 => number("fog", "", 0.0..=1.0),
         /// Blur: standard deviation of a Gaussian.
-        pub blur_px: f64 = number("blur", "px", 0.0..=20.0),
+        pub blur_px: f64 = 0.0 => number("blur", "px", 0.0..=20.0),
         /// Exposure: brighter above 0, darker below; values beyond white are clipped.
-        pub exposure_stops: f64 = number("exposure", "stops", -8.0..=8.0),
+        pub exposure_stops: f64 = 0.0 => number("exposure", "stops", -8.0..=8.0),
         /// Gamma: exponent of grey values from 0 to 1; below 1 dark parts become brighter, above 1 darker.
-        pub gamma: f64 = number("gamma", "", 0.05..=10.0),
+        pub gamma: f64 = 1.0 => number("gamma", "", 0.05..=10.0),
         /// Noise: standard deviation of Gaussian noise, seeded by --seed and the query's name.
-        pub noise_levels: f64 = number("noise", "grey levels", 0.0..=128.0),
+        pub noise_levels: f64 = 0.0 => number("noise", "grey levels", 0.0..=128.0),
         /// Invert: the negative of the photo.
-        pub invert: bool = flag("invert"),
-    }
-}
-
-impl Default for Degradation {
-    fn default() -> Self {
-        Self {
-            fog: 0.0,
-            blur_px: 0.0,
-            exposure_stops: 0.0,
-            gamma: 1.0,
-            noise_levels: 0.0,
-            invert: false,
-        }
+        pub invert: bool = false => flag("invert"),
     }
 }
 

@@ -39,32 +39,18 @@ parameters! {
     #[derive(Clone, Debug, PartialEq)]
     pub struct JudgeParams {
         /// Channels of the cost: grey value, local contrast, edge strength, or the mean of all.
-        pub channels: Channels = choice("channels"),
+        pub channels: Channels = Channels::Three => choice("channels"),
         /// Whether to subtract the chance level at this number of pixels from normalised mutual information.
-        pub corrected: bool = flag("corrected"),
+        pub corrected: bool = true => flag("corrected"),
         /// Standard deviation of the Gaussian that smooths the query.
-        pub sigma_px: f64 = number("sigma", "px", 0.0..=20.0),
+        pub sigma_px: f64 = 1.5 => number("sigma", "px", 0.0..=20.0),
         /// Standard deviation of the Gaussian that smooths the reference photo before it colours the cloud.
-        pub reference_sigma_px: f64 = number("reference_sigma", "px", 0.0..=20.0),
+        pub reference_sigma_px: f64 = 0.0 => number("reference_sigma", "px", 0.0..=20.0),
         /// Standard deviation of the Gaussian that smooths both photos before edge detection.
-        pub edge_sigma_px: f64 = number("edge_sigma", "px", 0.0..=20.0),
+        pub edge_sigma_px: f64 = 1.5 => number("edge_sigma", "px", 0.0..=20.0),
         /// Standard deviation of the neighbourhood that local contrast compares a grey value with.
-        pub contrast_sigma_px: f64 = number("contrast_sigma", "px", 1.0..=200.0),
+        pub contrast_sigma_px: f64 = 20.0 => number("contrast_sigma", "px", 1.0..=200.0),
         /// Bins per axis of each joint histogram.
-        pub bins: usize = count("bins", "", 2..=256),
-    }
-}
-
-impl Default for JudgeParams {
-    fn default() -> Self {
-        Self {
-            channels: Channels::Three,
-            corrected: true,
-            sigma_px: 1.5,
-            reference_sigma_px: 0.0,
-            edge_sigma_px: 1.5,
-            contrast_sigma_px: 20.0,
-            bins: 16,
-        }
+        pub bins: usize = 16 => count("bins", "", 2..=256),
     }
 }

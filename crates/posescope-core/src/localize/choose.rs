@@ -25,9 +25,8 @@ pub struct Chooser<'a> {
 }
 
 impl Chooser<'_> {
-    /// The references of a query, perhaps none. `left_out` says of a frame of the references' scene
-    /// that it must not be one; the query itself never is. `observer` hears how far it is, and
-    /// can stop it.
+    /// The references of a query, perhaps none. `left_out` excludes frames of the references' scene; the
+    /// query itself is always excluded. `observer` follows the progress and can stop it.
     ///
     /// # Errors
     /// [`ChoiceError`].
@@ -44,7 +43,7 @@ impl Chooser<'_> {
         let excluded = |frame| is_one_drive && frame == query || left_out(frame);
         let mut within = match (place, self.selection) {
             (Some(place), _) => frames_within(references, &place, self.radius_m, &excluded),
-            // What a place looks like is known even where nobody knows where it is.
+            // Without a position, all frames are candidates.
             (None, Selection::Matched(_) | Selection::Retrieved(_)) => {
                 (0..references.frames().len())
                     .filter(|&frame| !excluded(frame) && references.has_cloud(frame))

@@ -1,7 +1,5 @@
-//! Localising queries: every reference by itself, then fused where that is asked for.
-//!
-//! The one way through for a single query, for an experiment over thousands, and for whoever wants
-//! to watch either.
+//! Localises queries: against each reference alone, then fused if asked. Single queries, experiments and
+//! the window all go this way.
 
 mod explain;
 mod fuse;
@@ -59,8 +57,9 @@ pub struct Request {
 
 /// Localises the queries of one scene against the references of another, or of the same.
 ///
-/// The frames that were used last are at hand for the next method and the next query, with all that
-/// was worked out about them.
+/// It keeps the frames used last with all that was computed of them, for the next method and the next
+/// query.
+#[derive(Clone)]
 pub struct Localizer<'a> {
     references: CachedScene<'a>,
     queries: CachedScene<'a>,
@@ -87,8 +86,7 @@ impl<'a> Localizer<'a> {
         Self::with_cached_scenes(CachedScene::pair(references, queries), params, seed)
     }
 
-    /// A localizer for scenes, references and queries, whose frames are remembered for longer than
-    /// it lives.
+    /// A localizer for scenes, references and queries, whose frames are kept longer than it lives.
     pub fn with_cached_scenes(
         (references, queries): (CachedScene<'a>, CachedScene<'a>),
         params: &'a Params,
@@ -109,17 +107,7 @@ impl<'a> Localizer<'a> {
 
     /// The same scenes and their frames, localised with other parameters. It explains nothing.
     fn with_other_params<'b>(&'b self, params: &'b Params) -> Localizer<'b> {
-        Localizer {
-            references: self.references.clone(),
-            queries: self.queries.clone(),
-            params,
-            seed: self.seed,
-            tolerance: self.tolerance,
-            least_probability: self.least_probability,
-            runs_to_explain: 0,
-            foreign: self.foreign.clone(),
-            is_one_drive: self.is_one_drive,
-        }
+        Localizer { params, runs_to_explain: 0, ..self.clone() }
     }
 
     /// Whether queries and references are frames of one drive, so that a query must not be its own
@@ -165,12 +153,12 @@ impl<'a> Localizer<'a> {
         Self { foreign, ..self }
     }
 
-    /// The scene of the queries, its frames remembered.
+    /// The scene of the queries, with its frames cached.
     pub fn queries(&self) -> &dyn Scene {
         &self.queries
     }
 
-    /// The scene of the references, its frames remembered.
+    /// The scene of the references, with its frames cached.
     pub fn references(&self) -> &dyn Scene {
         &self.references
     }
@@ -235,8 +223,7 @@ impl<'a> Localizer<'a> {
         };
         observer.begin_query(index, &work.problems, work.truth.as_ref());
         self.report_rankings(requests, observer)?;
-        // Explained is what went wrong once every method has had its turn, so that all answers are
-        // there first and no method finds its work done by a remedy of another.
+        // Explain after all methods ran: answers come first, and no method profits from another's remedies.
         let mut unexplained = Vec::new();
         let answered = self.answer(
             &mut work,
@@ -385,8 +372,8 @@ impl<'a> Localizer<'a> {
                     };
                     (outcome, evidence)
                 } else {
-                    // An observer wants to see the hybrid at work. Everything is at hand, so the time that
-                    // it takes now says nothing.
+                    // An observer wants to see the hybrid at work. Its parts are cached, so this run is not
+                    // timed.
                     let again = self.estimate(work, problem, method, observer)?;
                     (again.estimated, again.evidence)
                 };
@@ -418,10 +405,7 @@ impl<'a> Localizer<'a> {
         let attention = observer.attention();
         let sinks: Vec<&mut dyn Sink> = vec![&mut timings, &mut evidence, observer];
         let mut fanout = Fanout::new(sinks);
-        let mut trace = match &attention {
-            Some(flag) => Trace::watched(&mut fanout, flag),
-            None => Trace::to(&mut fanout),
-        };
+        let mut trace = Trace::watched(&mut fanout, attention.as_deref());
         let current = &work.problems[problem];
         let outcome = match self.foreign.estimates(method) {
             Some(estimates) => {
@@ -458,8 +442,8 @@ impl<'a> Localizer<'a> {
     }
 }
 
-/// Whether two scenes have the same frames at the same places. Their names do not tell: a name is no path,
-/// and every KITTI folder has a sequence `00`.
+/// Whether two scenes have the same frames at the same places. Names are not enough: every KITTI folder has
+/// a sequence `00`.
 pub fn is_one_drive(a: &dyn Scene, b: &dyn Scene) -> bool {
     a.name() == b.name()
         && a.frames() == b.frames()

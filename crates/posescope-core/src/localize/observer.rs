@@ -17,16 +17,15 @@ pub trait LocalizeObserver: Sink {
         let _ = (index, problems, truth);
     }
 
-    /// References of a query are being chosen by their looks: so many of so many candidates were looked at, or
-    /// are now.
+    /// References are being chosen by appearance; `looked_at` counts the candidates up to the present one.
     fn choosing(&mut self, looked_at: usize, candidates: usize) {
         let _ = (looked_at, candidates);
     }
 
-    /// How the references were ranked is going to be told.
+    /// The ranking of the references comes next.
     fn begin_retrieval(&mut self) {}
 
-    /// A method begins on one of the problems; what it tells goes to [`Sink::accept`].
+    /// A method begins on one of the problems; its events go to [`Sink::accept`].
     fn begin_method(&mut self, problem: usize, method: Method) {
         let _ = (problem, method);
     }
@@ -36,7 +35,7 @@ pub trait LocalizeObserver: Sink {
         let _ = (result, times);
     }
 
-    /// What the method gave for several problems is going to be fused.
+    /// A method's poses for several problems are fused next.
     fn begin_fusion(&mut self, method: Method) {
         let _ = method;
     }
@@ -46,33 +45,29 @@ pub trait LocalizeObserver: Sink {
         let _ = result;
     }
 
-    /// A result went wrong, and what would have helped is being looked for: so many of so many
-    /// remedies were tried. It tells nothing else.
+    /// Remedies for a wrong result are being tried. They emit no events.
     fn explaining(&mut self, result: &QueryResult, tried: usize, remedies: usize) {
         let _ = (result, tried, remedies);
     }
 
-    /// A result that was told before, now with what would have helped.
+    /// The result once more, now with what would have helped.
     fn explained(&mut self, result: &QueryResult) {
         let _ = result;
     }
 
-    /// A flag that is raised when [`Sink::attend`] is to be called although nothing was told.
+    /// A flag that asks for a call of [`Sink::attend`] even without an event.
     fn attention(&self) -> Option<Arc<AtomicBool>> {
         None
     }
 }
 
-/// Between two steps that tell nothing: calls [`Sink::attend`] where the flag is up.
+/// Calls [`Sink::attend`] if the flag is up, between steps without events.
 pub(super) fn checkpoint(observer: &mut dyn LocalizeObserver) -> Result<(), Cancelled> {
     let attention = observer.attention();
-    match &attention {
-        Some(flag) => Trace::watched(observer, flag).checkpoint(),
-        None => Ok(()),
-    }
+    Trace::watched(observer, attention.as_deref()).checkpoint()
 }
 
-/// An observer that wants to hear nothing, for queries that nobody watches.
+/// An observer that ignores everything.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct NoObserver;
 

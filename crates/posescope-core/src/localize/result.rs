@@ -1,8 +1,5 @@
 //! One query, one method: the object of `run --json` and of a run folder.
 
-use std::fmt;
-use std::str::FromStr;
-
 use nalgebra::Matrix3x4;
 use serde::{Deserialize, Serialize};
 
@@ -14,10 +11,10 @@ use crate::fusion::Fusion;
 use crate::geometry::{Pose, PoseError, matrix_from_pose, pose_from_matrix};
 #[cfg(doc)]
 use crate::grid::GridParams;
-use crate::grid::{Basin, Offset};
+use crate::grid::{Basin, Offset, Phase};
 use crate::image::Degradation;
 use crate::method::Method;
-use crate::text::UnknownWord;
+use crate::text::words;
 
 /// The version of the result's form.
 pub const SCHEMA: &str = "posescope.result/1";
@@ -130,35 +127,7 @@ pub enum Status {
     Failed,
 }
 
-impl Status {
-    /// Both statuses.
-    pub const ALL: [Self; 2] = [Self::Ok, Self::Failed];
-
-    /// The status in one word.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Ok => "ok",
-            Self::Failed => "failed",
-        }
-    }
-}
-
-impl fmt::Display for Status {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(self.name())
-    }
-}
-
-impl FromStr for Status {
-    type Err = UnknownWord;
-
-    fn from_str(name: &str) -> Result<Self, UnknownWord> {
-        let found = Self::ALL.into_iter().find(|status| status.name() == name);
-        found.ok_or_else(|| UnknownWord::among(name, "status", Self::ALL.map(Self::name)))
-    }
-}
-
-crate::serde_as_text!(Status);
+words!(Status, "status": Ok = "ok", Failed = "failed");
 
 /// A reason with its code.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -242,8 +211,8 @@ pub struct CostReport {
     /// truth is known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub basin_m: Option<f64>,
-    /// What the cheapest coarse minimum elsewhere costs more than the one at the truth
-    /// ([`Basin::margin`]); negative where the cost prefers another place.
+    /// Cost of the lowest coarse minimum elsewhere less that at the truth ([`Basin::margin`]); negative
+    /// where the cost prefers another place.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub basin_margin: Option<f64>,
 }
@@ -266,7 +235,7 @@ impl CostReport {
     }
 }
 
-/// What a cost says of a pose that nobody searched by it.
+/// A cost at a pose that was not searched by it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CostAtPose {
     /// The method that searches this cost.
@@ -321,7 +290,7 @@ pub(super) fn evaluate_as(
     });
     let basin = truth.and_then(|truth| {
         let place = Offset::of(&problem.reference_from_query(truth));
-        subject.evidence.coarse()?.basin(&place)
+        subject.evidence.surface(Phase::PositionCoarse)?.basin(&place)
     });
     let on_rim = subject.evidence.minimum.is_some_and(|minimum| {
         let grid = &subject.params.grid;

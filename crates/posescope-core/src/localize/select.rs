@@ -33,21 +33,28 @@ pub enum Selection {
     Retrieved(usize),
 }
 
-impl Selection {
-    const NAMES: [&'static str; 4] = ["random", "nearest", "matches", "retrieve"];
+/// The ways of choosing by their names, in the order of the variants.
+const WAYS: [(&str, fn(usize) -> Selection); 4] = [
+    ("random", Selection::Random),
+    ("nearest", Selection::Nearest),
+    ("matches", Selection::Matched),
+    ("retrieve", Selection::Retrieved),
+];
 
-    fn parts(self) -> (&'static str, usize) {
+impl Selection {
+    /// The place among [`WAYS`], and how many are chosen.
+    fn parts(self) -> (usize, usize) {
         match self {
-            Self::Random(count) => (Self::NAMES[0], count),
-            Self::Nearest(count) => (Self::NAMES[1], count),
-            Self::Matched(count) => (Self::NAMES[2], count),
-            Self::Retrieved(count) => (Self::NAMES[3], count),
+            Self::Random(count) => (0, count),
+            Self::Nearest(count) => (1, count),
+            Self::Matched(count) => (2, count),
+            Self::Retrieved(count) => (3, count),
         }
     }
 
     /// Whether this is the name of a way of choosing: the part before the colon.
     pub fn is_name(text: &str) -> bool {
-        Self::NAMES.contains(&text)
+        WAYS.iter().any(|(name, _)| *name == text)
     }
 
     /// How many references are chosen: the K of its name.
@@ -57,19 +64,14 @@ impl Selection {
 
     /// The same way of choosing, with another K.
     pub fn with_count(self, count: usize) -> Self {
-        match self {
-            Self::Random(_) => Self::Random(count),
-            Self::Nearest(_) => Self::Nearest(count),
-            Self::Matched(_) => Self::Matched(count),
-            Self::Retrieved(_) => Self::Retrieved(count),
-        }
+        WAYS[self.parts().0].1(count)
     }
 }
 
 impl fmt::Display for Selection {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (name, count) = self.parts();
-        write!(f, "{name}:{count}")
+        let (way, count) = self.parts();
+        write!(f, "{}:{count}", WAYS[way].0)
     }
 }
 
@@ -77,23 +79,16 @@ impl FromStr for Selection {
     type Err = UnknownWord;
 
     fn from_str(text: &str) -> Result<Self, UnknownWord> {
-        let expected = || UnknownWord {
+        let read = || {
+            let (how, count) = text.split_once(':')?;
+            let (_, make) = WAYS.iter().find(|(name, _)| *name == how)?;
+            count.parse().ok().filter(|count| *count > 0).map(make)
+        };
+        read().ok_or_else(|| UnknownWord {
             found: text.to_owned(),
             kind: "choice of references",
             expected: "random:K, nearest:K, matches:K or retrieve:K with K from 1".to_owned(),
-        };
-        let (how, count) = text.split_once(':').ok_or_else(expected)?;
-        let count: usize = count.parse().map_err(|_| expected())?;
-        if count == 0 {
-            return Err(expected());
-        }
-        match how {
-            "random" => Ok(Self::Random(count)),
-            "nearest" => Ok(Self::Nearest(count)),
-            "matches" => Ok(Self::Matched(count)),
-            "retrieve" => Ok(Self::Retrieved(count)),
-            _ => Err(expected()),
-        }
+        })
     }
 }
 
@@ -136,7 +131,7 @@ impl From<Vec<usize>> for References {
     }
 }
 
-/// Tells whoever watches how the references of a query were ranked.
+/// Emits how the references of a query were ranked.
 ///
 /// # Errors
 /// Only [`Cancelled`]. A photo that cannot be read is not shown: watching never changes the answer.
@@ -192,7 +187,7 @@ pub fn draw(mut candidates: Vec<usize>, count: usize, query: &str, seed: u64) ->
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ChoiceError {
-    /// References are sought around the query, whose position nobody knows.
+    /// References are sought around the query, whose position is unknown.
     #[error(
         "the position of query {query} is not known; name a frame with --reference, say where it is \
          with --gps, or choose by looks with --reference matches:K or retrieve:K"
@@ -219,7 +214,7 @@ const AT_ONCE: usize = 8;
 
 /// Ranks by exhaustive matching of features.
 pub struct ByMatches<'a> {
-    /// The references' scene. Features are kept with its frames where these are remembered.
+    /// The references' scene.
     pub scene: &'a dyn Scene,
     /// Parameters of features and matching.
     pub params: &'a Params,

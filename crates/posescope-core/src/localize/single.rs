@@ -61,11 +61,11 @@ pub(super) fn estimate_traced(
     }
 }
 
-/// Localises as [`localize_traced`] does, by an estimator that somebody made. A panic in it is an
-/// outcome, [`Failure::Internal`].
+/// Localises by an estimator of one's own, as [`localize_traced`] does. A panic in it is an outcome,
+/// [`Failure::Internal`].
 ///
 /// # Errors
-/// [`Cancelled`] when whoever listens asks the run to stop.
+/// [`Cancelled`] when a sink asks the run to stop.
 pub fn localize_by(
     estimator: &dyn Estimator,
     problem: &Problem,
@@ -78,12 +78,12 @@ pub fn localize_by(
     })
 }
 
-/// Localises one query against several references at once and says what each of them has to do with the
-/// pose, in their order. A method that takes one at a time, or is in no registry, fails with
-/// [`Failure::NotJoint`]; a panic is a [`Failure::Internal`].
+/// Localises one query against several references at once. Returns the share of each in the pose too. A
+/// method that takes one at a time, or is in no registry, fails with [`Failure::NotJoint`]; a panic is a
+/// [`Failure::Internal`].
 ///
 /// # Errors
-/// [`Cancelled`] when whoever listens asks the run to stop.
+/// [`Cancelled`] when a sink asks the run to stop.
 pub fn localize_jointly(
     references: &[JointReference<'_>],
     method: Method,

@@ -67,7 +67,7 @@ impl Serialize for StageTimes {
     }
 }
 
-/// A sink that measures stages and wants no other event.
+/// A sink that measures stages.
 #[derive(Debug, Default)]
 pub struct StageTimings {
     open: Vec<(Stage, Instant)>,

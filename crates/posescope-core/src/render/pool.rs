@@ -46,12 +46,6 @@ impl<W> Default for Pool<W> {
     }
 }
 
-impl<W> Clone for Pool<W> {
-    fn clone(&self) -> Self {
-        Self::default()
-    }
-}
-
 impl<W: Send> Pool<W> {
     /// The scores of many cameras, in their order, on all threads.
     pub fn score(

@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 use std::fs::{self, File};
-use std::io::{self, BufReader, BufWriter, Read, Seek as _, Write};
+use std::io::{self, BufWriter, Read as _, Seek as _, Write as _};
 use std::path::Path;
 
 use rand::SeedableRng as _;
@@ -33,18 +33,10 @@ pub struct BuildRequest {
     pub fingerprint: u64,
     /// The positions of the frames in the scene.
     pub frames: Vec<usize>,
-    /// Number of visual words.
-    pub words: usize,
-    /// The seed of every random choice.
-    pub seed: u64,
-    /// See [`super::RetrievalParams`].
+    /// How the vocabulary is learnt; the seed is that of every random choice.
+    pub clustering: Clustering,
+    /// Descriptors per word at most from which it is learnt.
     pub sample: usize,
-    /// See [`super::RetrievalParams`].
-    pub iterations: usize,
-    /// See [`super::RetrievalParams`].
-    pub trees: usize,
-    /// See [`super::RetrievalParams`].
-    pub checks: usize,
     /// All that decides what the index holds, by name; kept with it and compared when it is used.
     pub recipe: BTreeMap<String, String>,
 }
@@ -117,7 +109,7 @@ pub fn build<E: std::error::Error + Send + 'static>(
         None => Path::new("."),
     };
     fs::create_dir_all(folder).map_err(io)?;
-    let mut waiting = FeatureSpool::new(folder).map_err(io)?;
+    let mut waiting = Spool::new(folder).map_err(io)?;
     let total = request.frames.len();
     for batch in request.frames.chunks(BATCH) {
         let features: Result<Vec<_>, _> =
@@ -128,10 +120,12 @@ pub fn build<E: std::error::Error + Send + 'static>(
         let done = waiting.counts.len();
         progress(BuildProgress { step: BuildStep::Features, done, total });
     }
-    let mut waiting = waiting.complete().map_err(io)?;
     let found: usize = waiting.counts.iter().sum();
-    if found < request.words.max(1) {
-        return Err(BuildError::TooFewDescriptors { found: found as u64, words: request.words });
+    if found < request.clustering.words.max(1) {
+        return Err(BuildError::TooFewDescriptors {
+            found: found as u64,
+            words: request.clustering.words,
+        });
     }
     let vocabulary = learn(&mut waiting, request, &mut progress).map_err(io)?;
     write_whole_with(path, |file| write(file, waiting, request, &vocabulary, &mut progress))
@@ -151,18 +145,18 @@ pub(super) fn seed_for(seed: u64, purpose: &str) -> u64 {
 
 /// Words from a sample of the descriptors, drawn without regard to frames.
 fn learn(
-    waiting: &mut SpooledFeatures,
+    waiting: &mut Spool,
     request: &BuildRequest,
     progress: &mut impl FnMut(BuildProgress),
 ) -> io::Result<Vocabulary> {
     let total: usize = waiting.counts.iter().sum();
-    let wanted = request.words.saturating_mul(request.sample.max(1));
-    let mut rng = Pcg64::seed_from_u64(seed_for(request.seed, "sample"));
+    let wanted = request.clustering.words.saturating_mul(request.sample.max(1));
+    let mut rng = Pcg64::seed_from_u64(seed_for(request.clustering.seed, "sample"));
     let mut chosen = index::sample(&mut rng, total, wanted.min(total)).into_vec();
     chosen.sort_unstable();
     let mut sample = Vec::with_capacity(chosen.len());
     let mut before = 0;
-    waiting.rewind()?;
+    waiting.file.rewind()?;
     for frame in 0..waiting.counts.len() {
         let (_, descriptors) = waiting.next(frame)?;
         let end = before + descriptors.len();
@@ -173,21 +167,17 @@ fn learn(
         }
         before = end;
     }
-    let clustering = Clustering {
-        words: request.words,
-        iterations: request.iterations,
-        trees: request.trees,
-        checks: request.checks,
-        seed: seed_for(request.seed, "vocabulary"),
-    };
+    let seed = seed_for(request.clustering.seed, "vocabulary");
+    let clustering = Clustering { seed, ..request.clustering };
+    let total = clustering.iterations;
     Ok(Vocabulary::learn(&sample, &clustering, |done| {
-        progress(BuildProgress { step: BuildStep::Vocabulary, done, total: request.iterations });
+        progress(BuildProgress { step: BuildStep::Vocabulary, done, total });
     }))
 }
 
 fn write(
     file: &mut File,
-    mut waiting: SpooledFeatures,
+    mut waiting: Spool,
     request: &BuildRequest,
     vocabulary: &Vocabulary,
     progress: &mut impl FnMut(BuildProgress),
@@ -200,7 +190,7 @@ fn write(
     };
     let mut occurrences = InvertedIndexBuilder::new(counts.words);
     let mut starts = vec![0];
-    waiting.rewind()?;
+    waiting.file.rewind()?;
     for done in 0..counts.documents {
         let (places, descriptors) = waiting.next(done)?;
         let words = vocabulary.quantize(&descriptors);
@@ -242,8 +232,8 @@ fn write(
         scene: request.scene.clone(),
         fingerprint: fingerprint_text(request.fingerprint),
         recipe: request.recipe.clone(),
-        trees: request.trees,
-        seed: seed_for(request.seed, "vocabulary"),
+        trees: request.clustering.trees,
+        seed: seed_for(request.clustering.seed, "vocabulary"),
         counts,
     })
 }
@@ -263,43 +253,26 @@ fn number(count: usize) -> io::Result<u32> {
     })
 }
 
-/// Features that wait on disk, in a file without a name.
-struct FeatureSpool {
-    file: BufWriter<File>,
+/// Features that wait on disk, in a file without a name, to be read in their order.
+struct Spool {
+    file: File,
     /// Features of each frame.
     counts: Vec<usize>,
 }
 
-impl FeatureSpool {
+impl Spool {
     fn new(folder: &Path) -> io::Result<Self> {
-        Ok(Self { file: BufWriter::new(tempfile::tempfile_in(folder)?), counts: Vec::new() })
+        Ok(Self { file: tempfile::tempfile_in(folder)?, counts: Vec::new() })
     }
 
     fn push(&mut self, features: &Features) -> io::Result<()> {
+        let mut bytes = Vec::new();
         for (keypoint, descriptor) in features.keypoints.iter().zip(&features.descriptors) {
             let place = [keypoint.x, keypoint.y, keypoint.scale, keypoint.angle];
-            for number in place.iter().chain(descriptor) {
-                self.file.write_all(&number.to_le_bytes())?;
-            }
+            bytes.extend(place.iter().chain(descriptor).flat_map(|number| number.to_le_bytes()));
         }
         self.counts.push(features.keypoints.len().min(features.descriptors.len()));
-        Ok(())
-    }
-
-    fn complete(self) -> io::Result<SpooledFeatures> {
-        Ok(SpooledFeatures { file: BufReader::new(self.file.into_inner()?), counts: self.counts })
-    }
-}
-
-/// The features of all frames, to be read in their order.
-struct SpooledFeatures {
-    file: BufReader<File>,
-    counts: Vec<usize>,
-}
-
-impl SpooledFeatures {
-    fn rewind(&mut self) -> io::Result<()> {
-        self.file.rewind()
+        self.file.write_all(&bytes)
     }
 
     /// Places and descriptors of a frame, which must be the next.

@@ -4,7 +4,7 @@
 //! Philbin et al. 2007, section 3.1 (the search of AKM); the trees are those of Silpa-Anan, Hartley,
 //! *Optimised KD-trees for fast image descriptor matching*, CVPR 2008.
 
-use std::cmp::{Ordering, Reverse};
+use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 use std::ops::Range;
 
@@ -17,7 +17,7 @@ use crate::features::Descriptor;
 
 /// A split's dimension is drawn among this many of the greatest variance, so that the trees differ.
 const CANDIDATE_DIMENSIONS: usize = 5;
-/// Variances and mean are those of so many points of a node: more do not change the split's worth.
+/// Points of a node that variances and mean are taken of; more do not improve the split.
 const VARIANCE_SAMPLE: usize = 100;
 
 /// Points of a leaf at most. Comparing a few more points takes less time than walking to them one by
@@ -55,7 +55,7 @@ pub struct Nearest {
     pub squared_distance: f32,
 }
 
-/// What a search needs to remember; kept between searches to spare allocations.
+/// Memory of a search, kept between searches to spare allocations.
 #[derive(Default)]
 pub struct Scratch {
     branches: BinaryHeap<Reverse<Branch>>,
@@ -64,35 +64,11 @@ pub struct Scratch {
     search: u32,
 }
 
-/// A side of a split that was not taken.
-struct Branch {
-    /// Sum of the squared distances to the splits on the way: small where the query is close by.
-    bound: f32,
-    tree: u32,
-    node: u32,
-}
-
-impl Ord for Branch {
-    fn cmp(&self, other: &Self) -> Ordering {
-        (self.bound.total_cmp(&other.bound))
-            .then(self.tree.cmp(&other.tree))
-            .then(self.node.cmp(&other.node))
-    }
-}
-
-impl PartialOrd for Branch {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-impl PartialEq for Branch {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other).is_eq()
-    }
-}
-
-impl Eq for Branch {}
+/// A side of a split that was not taken: the bits of its bound, its tree and its node.
+///
+/// The bound is the sum of the squared distances to the splits on the way, small where the query is close by. The
+/// bits of positive numbers are in their order.
+type Branch = (u32, u32, u32);
 
 impl Forest {
     /// `trees` trees over these points; the seed decides how they differ.
@@ -120,10 +96,9 @@ impl Forest {
             search.descend(tree, number as u32, 0, 0.0);
         }
         while search.checks_left > 0
-            && let Some(Reverse(branch)) = search.scratch.branches.pop()
+            && let Some(Reverse((bound, tree, node))) = search.scratch.branches.pop()
         {
-            let tree = &self.trees[branch.tree as usize];
-            search.descend(tree, branch.tree, branch.node, branch.bound);
+            search.descend(&self.trees[tree as usize], tree, node, f32::from_bits(bound));
         }
         search.best
     }
@@ -149,7 +124,7 @@ struct Search<'a> {
 }
 
 impl Search<'_> {
-    /// Walks to the leaf on the query's side, remembers the other sides, compares the leaf's points.
+    /// Walks to the leaf on the query's side, queues the other sides, compares the leaf's points.
     fn descend(&mut self, tree: &Tree, number: u32, mut node: u32, bound: f32) {
         loop {
             match &tree.nodes[node as usize] {
@@ -157,11 +132,8 @@ impl Search<'_> {
                     let beyond = self.query[usize::from(*dimension)] - threshold;
                     let (taken, other) =
                         if beyond < 0.0 { (*below, *above) } else { (*above, *below) };
-                    self.scratch.branches.push(Reverse(Branch {
-                        bound: bound + beyond * beyond,
-                        tree: number,
-                        node: other,
-                    }));
+                    let bound = bound + beyond * beyond;
+                    self.scratch.branches.push(Reverse((bound.to_bits(), number, other)));
                     node = taken;
                 }
                 Node::Leaf(range) => {

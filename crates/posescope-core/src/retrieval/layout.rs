@@ -147,7 +147,7 @@ impl<W: Write> IndexWriter<W> {
     }
 }
 
-/// An index in its file, of which what is asked for comes into memory.
+/// An index in its file, mapped: only the parts in use come into memory.
 pub struct MappedIndex {
     map: Mmap,
     description: Description,

@@ -6,24 +6,26 @@ use crate::features::SurfParams;
 
 parameters! {
     /// Parameters of building and querying an index.
+    ///
+    /// Eight trees as in the paper.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct RetrievalParams {
         /// Most features per photo; the strongest are used.
-        pub features: usize = count("features", "", 1..=100_000),
+        pub features: usize = 1000 => count("features", "", 1..=100_000),
         /// Most descriptors per word to learn the vocabulary from.
-        pub sample: usize = count("sample", "", 1..=10_000),
+        pub sample: usize = 50 => count("sample", "", 1..=10_000),
         /// Most rounds of approximate k-means.
-        pub iterations: usize = count("iterations", "", 1..=1000),
+        pub iterations: usize = 10 => count("iterations", "", 1..=1000),
         /// Randomised k-d trees over the words.
-        pub trees: usize = count("trees", "", 1..=64),
+        pub trees: usize = 8 => count("trees", "", 1..=64),
         /// Words that a descriptor is compared with.
-        pub checks: usize = count("checks", "", 1..=1_000_000),
+        pub checks: usize = 128 => count("checks", "", 1..=1_000_000),
         /// Number of best-scored frames to verify geometrically; 0 turns verification off.
-        pub verify: usize = count("verify", "", 0..=100_000),
+        pub verify: usize = 50 => count("verify", "", 0..=100_000),
         /// Fewest inliers of a verified frame.
-        pub min_inliers: usize = count("min_inliers", "", 2..=1000),
+        pub min_inliers: usize = 6 => count("min_inliers", "", 2..=1000),
         /// Greatest distance of an inlier of the affine transform.
-        pub inlier_px: f64 = number("inlier_px", "px", 0.5..=100.0),
+        pub inlier_px: f64 = 15.0 => number("inlier_px", "px", 0.5..=100.0),
     }
 }
 
@@ -32,29 +34,7 @@ parameters! {
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct IndexParams {
         /// Number of visual words.
-        pub words: usize = count("words", "", 1..=10_000_000),
-    }
-}
-
-impl Default for IndexParams {
-    fn default() -> Self {
-        Self { words: 10_000 }
-    }
-}
-
-impl Default for RetrievalParams {
-    /// Eight trees as in the paper.
-    fn default() -> Self {
-        Self {
-            features: 1000,
-            sample: 50,
-            iterations: 10,
-            trees: 8,
-            checks: 128,
-            verify: 50,
-            inlier_px: 15.0,
-            min_inliers: 6,
-        }
+        pub words: usize = 10_000 => count("words", "", 1..=10_000_000),
     }
 }
 

@@ -1,11 +1,11 @@
-//! What is told of a ranking: the frames that became references, and those that nearly did.
+//! A ranking as it is reported: the frames that became references, and those that nearly did.
 
 use super::index::Ranked;
 use crate::geometry::Pose;
 
-/// Frames after those chosen that are told about.
+/// Frames reported after those chosen.
 const RUNNERS_UP: usize = 5;
-/// Frames at most that are told about, where more are not chosen.
+/// Frames reported at most, unless more are chosen.
 const TOLD: usize = 10;
 
 /// What the scores of a ranking are.
@@ -22,7 +22,7 @@ pub enum Criterion {
 pub struct RankedReference {
     /// Its name in its scene.
     pub name: String,
-    /// Where its camera stood, if that is known: whoever knows the truth can tell how far off it is.
+    /// Its pose, if known.
     pub world_from_camera: Option<Pose>,
     /// Its score, and what verification made of it.
     pub ranked: Ranked,
@@ -35,14 +35,14 @@ pub struct ReferenceRanking {
     pub criterion: Criterion,
     /// Frames that could have been chosen.
     pub candidates: usize,
-    /// So many of the first frames were chosen.
+    /// The first of the frames, which were chosen.
     pub chosen: usize,
     /// The best first, some more than were chosen.
     pub frames: Vec<RankedReference>,
 }
 
 impl ReferenceRanking {
-    /// So many frames are to be ranked where `count` are asked for: [`Self::frames`] holds no more.
+    /// Frames to rank where `count` are asked for.
     pub fn depth(count: usize) -> usize {
         count.max(TOLD.min(count + RUNNERS_UP))
     }

@@ -43,12 +43,8 @@ fn request() -> BuildRequest {
         fingerprint: 42,
         // Every other place, so that positions in the index differ from those in the scene.
         frames: (0..FRAMES).step_by(2).collect(),
-        words: 200,
-        seed: 5,
+        clustering: Clustering { words: 200, iterations: 6, trees: 4, checks: 64, seed: 5 },
         sample: 100,
-        iterations: 6,
-        trees: 4,
-        checks: 64,
         recipe: [("words", "200"), ("features", "1000")]
             .map(|(key, value)| (key.to_owned(), value.to_owned()))
             .into(),
@@ -134,7 +130,8 @@ fn the_bytes_do_not_depend_on_the_number_of_threads_and_do_on_the_seed() {
     let on = |threads, seed| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
         pool.expect("a thread pool").install(|| {
-            let request = BuildRequest { seed, ..request() };
+            let mut request = request();
+            request.clustering.seed = seed;
             let (_folder, path) = built(&request);
             fs::read(path).expect("just written")
         })
@@ -203,7 +200,8 @@ fn an_index_of_something_else_is_stale_and_says_why() {
 fn a_vocabulary_too_large_is_refused_and_leaves_no_file() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("a.posescope-index");
-    let request = BuildRequest { words: 5000, ..request() };
+    let mut request = request();
+    request.clustering.words = 5000;
     let outcome = build(&path, &request, |f| Ok::<_, Infallible>(view(f, 0)), |_| ());
     let message = outcome.expect_err("900 descriptors").to_string();
     assert!(message.contains("900 descriptors"), "{message}");
@@ -273,7 +271,8 @@ fn another_layout_is_named() {
 }
 
 fn small_file() -> Vec<u8> {
-    let request = BuildRequest { frames: (0..3).collect(), words: 8, ..request() };
+    let mut request = BuildRequest { frames: (0..3).collect(), ..request() };
+    request.clustering.words = 8;
     let (_folder, path) = built(&request);
     fs::read(path).expect("just written")
 }

@@ -5,16 +5,16 @@
 //! `n_wd / n_d · ln(N / N_w)`. A word that every image has weighs nothing. Images are compared by the
 //! cosine of their weights, in which `n_d` cancels out.
 
-/// The inverted index while it grows: who has a word, and how often.
+/// The inverted index while it grows: which documents have a word, and how often.
 pub struct InvertedIndexBuilder {
     /// By word: document and count, in the order of the documents.
     lists: Vec<Vec<(u32, u32)>>,
     documents: u32,
 }
 
-/// The inverted index: who has a word, and how much it weighs there.
+/// The inverted index: which documents have a word, and how much it weighs there.
 pub struct InvertedIndex {
-    /// By word, `ln(N / N_w)`; 0 for a word that nobody has.
+    /// By word, `ln(N / N_w)`; 0 for a word in no document.
     pub idf: Vec<f32>,
     /// By word: document and its weight, over the norm of all weights of the document.
     pub lists: Vec<Vec<(u32, f32)>>,

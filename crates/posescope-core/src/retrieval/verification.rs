@@ -97,7 +97,7 @@ struct AffineFit<'a> {
 }
 
 impl AffineFit<'_> {
-    /// Squared distance of a pair; infinite where it cannot be told.
+    /// Squared distance of a pair \[px²\].
     fn residual(&self, affine: &Affine, pair: usize) -> f64 {
         let (query, reference) = &self.points[pair];
         (affine.apply(query) - reference).norm_squared()

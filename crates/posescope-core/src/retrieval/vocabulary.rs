@@ -10,7 +10,7 @@ use crate::features::Descriptor;
 
 /// Descriptors that one task of a thread looks up, so that its scratch memory pays.
 const CHUNK: usize = 256;
-/// The centres have settled when fewer than one in so many descriptors change their word.
+/// The centres have settled when fewer than one in this many descriptors change their word.
 const SETTLED: usize = 1000;
 
 /// How the centres are found.
@@ -73,7 +73,7 @@ impl Vocabulary {
                 break;
             }
         }
-        // Whoever reads the words from a file makes this forest from them again.
+        // An index that is opened makes the same forest of these words.
         Self::new(vocabulary.words, trees, checks, seed)
     }
 
@@ -84,17 +84,20 @@ impl Vocabulary {
 
     /// The word of each descriptor; `None` for one that has no distance from any.
     pub fn quantize(&self, descriptors: &[Descriptor]) -> Vec<Option<u32>> {
-        descriptors
-            .par_chunks(CHUNK)
-            .map_init(Scratch::default, |scratch, chunk| {
-                let word = |descriptor| {
-                    let found = self.nearest(descriptor, scratch)?;
-                    Some(found.0)
-                };
-                chunk.iter().map(word).collect::<Vec<_>>()
-            })
-            .flatten_iter()
-            .collect()
+        self.each_nearest(descriptors, |_, _, found| found.map(|(word, _)| word))
+    }
+
+    /// What `make` makes of the place of each descriptor, itself, and its word with the squared distance.
+    fn each_nearest<T: Send>(
+        &self,
+        descriptors: &[Descriptor],
+        make: impl Fn(usize, &Descriptor, Option<(u32, f32)>) -> T + Sync,
+    ) -> Vec<T> {
+        let descriptors = descriptors.par_iter().enumerate().with_min_len(CHUNK);
+        let made = descriptors.map_init(Scratch::default, |scratch, (place, descriptor)| {
+            make(place, descriptor, self.nearest(descriptor, scratch))
+        });
+        made.collect()
     }
 
     /// The word of one descriptor, and the squared distance from it.
@@ -105,22 +108,13 @@ impl Vocabulary {
 
     /// Word and squared distance of each descriptor of the sample.
     fn assign(&self, sample: &[Descriptor], before: Option<&[(u32, f32)]>) -> Vec<(u32, f32)> {
-        sample
-            .par_chunks(CHUNK)
-            .enumerate()
-            .map_init(Scratch::default, |scratch, (chunk, descriptors)| {
-                let assign = |(i, descriptor): (usize, &Descriptor)| {
-                    let found = self.nearest(descriptor, scratch);
-                    let found = found.unwrap_or((0, f32::INFINITY));
-                    let Some(before) = before else { return found };
-                    let (word, _) = before[chunk * CHUNK + i];
-                    let kept = squared_distance(descriptor, &self.words[word as usize]);
-                    if found.1 < kept { found } else { (word, kept) }
-                };
-                descriptors.iter().enumerate().map(assign).collect::<Vec<_>>()
-            })
-            .flatten_iter()
-            .collect()
+        self.each_nearest(sample, |place, descriptor, found| {
+            let found = found.unwrap_or((0, f32::INFINITY));
+            let Some(before) = before else { return found };
+            let (word, _) = before[place];
+            let kept = squared_distance(descriptor, &self.words[word as usize]);
+            if found.1 < kept { found } else { (word, kept) }
+        })
     }
 
     /// The means of the descriptors of each word. Summed in the order of the sample, because sums of

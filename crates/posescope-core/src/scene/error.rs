@@ -122,7 +122,7 @@ impl SceneError {
         Self::Content { path: path.into(), expected: expected.into() }
     }
 
-    /// The error of a line, counted from 1, that says something else than `expected`.
+    /// The error of a line, counted from 1, that is not as `expected`.
     pub fn line(path: impl Into<PathBuf>, line: usize, expected: impl Into<String>) -> Self {
         Self::Line { path: path.into(), line, expected: expected.into() }
     }

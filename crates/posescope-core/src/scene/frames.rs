@@ -1,4 +1,4 @@
-//! The frames that were used last, with what was worked out about them.
+//! The frames used last, with what was computed of them.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
@@ -7,19 +7,19 @@ use super::{Scene, SceneError, pose_of, reference_of};
 use crate::problem::{Query, ReferenceTuple};
 use crate::recent::{Limit, Recent};
 
-/// Frames that are kept unless others hold them anyway: a query, its references, and the candidates
-/// that were looked at to choose them.
+/// Frames that are kept, but for those held elsewhere: a query, its references, and the candidates that
+/// were looked at to choose them.
 const FRAMES: usize = 64;
-/// Memory that frames may take unless others hold them anyway \[bytes\]: that of 38 candidates
-/// within 15 m of a query on the street, each with its features. A frame with its cloud and all
-/// that the four estimators remember takes three times as much.
+/// Memory of the frames, but for those held elsewhere \[bytes\]: that of 38 candidates within 15 m of a
+/// query on the street, each with its features. A frame with its cloud and all that the four estimators
+/// keep takes three times as much.
 const BYTES: usize = 96 << 20;
 
-/// Frames with all that was worked out about them, within a limit. The frame that was not asked for
-/// the longest makes room; one that somebody holds stays, as letting it go would free nothing.
+/// Frames with all that was computed of them, within a limit. The least recently used frame makes room; one
+/// held elsewhere stays, as dropping it would free nothing.
 ///
-/// No lock is held while a frame is read. Two threads that ask for the same one may both read it, and
-/// get the same.
+/// No lock is held while a frame is read. Two threads that ask for the same one may both read it, and get
+/// the same.
 pub struct FrameStore {
     frames: Recent<FrameKey, Arc<Frame>>,
     /// Held, so that none is taken for another at the same address.
@@ -36,7 +36,7 @@ struct FrameKey {
     frame: usize,
 }
 
-/// Query and reference tuple are made of the same photo and remember together.
+/// Query and reference tuple have the same photo and memo.
 struct Frame {
     query: Arc<Query>,
     reference: OnceLock<Arc<ReferenceTuple>>,
@@ -71,7 +71,7 @@ impl Default for FrameStore {
 }
 
 impl FrameStore {
-    /// A store of at most so many frames, which together take at most so many bytes.
+    /// A store of at most `count` frames and `bytes` in all.
     pub fn new(count: usize, bytes: usize) -> Self {
         Self {
             frames: Recent::within(
@@ -90,15 +90,15 @@ impl FrameStore {
         scenes.unwrap_or_else(PoisonError::into_inner).len()
     }
 
-    /// Memory that all frames take with what was worked out about them \[bytes\], roughly.
+    /// Memory of all frames with what was computed of them \[bytes\], roughly.
     pub fn bytes(&self) -> usize {
         self.frames.bytes()
     }
 
-    /// The scene with its frames remembered here, those from before too.
+    /// The scene with its frames cached here, those from before too.
     pub fn of<'a>(self: &Arc<Self>, scene: &'a Arc<dyn Scene>) -> CachedScene<'a> {
         let mut scenes = self.scenes.lock().unwrap_or_else(PoisonError::into_inner);
-        // A scene that nobody else holds does not come back: each degradation tried is a scene of its own.
+        // A scene held nowhere else does not come back: each degradation tried is a scene of its own.
         scenes.retain(|(known, _)| Arc::strong_count(known) > 1);
         let known = scenes.iter().find(|(known, _)| Arc::ptr_eq(known, scene));
         let id = known.map(|(_, id)| *id).unwrap_or_else(|| {
@@ -110,7 +110,7 @@ impl FrameStore {
     }
 }
 
-/// A scene whose frames are remembered in a [`FrameStore`], with all that is worked out about them.
+/// A scene whose frames are kept in a [`FrameStore`], with all that is computed of them.
 #[derive(Clone)]
 pub struct CachedScene<'a> {
     scene: &'a dyn Scene,
@@ -131,7 +131,7 @@ impl<'a> CachedScene<'a> {
         (references, queries)
     }
 
-    /// Where its frames are remembered.
+    /// Where its frames are kept.
     pub fn store(&self) -> &Arc<FrameStore> {
         &self.store
     }
@@ -140,7 +140,7 @@ impl<'a> CachedScene<'a> {
         let key = FrameKey { scene: self.id, frame };
         let frames = &self.store.frames;
         if let Some(known) = frames.get(&key) {
-            // It has grown since, by what was worked out about it.
+            // It has grown since, by what was computed of it.
             frames.trim();
             return Ok(known);
         }

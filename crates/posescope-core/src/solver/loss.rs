@@ -1,4 +1,4 @@
-//! Robust losses: how much a large residual may say.
+//! Robust losses: the influence of large residuals.
 
 use serde::{Deserialize, Serialize};
 

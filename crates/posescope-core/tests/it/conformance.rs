@@ -153,7 +153,9 @@ fn moments(
 ) -> Vec<Moment> {
     let flag = AtomicBool::new(false);
     let mut sink = AttentionSeeker::new(&flag, wanted, None);
-    estimator.estimate(problem, &mut Trace::watched(&mut sink, &flag)).expect("nobody cancels");
+    estimator
+        .estimate(problem, &mut Trace::watched(&mut sink, Some(&flag)))
+        .expect("nobody cancels");
     sink.moments
 }
 
@@ -244,7 +246,7 @@ fn a_run_that_is_stopped_wherever_it_looks_up_ends_there() {
             for stop in stops {
                 let flag = AtomicBool::new(false);
                 let mut sink = AttentionSeeker::new(&flag, wanted, Some(stop));
-                let mut trace = Trace::watched(&mut sink, &flag);
+                let mut trace = Trace::watched(&mut sink, Some(&flag));
                 let outcome = estimator.estimate(&problem, &mut trace);
                 assert_eq!(outcome.err(), Some(Cancelled), "{name} at {stop} of {looks}");
                 // Nothing follows but the ends of the stages that were open.

@@ -7,12 +7,13 @@
 
 use std::convert::Infallible;
 
-use super::{centre_and_deviation, tamed};
+use super::tamed;
 use crate::geometry::{Pose, yaw};
 use crate::judge::{Judge, moved};
 use crate::params::Params;
 use crate::problem::Problem;
 use crate::render::Score;
+use crate::stats::median_and_deviation;
 
 /// How closely one looks. A method's coefficients belong to its look.
 #[derive(Clone, Copy, Debug)]
@@ -44,7 +45,7 @@ const RINGS_M: [f64; 2] = [0.5, 1.0];
 const DEG_PER_M: f64 = 2.0;
 
 /// A pose that covers less of what the reference pose covers has no say.
-const LEAST_COVERED: f64 = 0.25;
+const MIN_COVERED: f64 = 0.25;
 
 /// The cost at a pose among the costs of others; all but the last in robust standard deviations of the
 /// costs around the reference.
@@ -63,9 +64,8 @@ pub(super) struct Appearance {
 }
 
 impl Appearance {
-    /// What is seen at a pose of the query's camera in the reference camera's frame, remembered with the
-    /// query: a method and the hybrid that keeps its pose ask the same. Where nothing can be compared,
-    /// nothing speaks for the pose.
+    /// The appearance at a pose of the query camera in the reference camera's frame, kept with the query: a
+    /// method and the hybrid that keeps its pose ask the same. All 0 where nothing can be compared.
     pub(super) fn of(
         problem: &Problem,
         params: &Params,
@@ -94,11 +94,11 @@ impl Appearance {
         let [pose, start, beside @ ..] = of_poses else {
             return None;
         };
-        let least_covered = (LEAST_COVERED * f64::from(start.covered)) as u32;
+        let least_covered = (MIN_COVERED * f64::from(start.covered)) as u32;
         let mut around: Vec<f64> =
             around.iter().filter_map(|score| score.eligible_cost(least_covered)).collect();
         let least = around.iter().copied().reduce(f64::min)?;
-        let (centre, deviation) = centre_and_deviation(&mut around)?;
+        let (centre, deviation) = median_and_deviation(&mut around)?;
         let cost = pose.cost?;
         let above = |other: f64| (other - cost) / deviation;
         // Neighbours that show nothing are no better than the pose.
@@ -118,15 +118,15 @@ impl Appearance {
 
     /// The signals: depth, margin, both rises, above the start, gain.
     pub(super) fn signals(&self) -> [f64; 6] {
-        /// Below this the logarithm tells nothing but how small it is.
-        const LEAST_GAIN: f64 = 1e-3;
+        /// Smaller gains would dominate the logarithm.
+        const MIN_GAIN: f64 = 1e-3;
         [
             tamed(self.depth),
             tamed(self.margin),
             tamed(self.rises[0]),
             tamed(self.rises[1]),
             tamed(self.below_start),
-            self.gain.max(LEAST_GAIN).ln(),
+            self.gain.max(MIN_GAIN).ln(),
         ]
     }
 }

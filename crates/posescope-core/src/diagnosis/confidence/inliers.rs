@@ -2,13 +2,14 @@
 
 use nalgebra::Matrix6;
 
+use super::Signals;
 use super::appearance::{Appearance, Look};
-use super::{Signals, median};
 use crate::diagnosis::Evidence;
 use crate::features::FeatureState;
 use crate::params::Params;
 use crate::problem::Problem;
 use crate::solver::{Correspondence, pose_covariance};
+use crate::stats::median;
 
 /// What a probability is made of.
 const NAMES: &[&str] = &[

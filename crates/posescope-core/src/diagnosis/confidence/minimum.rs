@@ -1,9 +1,10 @@
 //! What the lattices of a search say about its minimum.
 
-use super::{Signals, centre_and_deviation, eligible_costs, surface, tamed};
+use super::{Signals, eligible_costs, tamed};
 use crate::diagnosis::Evidence;
 use crate::estimator::Outcome;
 use crate::grid::{Phase, ScoredLattice};
+use crate::stats::median_and_deviation;
 
 /// A minimum among the hypotheses of its search.
 pub(super) struct Minimum {
@@ -30,16 +31,16 @@ impl Minimum {
         let summary = outcome.cost.as_ref()?;
         // Without one there is nothing to judge.
         evidence.minimum?;
-        let coarse = surface(evidence, Phase::PositionCoarse)?;
+        let coarse = evidence.surface(Phase::PositionCoarse)?;
         let mut costs = eligible_costs(coarse);
         let coarse_best = costs.iter().copied().fold(f64::INFINITY, f64::min);
-        let (centre, deviation) = centre_and_deviation(&mut costs)?;
+        let (centre, deviation) = median_and_deviation(&mut costs)?;
         let depth = |cost: f64| (centre - cost) / deviation;
-        let yaw_surface = surface(evidence, Phase::YawCoarse);
+        let yaw_surface = evidence.surface(Phase::YawCoarse);
         let yaw_depth = yaw_surface.and_then(|surface| {
             let mut costs = eligible_costs(surface);
             let best = costs.iter().copied().fold(f64::INFINITY, f64::min);
-            let (centre, deviation) = centre_and_deviation(&mut costs)?;
+            let (centre, deviation) = median_and_deviation(&mut costs)?;
             Some((centre - best) / deviation)
         });
         let shuffled = summary.shuffled.unwrap_or(1.0).max(f64::MIN_POSITIVE);
@@ -81,8 +82,8 @@ impl Minimum {
     /// minimum until the cost has risen by as much as coarse costs differ anyway, by the parabola
     /// through the minimum and its neighbours on the fine lattices.
     pub(super) fn deviations(&self, evidence: &Evidence) -> Option<[f64; 3]> {
-        let position = surface(evidence, Phase::PositionFine)?;
-        let yaw = surface(evidence, Phase::YawFine)?;
+        let position = evidence.surface(Phase::PositionFine)?;
+        let yaw = evidence.surface(Phase::YawFine)?;
         let along = |surface: &ScoredLattice, step: usize| -> Option<f64> {
             let cell = surface.minimum()?;
             let cost = |cell: usize| surface.scores.get(cell).copied()??.cost;

@@ -1,10 +1,11 @@
 //! What a search from many starts says about the pose in which they settled.
 
-use super::{Signals, centre_and_deviation, eligible_costs, tamed};
+use super::{Signals, eligible_costs, tamed};
 use crate::diagnosis::Evidence;
 use crate::estimator::Outcome;
 use crate::geometry::{Pose, PoseError};
 use crate::grid::Phase;
+use crate::stats::median_and_deviation;
 
 /// Refined poses no farther apart are at one place.
 const SAME_M: f64 = 0.3;
@@ -47,7 +48,7 @@ impl Settled {
             .iter()
             .filter(|surface| surface.lattice.phase == Phase::PositionCoarse);
         let mut costs: Vec<f64> = coarse.flat_map(|surface| eligible_costs(surface)).collect();
-        let (centre, deviation) = centre_and_deviation(&mut costs)?;
+        let (centre, deviation) = median_and_deviation(&mut costs)?;
         let depth = |cost: f64| (centre - cost) / deviation;
         let refined = evidence.settled.as_ref()?;
         let answer = match &evidence.candidates {

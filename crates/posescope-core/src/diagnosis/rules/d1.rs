@@ -14,19 +14,18 @@ const MORE_GAIN: f64 = 0.02;
 const NEXT_TO_NOTHING: f64 = 0.15;
 
 pub(super) const RULE: Rule = Rule {
-    code: Code::D1,
     title: "the lowest cost covers too little",
     advice: "raise grid.coverage_floor",
     applies_to: &[Family::Grid, Family::Given],
     needs_truth: false,
-    is_conclusive: false,
     test: Test::Method(test),
     decided_at: DecidedAt::Stage(Stage::Search(Phase::PositionCoarse)),
     proof: Proof::CostMap(MapOverlay::Coverage),
     remedies,
+    ..Rule::new(Code::D1)
 };
 
-fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
+fn test(case: &Case<'_>) -> Option<Diagnosis> {
     match case.search {
         Some(search) if search.result_cost.is_none() => Some(out_of_view(search)),
         Some(search) => too_few_pixels(search),
@@ -35,7 +34,7 @@ fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
 }
 
 /// At another system's pose, next to nothing of the reference's cloud is in view.
-fn out_of_view(search: &Search<'_, '_>) -> Diagnosis {
+fn out_of_view(search: &Search<'_>) -> Diagnosis {
     RULE.found(&OutOfView {
         judge: search.judge.map(|method| method.name()),
         covered: search.covered(&search.result),
@@ -49,7 +48,7 @@ evidence!(OutOfView { judge: Option<&'static str>, covered: usize, covered_at_re
 );
 
 /// So few pixels match by chance.
-fn too_few_pixels(search: &Search<'_, '_>) -> Option<Diagnosis> {
+fn too_few_pixels(search: &Search<'_>) -> Option<Diagnosis> {
     let rivals = search.rivals()?;
     let at_truth = search.covered(&rivals.near.offset);
     let at_result = search.covered(&rivals.winner.offset);
@@ -87,7 +86,7 @@ evidence!(TooFewPixels {
 );
 
 /// Of a pose that is more likely wrong than right, what speaks against it without the truth.
-fn next_to_nothing(case: &Case<'_, '_>) -> Option<Diagnosis> {
+fn next_to_nothing(case: &Case<'_>) -> Option<Diagnosis> {
     if case.subject.truth.is_some() || !case.subject.is_low() {
         return None;
     }

@@ -3,19 +3,17 @@
 use super::*;
 
 pub(super) const RULE: Rule = Rule {
-    code: Code::D2,
     title: "the cost prefers another place",
     advice: "use another method or another reference",
     applies_to: Family::COSTED,
-    needs_truth: true,
-    is_conclusive: false,
     test: Test::Method(test),
     decided_at: DecidedAt::Stage(Stage::Search(Phase::PositionCoarse)),
     proof: Proof::CostMap(MapOverlay::Preference),
     remedies,
+    ..Rule::new(Code::D2)
 };
 
-fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
+fn test(case: &Case<'_>) -> Option<Diagnosis> {
     match case.family {
         Family::Starts => by_starts(case.starts()?),
         _ => by_grid(case.search?),
@@ -23,7 +21,7 @@ fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
 }
 
 /// Tried last of all causes, it holds wherever none of the others ended the list.
-fn by_grid(search: &Search<'_, '_>) -> Option<Diagnosis> {
+fn by_grid(search: &Search<'_>) -> Option<Diagnosis> {
     let judge = search.judge.map(|method| method.name());
     let cost_at_result = search.result_cost?;
     let Some(rivals) = search.rivals() else {

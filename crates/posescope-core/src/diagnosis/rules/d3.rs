@@ -6,19 +6,18 @@ use crate::diagnosis::search::Place;
 use crate::grid::ScoredLattice;
 
 pub(super) const RULE: Rule = Rule {
-    code: Code::D3,
     title: "the search missed a lower cost near the truth",
     advice: "raise grid.rounds or mi6.starts, or lower grid.coarse_step; instead of search=descent, use search=grid",
     applies_to: Family::COSTED,
-    needs_truth: true,
     is_conclusive: true,
     test: Test::Method(test),
     decided_at: DecidedAt::Stage(Stage::Search(Phase::PositionCoarse)),
     proof: Proof::CostMap(MapOverlay::Ranks),
     remedies,
+    ..Rule::new(Code::D3)
 };
 
-fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
+fn test(case: &Case<'_>) -> Option<Diagnosis> {
     match case.family {
         Family::Starts => by_starts(case.starts()?),
         Family::Given => by_given(case.search?),
@@ -26,7 +25,7 @@ fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
     }
 }
 
-fn by_grid(search: &Search<'_, '_>) -> Option<Diagnosis> {
+fn by_grid(search: &Search<'_>) -> Option<Diagnosis> {
     let rivals = search.rivals().filter(|rivals| rivals.is_missed)?;
     let lost = lost_in(search, &rivals.near);
     Some(RULE.found(&Missed {
@@ -74,7 +73,7 @@ impl fmt::Display for Missed {
 }
 
 /// Another system's pose costs more than the truth.
-fn by_given(search: &Search<'_, '_>) -> Option<Diagnosis> {
+fn by_given(search: &Search<'_>) -> Option<Diagnosis> {
     let cost_at_result = search.result_cost?;
     let cost_near_truth = match search.rivals() {
         Some(rivals) => rivals.is_missed.then_some(rivals.near.cost)?,
@@ -147,9 +146,9 @@ struct Loss {
 }
 
 /// The phase that turned away from the truth.
-fn lost_in(search: &Search<'_, '_>, near: &Place) -> Loss {
+fn lost_in(search: &Search<'_>, near: &Place) -> Loss {
     let at = |phase: Phase| {
-        let surface = search.surface(phase)?;
+        let surface = search.subject.evidence.surface(phase)?;
         Some((surface, surface.lattice.offset(surface.minimum()?)?))
     };
     let Some((coarse, chosen)) = at(Phase::PositionCoarse) else {
@@ -168,7 +167,7 @@ fn lost_in(search: &Search<'_, '_>, near: &Place) -> Loss {
     let tolerance_m = search.subject.tolerance.translation_m;
     let phase = match at(Phase::PositionFine) {
         Some((_, chosen)) if away(&chosen) > tolerance_m => Some(Phase::PositionFine),
-        _ => search.surface(Phase::YawCoarse).map(|_| Phase::YawCoarse),
+        _ => search.subject.evidence.surface(Phase::YawCoarse).map(|_| Phase::YawCoarse),
     };
     Loss { phase, ..Loss::default() }
 }

@@ -3,19 +3,18 @@
 use super::*;
 
 pub(super) const RULE: Rule = Rule {
-    code: Code::D4,
     title: "the truth is outside of what is searched",
     advice: "if the reference is wrong, use another; otherwise raise --radius or grid.yaw_range, or lower grid.coverage_floor",
     applies_to: Family::SEARCHING,
-    needs_truth: true,
     is_conclusive: true,
     test: Test::Method(test),
     decided_at: DecidedAt::Stage(Stage::Search(Phase::PositionCoarse)),
     proof: Proof::CostMap(MapOverlay::Reach),
     remedies,
+    ..Rule::new(Code::D4)
 };
 
-fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
+fn test(case: &Case<'_>) -> Option<Diagnosis> {
     let radius_m = case.subject.problem.uncertainty_radius_m;
     match case.family {
         Family::Starts => by_starts(case.starts()?, radius_m),
@@ -23,7 +22,7 @@ fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
     }
 }
 
-fn by_grid(search: &Search<'_, '_>, radius_m: f64) -> Option<Diagnosis> {
+fn by_grid(search: &Search<'_>, radius_m: f64) -> Option<Diagnosis> {
     let truth = search.truth_offset();
     let outside = |is_turned: bool| {
         RULE.found(&Outside {

@@ -6,7 +6,6 @@ use super::*;
 const TEXTURELESS: f64 = 2.0;
 
 pub(super) const RULE: Rule = Rule {
-    code: Code::D5,
     title: "no pose stands out: the query shows nothing",
     advice: "use another photo, or another reference",
     applies_to: Family::COSTED,
@@ -15,17 +14,17 @@ pub(super) const RULE: Rule = Rule {
     test: Test::Method(test),
     decided_at: DecidedAt::Stage(Stage::Assess),
     proof: Proof::CostMap(MapOverlay::Flat),
-    remedies: no_remedy,
+    ..Rule::new(Code::D5)
 };
 
 /// Whether the query is the same everywhere: costs may differ, but by nothing that it shows.
-pub(super) fn is_textureless(case: &Case<'_, '_>) -> bool {
+pub(super) fn is_textureless(case: &Case<'_>) -> bool {
     Family::COSTED.contains(&case.family)
         && case.subject.outcome.pose.is_ok()
         && case.contrast() < TEXTURELESS
 }
 
-fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
+fn test(case: &Case<'_>) -> Option<Diagnosis> {
     is_textureless(case).then(|| RULE.found(&Textureless { deviation: case.contrast() }))
 }
 

@@ -3,20 +3,18 @@
 use super::*;
 
 pub(super) const RULE: Rule = Rule {
-    code: Code::D6,
     title: "the photos look too different",
     advice: "use another method, or a reference of similar light",
     applies_to: &[Family::Grid, Family::Given],
-    needs_truth: true,
-    is_conclusive: false,
     test: Test::Method(test),
     decided_at: DecidedAt::Stage(Stage::Assess),
     proof: Proof::CostMap(MapOverlay::Light),
     remedies: d2::remedies,
+    ..Rule::new(Code::D6)
 };
 
 /// The images share nothing, even at the truth.
-fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
+fn test(case: &Case<'_>) -> Option<Diagnosis> {
     let search = case.search?;
     let rivals = search.rivals().filter(|rivals| rivals.is_changed)?;
     let against = search.against_chance(&rivals.near.offset)?;

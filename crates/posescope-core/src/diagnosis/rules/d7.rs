@@ -8,19 +8,16 @@ const OFF_PLANE_M: f64 = 0.1;
 const OFF_PLANE_DEG: f64 = 0.5;
 
 pub(super) const RULE: Rule = Rule {
-    code: Code::D7,
     title: "height, pitch or roll are off, which are not searched",
     advice: "use mi6 or robust, which search all six freedoms",
     applies_to: &[Family::Grid, Family::Given],
-    needs_truth: true,
-    is_conclusive: false,
     test: Test::Method(test),
-    decided_at: DecidedAt::End,
     proof: Proof::FreedViews,
     remedies: d2::remedies,
+    ..Rule::new(Code::D7)
 };
 
-fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
+fn test(case: &Case<'_>) -> Option<Diagnosis> {
     let search = case.search?;
     let rivals = search.rivals()?;
     let frozen = search.off_the_plane();
@@ -39,7 +36,7 @@ fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
 }
 
 fn found(
-    search: &Search<'_, '_>,
+    search: &Search<'_>,
     frozen_error: PoseError,
     near: &Place,
     won: Option<(f64, f64)>,

@@ -3,21 +3,20 @@
 use super::*;
 
 pub(super) const RULE: Rule = Rule {
-    code: Code::D8,
     title: "the search ended at its edge",
     advice: "raise --radius",
     applies_to: &[Family::Grid],
     needs_truth: false,
-    is_conclusive: false,
     test: Test::Method(test),
     decided_at: DecidedAt::Stage(Stage::Search(Phase::PositionCoarse)),
     proof: Proof::CostMap(MapOverlay::Rim),
     remedies: d1::remedies,
+    ..Rule::new(Code::D8)
 };
 
 /// With the truth, where the minimum's basin goes on outside; without, of a pose that is more likely wrong
 /// than right.
-fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
+fn test(case: &Case<'_>) -> Option<Diagnosis> {
     match case.subject.truth {
         Some(_) => {
             let search = case.search?;
@@ -29,7 +28,7 @@ fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
     }
 }
 
-fn on_rim(case: &Case<'_, '_>) -> Option<Diagnosis> {
+fn on_rim(case: &Case<'_>) -> Option<Diagnosis> {
     case.subject.outcome.cost?;
     let offset = case.subject.evidence.minimum?.offset;
     let (grid, radius_m) = (&case.subject.params.grid, case.subject.problem.uncertainty_radius_m);

@@ -3,14 +3,9 @@
 use super::*;
 
 pub(super) const RULE: Rule = Rule {
-    code: Code::D9,
     title: "the search grid is too large",
     advice: "use larger steps or a smaller radius",
-    applies_to: &[],
     needs_truth: false,
-    is_conclusive: false,
-    test: Test::Reported,
-    decided_at: DecidedAt::End,
     proof: Proof::CostMap(MapOverlay::Reach),
-    remedies: no_remedy,
+    ..Rule::new(Code::D9)
 };

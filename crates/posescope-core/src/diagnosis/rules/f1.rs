@@ -5,16 +5,12 @@ use crate::diagnosis::case::heaviest;
 use crate::fusion::{ShareOutcome, average_pose};
 
 pub(super) const RULE: Rule = Rule {
-    code: Code::F1,
     title: "one reference dragged the fusion",
     advice: "try --fusion r-wavg or --fusion joint",
-    applies_to: &[],
-    needs_truth: true,
-    is_conclusive: false,
     test: Test::Fusion(test),
     decided_at: DecidedAt::Stage(Stage::Fuse),
     proof: Proof::PoseMap,
-    remedies: no_remedy,
+    ..Rule::new(Code::F1)
 };
 
 fn test(case: &FusionCase<'_>) -> Option<Diagnosis> {

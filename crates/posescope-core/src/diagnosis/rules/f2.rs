@@ -3,14 +3,10 @@
 use super::*;
 
 pub(super) const RULE: Rule = Rule {
-    code: Code::F2,
     title: "the method takes one reference at a time",
     advice: "choose another --fusion",
-    applies_to: &[],
     needs_truth: false,
-    is_conclusive: false,
-    test: Test::Reported,
     decided_at: DecidedAt::Stage(Stage::Fuse),
     proof: Proof::PoseMap,
-    remedies: no_remedy,
+    ..Rule::new(Code::F2)
 };

@@ -4,19 +4,14 @@ use super::*;
 use crate::method::Method;
 
 pub(super) const RULE: Rule = Rule {
-    code: Code::H1,
     title: "the wrong method's pose was kept",
     advice: "run the other method alone, or use robust",
     applies_to: Family::ALL,
-    needs_truth: true,
-    is_conclusive: false,
     test: Test::Method(test),
-    decided_at: DecidedAt::End,
-    proof: Proof::DecidingStage,
-    remedies: no_remedy,
+    ..Rule::new(Code::H1)
 };
 
-fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
+fn test(case: &Case<'_>) -> Option<Diagnosis> {
     match case.family {
         Family::Starts => passed_over(case),
         _ => kept_by_hybrid(case),
@@ -24,7 +19,7 @@ fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
 }
 
 /// A hybrid that kept its first method's pose answers for it.
-fn kept_by_hybrid(case: &Case<'_, '_>) -> Option<Diagnosis> {
+fn kept_by_hybrid(case: &Case<'_>) -> Option<Diagnosis> {
     let parts = case.hybrid()?;
     let error = case.subject.error()?;
     (case.responsible == parts.first).then(|| {
@@ -44,7 +39,7 @@ evidence!(Kept { hybrid: Method, kept: Method, not_asked: Method, error: PoseErr
 );
 
 /// A candidate was right, and another one was taken.
-fn passed_over(case: &Case<'_, '_>) -> Option<Diagnosis> {
+fn passed_over(case: &Case<'_>) -> Option<Diagnosis> {
     case.subject.evidence.settled.as_ref()?;
     let truth = case.subject.reference_from_truth()?;
     let candidates = case.subject.evidence.candidates.as_ref()?;

@@ -4,19 +4,15 @@ use super::*;
 use crate::diagnosis::confidence::{self, Confidence, PoseConfidence};
 
 pub(super) const RULE: Rule = Rule {
-    code: Code::L1,
     title: "low confidence",
     advice: "do not rely on it; --min-confidence 0.9 refuses such poses",
     applies_to: Family::ALL,
     needs_truth: false,
-    is_conclusive: false,
     test: Test::Method(test),
-    decided_at: DecidedAt::End,
-    proof: Proof::DecidingStage,
-    remedies: no_remedy,
+    ..Rule::new(Code::L1)
 };
 
-fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
+fn test(case: &Case<'_>) -> Option<Diagnosis> {
     low(case.subject.confidence.as_ref())
 }
 

@@ -6,22 +6,19 @@ use super::*;
 use crate::camera::Intrinsics;
 
 /// Share of the reference's points that the query must show.
-const LEAST_OVERLAP: f64 = 0.05;
+const MIN_OVERLAP: f64 = 0.05;
 
 pub(super) const RULE: Rule = Rule {
-    code: Code::R1,
     title: "the reference does not see the query's scene",
     advice: "use another reference",
     applies_to: Family::MATCHING,
-    needs_truth: true,
-    is_conclusive: false,
     test: Test::Method(test),
     decided_at: DecidedAt::Stage(Stage::Match),
     proof: Proof::CloudOnPhoto,
-    remedies: no_remedy,
+    ..Rule::new(Code::R1)
 };
 
-fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
+fn test(case: &Case<'_>) -> Option<Diagnosis> {
     case.matches()?;
     let query_from_reference = case.subject.reference_from_truth()?.inverse();
     let problem = case.subject.problem;
@@ -39,7 +36,7 @@ fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
         }
     }
     let overlap = shared as f64 / seen.max(1) as f64;
-    (seen > 0 && overlap < LEAST_OVERLAP).then(|| RULE.found(&Overlap { overlap }))
+    (seen > 0 && overlap < MIN_OVERLAP).then(|| RULE.found(&Overlap { overlap }))
 }
 
 evidence!(Overlap { overlap: f64 } =>

@@ -6,19 +6,17 @@ use super::*;
 const FEW_KEYPOINTS: usize = 20;
 
 pub(super) const RULE: Rule = Rule {
-    code: Code::R2,
     title: "too few keypoints",
     advice: "lower surf.threshold (fb2: fb2.contrast)",
     applies_to: Family::MATCHING,
-    needs_truth: true,
-    is_conclusive: false,
     test: Test::Method(test),
     decided_at: DecidedAt::Stage(Stage::Detect),
     proof: Proof::Matches,
     remedies,
+    ..Rule::new(Code::R2)
 };
 
-fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
+fn test(case: &Case<'_>) -> Option<Diagnosis> {
     case.matches()?;
     let counts = case.subject.outcome.counts?;
     let (query, reference) = (counts.query_keypoints, counts.reference_keypoints);

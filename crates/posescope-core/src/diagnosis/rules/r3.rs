@@ -7,19 +7,17 @@ use crate::diagnosis::matches::Step;
 pub(super) const FEW_MATCHES: usize = 8;
 
 pub(super) const RULE: Rule = Rule {
-    code: Code::R3,
     title: "too few true matches",
     advice: "raise fb.ratio or get more keypoints; other light needs another method",
     applies_to: Family::MATCHING,
-    needs_truth: true,
-    is_conclusive: false,
     test: Test::Method(test),
     decided_at: DecidedAt::Stage(Stage::Match),
     proof: Proof::Matches,
     remedies,
+    ..Rule::new(Code::R3)
 };
 
-fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
+fn test(case: &Case<'_>) -> Option<Diagnosis> {
     let matches = case.matches()?;
     let funnel = matches.funnel;
     let without_depth = if matches.many_without_depth() {

@@ -4,20 +4,18 @@ use super::r3::FEW_MATCHES;
 use super::*;
 
 pub(super) const RULE: Rule = Rule {
-    code: Code::R4,
     title: "depths are missing or wrong",
     advice: "raise fb.depth_radius, try fb.depth=guarded; does the cloud belong to the photo?",
     applies_to: Family::MATCHING,
-    needs_truth: true,
-    is_conclusive: false,
     test: Test::Method(test),
     decided_at: DecidedAt::Stage(Stage::DepthLift),
     proof: Proof::DepthPatch,
     remedies,
+    ..Rule::new(Code::R4)
 };
 
 /// True matches whose depth is missing or wrong.
-fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
+fn test(case: &Case<'_>) -> Option<Diagnosis> {
     let matches = case.matches()?;
     let right = matches.funnel.lifted;
     let (wrong, missing) = (matches.wrong_depth, matches.no_depth);

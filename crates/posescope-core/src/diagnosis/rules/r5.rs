@@ -6,20 +6,17 @@ use super::*;
 pub(super) const FIXED_M: f64 = 0.3;
 
 pub(super) const RULE: Rule = Rule {
-    code: Code::R5,
     title: "the inliers do not fix the pose",
     advice: "get more matches, and better spread ones",
     applies_to: Family::MATCHING,
-    needs_truth: true,
-    is_conclusive: false,
     test: Test::Method(test),
-    decided_at: DecidedAt::End,
     proof: Proof::InlierSpread,
     remedies: r4::remedies,
+    ..Rule::new(Code::R5)
 };
 
 /// The inliers are true, but leave the pose play.
-fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
+fn test(case: &Case<'_>) -> Option<Diagnosis> {
     let matches = case.matches()?;
     let inliers = matches.inliers();
     case.subject.outcome.pose.as_ref().ok()?;

@@ -4,20 +4,17 @@ use super::*;
 use crate::solver::{Correspondence, refine};
 
 pub(super) const RULE: Rule = Rule {
-    code: Code::R6,
     title: "MLESAC missed the right pose",
     advice: "raise fb.max_trials or fb.confidence",
     applies_to: Family::MATCHING,
-    needs_truth: true,
-    is_conclusive: false,
     test: Test::Method(test),
-    decided_at: DecidedAt::End,
     proof: Proof::RivalInliers,
     remedies,
+    ..Rule::new(Code::R6)
 };
 
 /// Near the truth is a pose that the method would accept, with more inliers than the one that it ended with.
-fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
+fn test(case: &Case<'_>) -> Option<Diagnosis> {
     let matches = case.matches()?;
     if case.consensus_is_right() {
         return None;

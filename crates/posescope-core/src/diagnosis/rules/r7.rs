@@ -3,19 +3,16 @@
 use super::*;
 
 pub(super) const RULE: Rule = Rule {
-    code: Code::R7,
     title: "the right pose was refused",
     advice: "get more matches, or try fb.accept=paper",
     applies_to: Family::MATCHING,
-    needs_truth: true,
-    is_conclusive: false,
     test: Test::Method(test),
-    decided_at: DecidedAt::End,
     proof: Proof::RivalInliers,
     remedies: r3::remedies,
+    ..Rule::new(Code::R7)
 };
 
-fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
+fn test(case: &Case<'_>) -> Option<Diagnosis> {
     case.matches()?;
     let failure = case.subject.outcome.pose.as_ref().err()?;
     let error = case.consensus_error()?;

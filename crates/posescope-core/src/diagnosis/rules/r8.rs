@@ -3,19 +3,16 @@
 use super::*;
 
 pub(super) const RULE: Rule = Rule {
-    code: Code::R8,
     title: "a wrong pose was accepted",
     advice: "lower fb.ratio; does the cloud belong to the photo?",
     applies_to: Family::MATCHING,
-    needs_truth: true,
-    is_conclusive: false,
     test: Test::Method(test),
-    decided_at: DecidedAt::End,
     proof: Proof::Matches,
     remedies,
+    ..Rule::new(Code::R8)
 };
 
-fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
+fn test(case: &Case<'_>) -> Option<Diagnosis> {
     let matches = case.matches()?;
     Some(RULE.found(&Accepted {
         error: case.subject.error()?,

@@ -4,20 +4,17 @@ use super::*;
 use crate::estimator::Failure;
 
 pub(super) const RULE: Rule = Rule {
-    code: Code::R9,
     title: "the pose is outside the prior",
     advice: "raise --radius or fb.radius_slack",
     applies_to: Family::MATCHING,
-    needs_truth: true,
-    is_conclusive: false,
     test: Test::Method(test),
-    decided_at: DecidedAt::End,
     proof: Proof::PoseMap,
     remedies,
+    ..Rule::new(Code::R9)
 };
 
 /// A pose was refused for its distance from the reference, or the right one would have been.
-fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
+fn test(case: &Case<'_>) -> Option<Diagnosis> {
     case.matches()?;
     if let Some(Failure::OutsideRadius { distance_m, radius_m }) =
         case.subject.outcome.pose.as_ref().err()

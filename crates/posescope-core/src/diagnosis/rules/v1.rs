@@ -4,16 +4,12 @@ use super::*;
 use crate::retrieval::RankedReference;
 
 pub(super) const RULE: Rule = Rule {
-    code: Code::V1,
     title: "the right place was ranked too low",
     advice: "take more references: retrieve:K with a larger K",
-    applies_to: &[],
-    needs_truth: true,
-    is_conclusive: false,
     test: Test::Ranking(test),
     decided_at: DecidedAt::Stage(Stage::Retrieve),
     proof: Proof::Ranking,
-    remedies: no_remedy,
+    ..Rule::new(Code::V1)
 };
 
 /// None of the references that were taken is of the right place.

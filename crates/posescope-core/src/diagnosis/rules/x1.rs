@@ -1,30 +1,28 @@
 //! X1: the ground truth, a calibration or the units are suspect.
 
 use nalgebra::{Translation3, Vector2};
-use rayon::prelude::*;
 
 use super::*;
 use crate::camera::Intrinsics;
-use crate::diagnosis::descent::{Descended, compass_search};
 use crate::diagnosis::matches::TrueMatches;
-use crate::diagnosis::search::BEYOND_CHANCE;
-use crate::render::Score;
+use crate::diagnosis::{Evidence, Subject};
+use crate::estimator::{Estimator, FeatureBased};
+use crate::method::Method;
 use crate::solver::Correspondence;
+use crate::stats::median;
+use crate::trace::Trace;
 
 pub(super) const RULE: Rule = Rule {
-    code: Code::X1,
     title: "a calibration or the ground truth is suspect",
     advice: "check calibration, pose convention and units; `posescope doctor` does",
     applies_to: Family::ALL,
     needs_truth: false,
-    is_conclusive: false,
     test: Test::Method(test),
-    decided_at: DecidedAt::End,
     proof: Proof::CloudOnPhoto,
-    remedies: no_remedy,
+    ..Rule::new(Code::X1)
 };
 
-fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
+fn test(case: &Case<'_>) -> Option<Diagnosis> {
     if let Some(found) = units(case) {
         return Some(found);
     }
@@ -44,26 +42,24 @@ fn test(case: &Case<'_, '_>) -> Option<Diagnosis> {
         Family::Grid | Family::Given => {
             let search = case.search?;
             search.result_cost?;
-            poses(case).or_else(|| camera_by_cost(search)).or_else(|| truth_by_cost(case, search))
+            poses(case).or_else(|| camera_by_fb(case)).or_else(|| truth_by_cost(case, search))
         }
         Family::Starts => poses(case),
     }
 }
 
 /// The cloud is not in metres.
-fn units(case: &Case<'_, '_>) -> Option<Diagnosis> {
+fn units(case: &Case<'_>) -> Option<Diagnosis> {
     /// Median depths of a cloud that no scanner and no indoor depth camera has \[m\].
-    const LEAST_DEPTH_M: f64 = 0.1;
-    const GREATEST_DEPTH_M: f64 = 400.0;
+    const MIN_DEPTH_M: f64 = 0.1;
+    const MAX_DEPTH_M: f64 = 400.0;
     const STRIDE: usize = 16;
     let points = case.subject.problem.reference.cloud.points.iter();
-    let depths = points.step_by(STRIDE).map(|point| point.z);
-    let mut depths: Vec<f32> = depths.filter(|&depth| depth > 0.0).collect();
-    let middle = depths.len().checked_sub(1)? / 2;
-    let median_depth_m = f64::from(*depths.select_nth_unstable_by(middle, f32::total_cmp).1);
-    let (unit, times) = if median_depth_m > GREATEST_DEPTH_M {
+    let depths = points.step_by(STRIDE).map(|point| f64::from(point.z));
+    let median_depth_m = median(&mut depths.filter(|&depth| depth > 0.0).collect::<Vec<_>>())?;
+    let (unit, times) = if median_depth_m > MAX_DEPTH_M {
         ("millimetres", 1e-3)
-    } else if median_depth_m < LEAST_DEPTH_M {
+    } else if median_depth_m < MIN_DEPTH_M {
         ("kilometres", 1e3)
     } else {
         return None;
@@ -79,7 +75,7 @@ evidence!(Units { median_depth_m: f64, unit: &'static str, depth_in_unit_m: f64 
 /// The pose agrees with the truth if the poses of the scene are read in another way.
 ///
 /// Only for a pose that is more likely right than wrong: one of many poses agrees with something by chance.
-fn poses(case: &Case<'_, '_>) -> Option<Diagnosis> {
+fn poses(case: &Case<'_>) -> Option<Diagnosis> {
     const LIKELY: f64 = 0.5;
     /// How well another reading must agree with the estimate.
     const AGREEING_M: f64 = 0.5;
@@ -134,8 +130,22 @@ evidence!(Cloud { wrong_depth: usize, right_depth: usize } =>
      {right_depth} the right one."
 );
 
+/// A method without matches learns of another camera from those of FB.
+fn camera_by_fb(case: &Case<'_>) -> Option<Diagnosis> {
+    // Where the truth is not searched, that alone explains the result.
+    case.search?.near_truth()?;
+    let subject = case.subject;
+    let mut evidence = Evidence::default();
+    let fb = FeatureBased::new(subject.params);
+    let outcome = fb.estimate(subject.problem, &mut Trace::to(&mut evidence)).ok()?;
+    let (outcome, evidence) = (&outcome, &evidence);
+    let subject = Subject { method: Method::FB, outcome, evidence, ..subject.clone() };
+    let case = Case::new(&subject, Family::Features, None);
+    camera_by_matches(&case, case.matches()?)
+}
+
 /// From the true pose, another focal length and principal point explain far more matches.
-fn camera_by_matches(case: &Case<'_, '_>, matches: &TrueMatches) -> Option<Diagnosis> {
+fn camera_by_matches(case: &Case<'_>, matches: &TrueMatches) -> Option<Diagnosis> {
     let query_from_reference = case.subject.reference_from_truth()?.inverse();
     let stated = &case.subject.problem.query.intrinsics;
     let threshold_px = case.matching().mlesac.inlier_threshold_px;
@@ -155,7 +165,7 @@ fn camera_by_matches(case: &Case<'_, '_>, matches: &TrueMatches) -> Option<Diagn
     let is_other = (camera.fx / stated.fx - 1.0).abs() > 0.02
         || (camera.cx - stated.cx).hypot(camera.cy - stated.cy) > 8.0;
     (is_more && is_other).then(|| {
-        RULE.found(&CameraByMatches {
+        RULE.found(&OtherCamera {
             explained: before,
             explained_otherwise: after,
             camera,
@@ -164,7 +174,7 @@ fn camera_by_matches(case: &Case<'_, '_>, matches: &TrueMatches) -> Option<Diagn
     })
 }
 
-evidence!(CameraByMatches {
+evidence!(OtherCamera {
     explained: usize,
     explained_otherwise: usize,
     camera: Intrinsics,
@@ -249,7 +259,7 @@ fn likeliest_camera(
 }
 
 /// The photos agree on a pose as well as photos ever do, and it is not the stated truth.
-fn truth_by_matches(case: &Case<'_, '_>, matches: &TrueMatches) -> Option<Diagnosis> {
+fn truth_by_matches(case: &Case<'_>, matches: &TrueMatches) -> Option<Diagnosis> {
     const NEARLY_CERTAIN: f64 = -15.0;
     let error = case.subject.error().or_else(|| case.consensus_error())?;
     let judged = case.subject.evidence.judged.as_ref()?;
@@ -276,89 +286,9 @@ evidence!(TruthByMatches {
     metres(error.translation_m)
 );
 
-/// What another camera must save beyond the best pose, as a share of the cost of shuffled pixels.
-const TELLING_GAIN: f64 = 0.02;
-
-/// From the true pose, another focal length explains the query much better than any pose does with the
-/// stated one.
-fn camera_by_cost(search: &Search<'_, '_>) -> Option<Diagnosis> {
-    const TIMES: [f64; 8] = [0.7, 0.8, 0.9, 0.95, 1.05, 1.1, 1.25, 1.4];
-    // Where the truth is not searched, that alone explains the result.
-    let near = search.near_truth()?;
-    let result_cost = search.result_cost?;
-    let stated = search.subject.problem.query.intrinsics;
-    let camera = |at: &[f64; 3]| Intrinsics {
-        fx: stated.fx * at[0].exp(),
-        fy: stated.fy * at[0].exp(),
-        cx: stated.cx + at[1],
-        cy: stated.cy + at[2],
-        ..stated
-    };
-    let stated_score = search.scorer.score(&[search.truth])[0];
-    let cost_at_truth = stated_score.eligible_cost(search.least_covered)?;
-    let costs = |places: &[[f64; 3]]| -> Vec<Option<f64>> {
-        let scored = |at| search.scorer.seen_by(&camera(at)).score(&[search.truth])[0];
-        let cost = |at| comparable_cost(&scored(at), &stated_score);
-        places.par_iter().map(cost).collect()
-    };
-    let focal_lengths = TIMES.map(|times| [times.ln(), 0.0, 0.0]);
-    let best = focal_lengths
-        .into_iter()
-        .zip(costs(&focal_lengths))
-        .filter_map(|(at, cost)| Some(Descended { at, cost: cost? }))
-        .reduce(|best, next| if next.cost < best.cost { next } else { best })?;
-    let chance = search.shuffled_cost?;
-    let rival = near.cost.min(result_cost);
-    // Far behind is no reason to stop: only with its own centre does another camera catch up.
-    if best.cost >= cost_at_truth {
-        return None;
-    }
-    let best = compass_search(best.at, [0.02, 8.0, 8.0], 2, costs)?;
-    if rival - best.cost <= TELLING_GAIN * chance {
-        return None;
-    }
-    let camera = camera(&best.at);
-    // A cost can also fall because dark falls on dark: pixels must go together better than the same pixels
-    // shuffled do, and by more than they do with the stated camera.
-    let otherwise = search.against_chance_of(&search.scorer.seen_by(&camera), &search.truth)?;
-    let gains = [&near.offset, &search.result].map(|offset| search.gain(offset));
-    let stated_gain = gains.into_iter().flatten().fold(0.0, f64::max);
-    if otherwise.deviations() < BEYOND_CHANCE || otherwise.gain() < stated_gain + TELLING_GAIN {
-        return None;
-    }
-    Some(RULE.found(&CameraByCost { cost_at_truth, cost_otherwise: best.cost, camera, stated }))
-}
-
-/// What another camera costs; `None` for one that sees so little of the cloud that its cost is low by
-/// chance, as one of a much shorter focal length does.
-fn comparable_cost(other: &Score, stated: &Score) -> Option<f64> {
-    other.eligible_cost(stated.covered / 2)
-}
-
-#[derive(Serialize)]
-struct CameraByCost {
-    cost_at_truth: f64,
-    cost_otherwise: f64,
-    camera: Intrinsics,
-    stated: Intrinsics,
-}
-
-impl fmt::Display for CameraByCost {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (stated, otherwise) = pair(self.cost_at_truth, self.cost_otherwise);
-        write!(
-            f,
-            "The query camera is suspect: its stated focal length is {:.0} px. With {} the cost at the truth falls from \
-             {stated} to {otherwise} (lower is better).",
-            self.stated.fx,
-            otherwise_stated(&self.camera, &self.stated)
-        )
-    }
-}
-
 /// The result is as certain as results ever are, and it is not the stated truth. Where the images agree at
 /// the truth too, though less, both are there, and the truth is not suspect.
-fn truth_by_cost(case: &Case<'_, '_>, search: &Search<'_, '_>) -> Option<Diagnosis> {
+fn truth_by_cost(case: &Case<'_>, search: &Search<'_>) -> Option<Diagnosis> {
     const NEARLY_CERTAIN: f64 = 0.97;
     const SUPPORTED: f64 = 0.5;
     let probability = case.subject.confidence.as_ref()?.probability;
@@ -379,16 +309,3 @@ evidence!(TruthByCost { probability: f64, error: PoseError } =>
     "The ground truth is suspect: the pose is {:.0} % likely right, but {} from it.",
     100.0 * probability, metres(error.translation_m)
 );
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_camera_that_sees_less_than_half_of_the_cloud_is_not_compared() {
-        let score = |covered| Score { cost: Some(0.1), covered };
-        let stated = score(1000);
-        assert_eq!(comparable_cost(&score(499), &stated), None);
-        assert_eq!(comparable_cost(&score(500), &stated), Some(0.1));
-    }
-}

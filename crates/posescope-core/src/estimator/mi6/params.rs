@@ -8,56 +8,35 @@ parameters! {
     #[derive(Clone, Debug, PartialEq)]
     pub struct SixParams {
         /// Coarse lattices, each at a yaw of its own.
-        pub yaws: usize = count("yaws", "", 1..=61),
+        pub yaws: usize = 5 => count("yaws", "", 1..=61),
         /// Yaw between neighbouring coarse lattices.
-        pub yaw_step_deg: f64 = number("yaw_step", "°", 0.1..=45.0),
+        pub yaw_step_deg: f64 = 3.0 => number("yaw_step", "°", 0.1..=45.0),
         /// Coarse minima that are refined in right, forward and yaw.
-        pub starts: usize = count("starts", "", 1..=200),
+        pub starts: usize = 20 => count("starts", "", 1..=200),
         /// The best of those, which are refined in all six freedoms.
-        pub finalists: usize = count("finalists", "", 1..=100),
+        pub finalists: usize = 8 => count("finalists", "", 1..=100),
         /// First step of the refinement in right, forward and yaw; at most half a step between coarse positions.
-        pub first_step_m: f64 = number("first_step", "m", 0.01..=5.0),
+        pub first_step_m: f64 = 0.5 => number("first_step", "m", 0.01..=5.0),
         /// First step of the refinement in six freedoms; at most half a step between coarse positions.
-        pub six_step_m: f64 = number("six_step", "m", 0.001..=2.0),
+        pub six_step_m: f64 = 0.1 => number("six_step", "m", 0.001..=2.0),
         /// Steps below this are the last.
-        pub last_step_m: f64 = number("last_step", "m", 0.0005..=0.5),
+        pub last_step_m: f64 = 0.004 => number("last_step", "m", 0.0005..=0.5),
         /// Turn that goes with a step of one metre: what moves a view by as much. A room, where things are ten
         /// times nearer than on a street, needs ten times as much.
-        pub deg_per_m: f64 = number("deg_per_m", "°", 0.1..=90.0),
+        pub deg_per_m: f64 = 3.0 => number("deg_per_m", "°", 0.1..=90.0),
         /// How many times smaller photos are for the coarse level, whose minima are finalists beside those
         /// of the fine one; 1 leaves it out.
-        pub coarse_shrink: usize = count("coarse_shrink", "", 1..=16),
+        pub coarse_shrink: usize = 3 => count("coarse_shrink", "", 1..=16),
         /// Lattices of the coarse level, each at a yaw of its own.
-        pub coarse_yaws: usize = count("coarse_yaws", "", 1..=61),
+        pub coarse_yaws: usize = 11 => count("coarse_yaws", "", 1..=61),
         /// Turn against the reference's heading that makes a pose dearer by a standard deviation of the coarse
         /// costs; four times as dear at twice the turn.
-        pub usual_yaw_deg: f64 = number("usual_yaw", "°", 0.1..=1000.0),
+        pub usual_yaw_deg: f64 = 8.0 => number("usual_yaw", "°", 0.1..=1000.0),
         /// Height above or below the reference that does so.
-        pub usual_height_m: f64 = number("usual_height", "m", 0.01..=1000.0),
+        pub usual_height_m: f64 = 0.5 => number("usual_height", "m", 0.01..=1000.0),
         /// Tilt against the reference, of pitch and roll together, that does so.
-        pub usual_tilt_deg: f64 = number("usual_tilt", "°", 0.1..=1000.0),
+        pub usual_tilt_deg: f64 = 1.5 => number("usual_tilt", "°", 0.1..=1000.0),
         /// How many standard deviations dearer an unlikely pose is at most; 0 takes all for equally likely.
-        pub unlikely: f64 = number("unlikely", "", 0.0..=100.0),
-    }
-}
-
-impl Default for SixParams {
-    fn default() -> Self {
-        Self {
-            yaws: 5,
-            yaw_step_deg: 3.0,
-            starts: 20,
-            finalists: 8,
-            first_step_m: 0.5,
-            six_step_m: 0.1,
-            last_step_m: 0.004,
-            deg_per_m: 3.0,
-            coarse_shrink: 3,
-            coarse_yaws: 11,
-            usual_yaw_deg: 8.0,
-            usual_height_m: 0.5,
-            usual_tilt_deg: 1.5,
-            unlikely: 4.0,
-        }
+        pub unlikely: f64 = 4.0 => number("unlikely", "", 0.0..=100.0),
     }
 }

@@ -67,7 +67,7 @@ pub(super) fn descriptor(
 ) -> SiftDescriptor {
     const FIELDS: i32 = 4;
     const DIRECTIONS: i32 = 8;
-    const MOST_SHARE: f32 = 0.2;
+    const MAX_SHARE: f32 = 0.2;
     let field = 3.0 * sigma;
     let (sin, cos) = angle.sin_cos();
     let radius = (field * SQRT_2 * 2.5).round() as i32;
@@ -103,7 +103,7 @@ pub(super) fn descriptor(
         }
     }
     let norm = |values: &[f32; 128]| values.iter().map(|v| v * v).sum::<f32>().sqrt();
-    let most = MOST_SHARE * norm(&histograms);
+    let most = MAX_SHARE * norm(&histograms);
     let clipped = histograms.map(|value| value.min(most));
     let sum: f32 = clipped.iter().sum();
     if sum <= 0.0 {

@@ -11,7 +11,7 @@ use crate::image::FloatImage;
 /// Smoothing of the first image of every octave (section 3.3) \[px of that octave\].
 pub(super) const BASE_SIGMA: f64 = 1.6;
 /// Steps of the interpolation of an extremum, after which it is dropped.
-const MOST_STEPS: usize = 5;
+const MAX_STEPS: usize = 5;
 /// Distance of extrema from the border \[px\].
 const BORDER: u32 = 5;
 /// The image convolved with a Gaussian of `sigma` \[px\], the outermost pixels repeated. An image library's
@@ -145,7 +145,7 @@ impl Octave {
         params: &SiftParams,
     ) -> Option<Extremum> {
         let (width, height) = self.differences[0].dimensions();
-        for _ in 0..MOST_STEPS {
+        for _ in 0..MAX_STEPS {
             let here = self.at(level, x, y);
             let gradient = 0.5
                 * Vector3::new(

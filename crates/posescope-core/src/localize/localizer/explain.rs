@@ -38,8 +38,8 @@ impl Localizer<'_> {
         Ok(())
     }
 
-    /// Tries the remedies on an answer, at most as many as are to be tried. Whoever watches hears
-    /// nothing of what they do, but can stop them.
+    /// Tries the remedies on an answer, up to the limit of runs. The observer does not see their events,
+    /// but can stop them.
     fn explain(
         &self,
         answer: &Answer,
@@ -107,8 +107,8 @@ impl Localizer<'_> {
         Some(changed)
     }
 
-    /// The reference that is so many places farther from the one that was used, of those within the
-    /// radius around it.
+    /// A reference farther from the one used, of those within the radius around it: a third of them on for
+    /// each step of `farther`.
     fn farther_reference(&self, asked: &Request, query: usize, farther: usize) -> Option<usize> {
         let [used] = asked.references.frames[..] else {
             return None;
@@ -142,7 +142,7 @@ impl Changed {
         };
         let requests = std::slice::from_ref(&self.request);
         let done = again.localize(0, query, requests, &[self.method], &mut NoObserver, keep);
-        // A frame that cannot be read helps nobody.
+        // A frame that cannot be read does not help.
         done.ok()?;
         found
     }

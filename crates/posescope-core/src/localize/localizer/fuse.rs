@@ -146,10 +146,7 @@ impl Localizer<'_> {
             .collect();
         let attention = observer.attention();
         let mut fanout = Fanout::new(vec![own, observer]);
-        let mut trace = match &attention {
-            Some(flag) => Trace::watched(&mut fanout, flag),
-            None => Trace::to(&mut fanout),
-        };
+        let mut trace = Trace::watched(&mut fanout, attention.as_deref());
         localize_jointly(&references, method, self.params, &mut trace)
     }
 }

@@ -28,7 +28,7 @@ pub(super) struct MethodOutcome {
     pub(super) estimated: Outcome,
     /// What is made of it: a pose of low confidence may be refused.
     pub(super) outcome: Outcome,
-    /// What the estimator told.
+    /// The events of the estimator.
     pub(super) evidence: Evidence,
     /// The outcome measured and judged.
     pub(super) result: QueryResult,
@@ -54,7 +54,7 @@ pub(super) struct QueryWork<'a> {
     pub(super) candidates: BTreeMap<Method, Vec<Option<MethodOutcome>>>,
 }
 
-/// A reference, and what is known of the distance of the query \[m\].
+/// A reference, and what is known about the distance of the query \[m\].
 #[derive(Clone, Copy, PartialEq)]
 pub(super) struct Place {
     /// The reference's position in its scene.

@@ -28,11 +28,6 @@ impl OnDevice {
     pub fn new(device: Option<Arc<dyn Device>>) -> Self {
         Self { device, loaded: OnceLock::new(), is_used: AtomicBool::new(false) }
     }
-
-    /// The same device, for another scorer.
-    pub fn unused(&self) -> Self {
-        Self::new(self.device.clone())
-    }
 }
 
 impl Scorer<'_> {
