@@ -436,6 +436,18 @@ mod tests {
     use super::*;
 
     #[test]
+    fn the_best_of_what_helped_is_nearest_to_the_truth_and_the_first_of_equals() {
+        let helped = |arg: &str, translation_m: f64| Helped {
+            args: vec![arg.to_owned()],
+            error: PoseError { translation_m, rotation_deg: 1.0, max_euler_deg: 1.0 },
+        };
+        let helped = vec![helped("a", 0.5), helped("b", 0.2), helped("c", 0.2)];
+        let explanation = Explanation { helped, runs: 3, complete: true };
+        assert_eq!(explanation.best().expect("two helped").args, ["b"]);
+        assert_eq!(Explanation::default().best(), None);
+    }
+
+    #[test]
     fn with_the_truth_hidden_nothing_is_left_that_needs_it() {
         let error = json!({"translation_m": 12.5, "rotation_deg": 1.0, "max_euler_deg": 1.0});
         let finding = |code: &str| json!({"code": code, "text": "A sentence.", "evidence": {}});
