@@ -23,7 +23,6 @@ use rand_pcg::Pcg64;
 
 pub use joint_histogram::{
     Entropies, JointHistogram, LEAST_ENTROPY, MOST_BYTE_BINS, bin, byte_bin, count_pairs,
-    put_into_bins,
 };
 pub use lesser_half::{LesserHalf, LesserHalfFinder};
 pub use mutual_information::MutualInformation;

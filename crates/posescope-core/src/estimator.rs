@@ -4,7 +4,6 @@
 //! A direct estimator is a registered [cost](crate::cost::ALL) with a search, so a new cost is a new
 //! method. Any other estimator is one file, its `mod` line and its [`Entry`] in [`all`].
 
-mod consensus;
 mod direct;
 mod failure;
 mod family;

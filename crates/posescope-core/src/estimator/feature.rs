@@ -18,7 +18,6 @@ pub(super) use self::matched::{Detected, Detector};
 pub use self::params::{DepthRule, FeatureParams};
 pub(super) use self::several::Gathered;
 use self::states::FeatureStates;
-use super::consensus::FoundConsensus;
 use super::{Estimator, Failure, FeatureCounts, Halt, Outcome, separate_failure};
 use crate::depth::LiftedMatch;
 use crate::event::{
@@ -83,22 +82,15 @@ impl Estimator for FeatureBased {
 pub(super) struct Proposal {
     /// The answer.
     pub(super) outcome: Outcome,
-    /// The consensus that was accepted or refused; `None` where there was none.
-    pub(super) consensus: Option<Agreed>,
-}
-
-/// A consensus, in short.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Agreed {
-    /// The query camera in the reference camera's frame.
-    pub(super) reference_from_query: Pose,
+    /// The pose `reference_from_query` of the consensus that was accepted or refused; `None` where there was none.
+    pub(super) consensus: Option<Pose>,
 }
 
 /// What is known of a run, up to where it stops.
 #[derive(Default)]
 struct Progress {
     counts: FeatureCounts,
-    agreed: Option<Agreed>,
+    agreed: Option<Pose>,
     states: FeatureStates,
 }
 
@@ -252,17 +244,9 @@ impl FeatureBased {
         // A feature that was matched again ends in the state of its last match.
         states.after_pose(&best.pairings, &best.residuals_px, threshold_px);
         *counts = states.counts(reference.keypoints.len());
-        *agreed = Some(Agreed { reference_from_query: best.pose.inverse() });
+        *agreed = Some(best.pose.inverse());
         trace.stage(Stage::Accept, |trace| {
-            let found = FoundConsensus {
-                reference_from_query: best.pose.inverse(),
-                acceptance: beyond.acceptance,
-                tested: beyond.tested,
-                counted: beyond.counted,
-                is_enough: self.accepts(&beyond.acceptance),
-                slack: self.slack(),
-            };
-            found.judged(problem, trace)
+            self.judged(&best.pose.inverse(), &beyond, problem, trace)
         })
     }
 

@@ -12,7 +12,6 @@ use std::sync::Arc;
 
 pub use params::RobustParams;
 
-use super::feature::Agreed;
 use super::mi6::{self, Found, JUDGED, shown};
 use super::{
     CostSummary, Entry, Estimator, Failure, Family, FeatureBased, Halt, Outcome, SixFreedoms, fb2,
@@ -52,7 +51,8 @@ pub struct Robust {
 /// A consensus of features, accepted by its method or not.
 struct Proposed {
     method: Method,
-    agreed: Agreed,
+    /// `reference_from_query`.
+    agreed: Pose,
     accepted: bool,
 }
 
@@ -92,7 +92,7 @@ impl Robust {
                 })
                 .collect();
             for proposed in proposed {
-                let pose = proposed.agreed.reference_from_query;
+                let pose = proposed.agreed;
                 let checkpoint = || trace.checkpoint();
                 if let Some(refined) = self.six.refined(problem, &judge, pose, checkpoint)? {
                     candidates.push(JudgedPose {
@@ -152,7 +152,7 @@ fn unjudged(
         method: accepted.method,
         why: format!("there is no search to compare with: {failure}"),
     })?;
-    let pose = problem.world_from_query(&accepted.agreed.reference_from_query);
+    let pose = problem.world_from_query(&accepted.agreed);
     Ok((pose, None))
 }
 
