@@ -102,9 +102,22 @@ pub struct Outcome {
 }
 
 impl Outcome {
+    /// A pose, or why there is none, and nothing else.
+    pub fn of(pose: Result<Pose, Failure>) -> Self {
+        Self { pose, counts: None, cost: None, fell_back: false }
+    }
+
     /// No pose, and nothing to say but why.
     pub fn failed(failure: Failure) -> Self {
-        Self { pose: Err(failure), counts: None, cost: None, fell_back: false }
+        Self::of(Err(failure))
+    }
+
+    /// The end of a search.
+    fn searched(found: Result<(Pose, CostSummary), Failure>) -> Self {
+        match found {
+            Ok((pose, cost)) => Self { cost: Some(cost), ..Self::of(Ok(pose)) },
+            Err(failure) => Self::failed(failure),
+        }
     }
 }
 

@@ -74,12 +74,7 @@ impl Estimator for Direct {
             SearchRule::Grid => self.search_grid(problem, trace),
             SearchRule::Descent => self.descend(problem, trace),
         });
-        Ok(match separate_failure(found)? {
-            Ok((pose, cost)) => {
-                Outcome { pose: Ok(pose), counts: None, cost: Some(cost), fell_back: false }
-            }
-            Err(failure) => Outcome::failed(failure),
-        })
+        Ok(Outcome::searched(separate_failure(found)?))
     }
 
     fn scorer(&self, problem: &Problem) -> Option<Scorer<'_>> {

@@ -146,10 +146,8 @@ impl FeatureBased {
         });
         Ok(Proposal {
             outcome: Outcome {
-                pose: separate_failure(pose)?,
                 counts: Some(progress.counts),
-                cost: None,
-                fell_back: false,
+                ..Outcome::of(separate_failure(pose)?)
             },
             consensus: progress.agreed,
         })

@@ -12,11 +12,13 @@
 //! 5. and of minima that cost about the same the likelier pose stands.
 
 mod basin;
+mod level;
 mod params;
 mod prior;
 
 use std::sync::Arc;
 
+pub(super) use level::Level;
 pub use params::SixParams;
 
 use super::direct::Direct;
@@ -24,8 +26,8 @@ use super::{CostSummary, Entry, Estimator, Failure, Family, Halt, Outcome, separ
 use crate::cost;
 use crate::event::{Moment, PhaseSearched, PoseScored, Stage, StartsRefined, ViewRendered};
 use crate::geometry::{Pose, PoseError};
-use crate::grid::{GridParams, Lattice, Offset, Phase, Scored, ScoredLattice, least_covered, scan};
-use crate::judge::{Freedoms, Judge, JudgeParams, Refined, Shrinking, Start, shrink};
+use crate::grid::{GridParams, Lattice, Offset, Phase, Scored, ScoredLattice, scan};
+use crate::judge::{Freedoms, Judge, JudgeParams, Refined, Shrinking, Start};
 use crate::method::Method;
 use crate::params::Params;
 use crate::problem::Problem;
@@ -158,16 +160,6 @@ impl SixFreedoms {
         0.5 * self.grid.coarse_step_m
     }
 
-    /// The judge of a problem, with the parameters of this estimator.
-    pub(super) fn judge(&self, problem: &Problem) -> Judge {
-        Judge::new(problem, &self.render, &self.judge, 1)
-    }
-
-    /// Pixels that a pose must cover to have a say, given what the reference pose covers.
-    pub(super) fn least_covered(&self, initial: Score) -> u32 {
-        least_covered(self.grid.coverage_floor, initial.covered)
-    }
-
     /// How far from the reference an answer may be \[m\]: a little farther than the disc, as for FB.
     pub(super) fn reach(&self, problem: &Problem) -> f64 {
         problem.uncertainty_radius_m * (1.0 + self.radius_slack)
@@ -178,16 +170,16 @@ impl SixFreedoms {
         Comparison { score, ..self.view.scorer_of(problem).compare(pose) }
     }
 
-    /// Searches all of the disc.
+    /// Searches all of the disc, with the photos as they are.
     pub(super) fn search(
         &self,
         problem: &Problem,
-        judge: &Judge,
+        level: &Level,
         trace: &mut Trace<'_>,
     ) -> Result<Found, Halt> {
         let lattices = self.lattices(problem, self.params.yaws)?;
         self.view.color(problem, trace)?;
-        let initial = judge.score(&[Pose::identity()])[0];
+        let initial = level.initial;
         let rendered = |moment, evaluation, pose: &Pose, score| ViewRendered {
             moment,
             evaluation,
@@ -195,12 +187,7 @@ impl SixFreedoms {
             comparison: Arc::new(self.compare(problem, pose, score)),
         };
         trace.emit(|| rendered(Moment::Start, 0, &Pose::identity(), initial))?;
-        let mut search = Search {
-            judge,
-            covered_at_reference: initial.covered,
-            least_covered: self.least_covered(initial),
-            evaluations: 1,
-        };
+        let mut search = Search { level, evaluations: 1 };
         let surfaces = trace.stage(Stage::Search(Phase::PositionCoarse), |trace| {
             let mut surfaces = Vec::new();
             for lattice in lattices {
@@ -230,9 +217,7 @@ impl SixFreedoms {
             let more =
                 trace.stage(Stage::SearchCoarse, |trace| self.coarse_poses(problem, trace))?;
             search.evaluations += more.len() as u64;
-            let costs = judge.costs(&more, search.least_covered);
-            let more = more.into_iter().zip(costs);
-            finalists.extend(more.filter_map(|(pose, cost)| Some(Start { pose, cost: cost? })));
+            finalists.extend(level.starts(&more));
         }
         let mut refined = trace.stage(Stage::RefineSix, |trace| {
             search.refine(&finalists, &self.in_six(), price, trace)
@@ -246,10 +231,10 @@ impl SixFreedoms {
         }
         trace.stage(Stage::Assess, |trace| {
             let best = refined[0];
-            let score = judge.score(&[best.pose])[0];
+            let score = level.judge.score(&[best.pose])[0];
             let area = problem.query.intrinsics.area();
             let seed = problem.random_seed("shuffled pixels");
-            let shuffled = judge.shuffled(&best.pose, seed);
+            let shuffled = level.judge.shuffled(&best.pose, seed);
             let summary = CostSummary {
                 initial: initial.cost,
                 best: best.cost,
@@ -290,47 +275,35 @@ impl SixFreedoms {
     /// that they find what lies between the fine level's cells.
     fn coarse_poses(&self, problem: &Problem, trace: &mut Trace<'_>) -> Result<Vec<Pose>, Halt> {
         let shrink_by = self.params.coarse_shrink as u32;
-        let judge = Judge::new(problem, &self.render, &self.judge, shrink_by);
-        let least_covered = self.least_covered(judge.score(&[Pose::identity()])[0]);
+        let level = self.level(problem, shrink_by);
         let mut surfaces = Vec::new();
         for lattice in self.lattices(problem, self.params.coarse_yaws)? {
-            let score = |poses: &[Pose]| judge.score(poses);
+            let score = |poses: &[Pose]| level.judge.score(poses);
             let silently = |_: &[Scored]| trace.checkpoint();
-            let surface = scan(lattice, least_covered, judge.at_a_time(), score, silently)?;
+            let batch = level.judge.at_a_time();
+            let surface = scan(lattice, level.least_covered, batch, score, silently)?;
             surfaces.push(Arc::new(surface));
         }
-        let mut costs = |poses: &[Pose]| {
-            trace.checkpoint()?;
-            Ok::<_, Cancelled>(judge.costs(poses, least_covered))
-        };
         let spread = Spread::of(&surfaces);
         let price = |pose: &Pose, cost: f64| self.price(&spread, pose, cost);
         let starts = starts(&surfaces, 2 * self.params.starts, price);
         let most_m = self.most_m();
         let plan = Shrinking { last_m: most_m.min(0.1), ..self.in_the_plane() };
-        let plane = shrink(&starts, &plan, &mut costs)?;
+        let plane = level.refined(&starts, &plan, || trace.checkpoint())?;
         let plan = Shrinking {
             freedoms: Freedoms::Six,
             first_m: most_m.min(0.2),
             last_m: most_m.min(0.05),
             ..plan
         };
-        let six = shrink(&apart(plane, self.params.starts, price), &plan, &mut costs)?;
+        let best = apart(plane, self.params.starts, price);
+        let six = level.refined(&best, &plan, || trace.checkpoint())?;
 
-        let judge = Judge::new(problem, &self.render, &self.judge, shrink_by.div_ceil(2));
-        let least_covered = self.least_covered(judge.score(&[Pose::identity()])[0]);
-        let mut costs = |poses: &[Pose]| {
-            trace.checkpoint()?;
-            Ok::<_, Cancelled>(judge.costs(poses, least_covered))
-        };
+        let level = self.level(problem, shrink_by.div_ceil(2));
+        trace.checkpoint()?;
         let poses: Vec<Pose> = six.iter().map(|refined| refined.pose).collect();
-        let starts: Vec<Start> = poses
-            .iter()
-            .zip(costs(&poses)?)
-            .filter_map(|(&pose, cost)| Some(Start { pose, cost: cost? }))
-            .collect();
         let plan = Shrinking { last_m: most_m.min(0.025), ..plan };
-        let refined = shrink(&starts, &plan, &mut costs)?;
+        let refined = level.refined(&level.starts(&poses), &plan, || trace.checkpoint())?;
         let best = apart(refined, self.params.finalists, price);
         Ok(best.into_iter().map(|start| start.pose).collect())
     }
@@ -340,32 +313,25 @@ impl Estimator for SixFreedoms {
     fn estimate(&self, problem: &Problem, trace: &mut Trace<'_>) -> Result<Outcome, Cancelled> {
         leave_out(METHOD, JUDGED);
         let found = trace.stage(Stage::Estimator(METHOD), |trace| {
-            let judge = self.judge(problem);
-            self.search(problem, &judge, trace)
+            self.search(problem, &self.level(problem, 1), trace)
         });
-        Ok(match separate_failure(found)? {
-            Ok(found) => Outcome {
-                pose: Ok(problem.world_from_query(&found.refined[0].pose)),
-                counts: None,
-                cost: Some(found.summary),
-                fell_back: false,
-            },
-            Err(failure) => Outcome::failed(failure),
-        })
+        Ok(Outcome::searched(separate_failure(found)?.map(|found| {
+            let pose = problem.world_from_query(&found.refined[0].pose);
+            (pose, found.summary)
+        })))
     }
 
     fn compare_at(&self, problem: &Problem, world_from_query: &Pose) -> Option<Comparison> {
         let pose = problem.reference_from_query(world_from_query);
-        let score = self.judge(problem).score(&[pose])[0];
+        let judge = Judge::new(problem, &self.render, &self.judge, 1);
+        let score = judge.score(&[pose])[0];
         Some(self.compare(problem, &pose, score))
     }
 }
 
 /// The state of a search.
 struct Search<'a> {
-    judge: &'a Judge,
-    covered_at_reference: u32,
-    least_covered: u32,
+    level: &'a Level,
     evaluations: u64,
 }
 
@@ -375,7 +341,7 @@ impl Search<'_> {
         lattice: Lattice,
         trace: &mut Trace<'_>,
     ) -> Result<Arc<ScoredLattice>, Cancelled> {
-        let &mut Self { judge, covered_at_reference, least_covered, .. } = self;
+        let &Level { ref judge, initial, least_covered } = self.level;
         let phase = lattice.phase;
         let score = |poses: &[Pose]| judge.score(poses);
         let tell = |some: &[Scored]| {
@@ -383,7 +349,7 @@ impl Search<'_> {
             for &one in some {
                 let evaluation = self.evaluations;
                 self.evaluations += 1;
-                trace.emit(|| PoseScored::new(phase, evaluation, one, covered_at_reference))?;
+                trace.emit(|| PoseScored::new(phase, evaluation, one, initial.covered))?;
             }
             Ok(())
         };
@@ -403,11 +369,7 @@ impl Search<'_> {
         price: impl Fn(&Pose, f64) -> f64,
         trace: &mut Trace<'_>,
     ) -> Result<Vec<Refined>, Cancelled> {
-        let costs = |poses: &[Pose]| {
-            trace.checkpoint()?;
-            Ok::<_, Cancelled>(self.judge.costs(poses, self.least_covered))
-        };
-        let mut refined = shrink(starts, plan, costs)?;
+        let mut refined = self.level.refined(starts, plan, || trace.checkpoint())?;
         self.evaluations += refined.iter().map(|one| one.evaluations).sum::<u64>();
         refined.sort_by(|a, b| price(&a.pose, a.cost).total_cmp(&price(&b.pose, b.cost)));
         trace.emit(|| StartsRefined {

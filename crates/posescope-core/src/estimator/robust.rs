@@ -73,9 +73,9 @@ impl Robust {
         proposed: &[Proposed],
         trace: &mut Trace<'_>,
     ) -> Result<(Pose, Option<CostSummary>), Halt> {
-        let judge = self.six.judge(problem);
+        let level = self.six.level(problem, 1);
         let found = trace
-            .stage(Stage::Estimator(mi6::METHOD), |trace| self.six.search(problem, &judge, trace));
+            .stage(Stage::Estimator(mi6::METHOD), |trace| self.six.search(problem, &level, trace));
         let found = separate_failure(found)?;
         trace.stage(Stage::Judge, |trace| {
             let Found { refined, summary, spread } = match found {
@@ -94,7 +94,7 @@ impl Robust {
             for proposed in proposed {
                 let pose = proposed.agreed;
                 let checkpoint = || trace.checkpoint();
-                if let Some(refined) = self.six.refined(problem, &judge, pose, checkpoint)? {
+                if let Some(refined) = self.six.refined(problem, &level, pose, checkpoint)? {
                     candidates.push(JudgedPose {
                         method: proposed.method,
                         refined,

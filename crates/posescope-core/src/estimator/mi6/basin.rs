@@ -2,9 +2,9 @@
 
 use std::convert::Infallible;
 
-use super::SixFreedoms;
+use super::{Level, SixFreedoms};
 use crate::geometry::Pose;
-use crate::judge::{Judge, Refined, Start, shrink};
+use crate::judge::Refined;
 use crate::problem::Problem;
 
 impl SixFreedoms {
@@ -16,34 +16,24 @@ impl SixFreedoms {
     pub(in crate::estimator) fn refined<E>(
         &self,
         problem: &Problem,
-        judge: &Judge,
+        level: &Level,
         pose: Pose,
-        mut checkpoint: impl FnMut() -> Result<(), E>,
+        checkpoint: impl FnMut() -> Result<(), E>,
     ) -> Result<Option<Refined>, E> {
         let reach = self.reach(problem);
         if pose.translation.vector.norm() > reach {
             return Ok(None);
         }
-        let scores = judge.score(&[Pose::identity(), pose]);
-        let least_covered = self.least_covered(scores[0]);
-        let Some(cost) = scores[1].eligible_cost(least_covered) else {
-            return Ok(None);
-        };
-        let start = [Start { pose, cost }];
-        let refined = shrink(&start, &self.in_six(), |poses| {
-            checkpoint()?;
-            Ok(judge.costs(poses, least_covered))
-        })?;
+        let refined = level.refined(&level.starts(&[pose]), &self.in_six(), checkpoint)?;
         let inside = refined.first().filter(|one| one.pose.translation.vector.norm() <= reach);
         Ok(inside.copied())
     }
 
     /// The same for a pose that nobody searched from.
     pub fn basin_of(&self, problem: &Problem, reference_from_camera: &Pose) -> Option<Refined> {
-        let judge = self.judge(problem);
         let never = || Ok::<_, Infallible>(());
-        match self.refined(problem, &judge, *reference_from_camera, never) {
-            Ok(refined) => refined,
-        }
+        let Ok(refined) =
+            self.refined(problem, &self.level(problem, 1), *reference_from_camera, never);
+        refined
     }
 }
