@@ -14,6 +14,7 @@ mod hybrid;
 mod joint;
 mod mi6;
 mod robust;
+mod starts;
 
 pub use direct::Direct;
 pub use failure::Failure;
@@ -26,8 +27,9 @@ pub use hybrid::{Hybrid, HybridParts, hybrid_outcome};
 pub use joint::{
     JointDirect, JointEstimator, JointFeatures, JointHybrid, JointOutcome, JointReference,
 };
-pub use mi6::{SixFreedoms, SixParams};
+pub use mi6::SixFreedoms;
 pub use robust::{Robust, RobustParams};
+pub use starts::SixParams;
 
 use std::str::FromStr;
 use std::sync::LazyLock;

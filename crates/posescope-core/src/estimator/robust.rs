@@ -12,7 +12,8 @@ use std::sync::Arc;
 
 pub use params::RobustParams;
 
-use super::mi6::{self, Found, JUDGED, shown};
+use super::mi6::{self, JUDGED, shown};
+use super::starts::Found;
 use super::{
     CostSummary, Entry, Estimator, Failure, Family, FeatureBased, Halt, Outcome, SixFreedoms, fb2,
     separate_failure,
@@ -94,7 +95,7 @@ impl Robust {
             for proposed in proposed {
                 let pose = proposed.agreed;
                 let checkpoint = || trace.checkpoint();
-                if let Some(refined) = self.six.refined(problem, &level, pose, checkpoint)? {
+                if let Some(refined) = self.six.starts.refined(problem, &level, pose, checkpoint)? {
                     candidates.push(JudgedPose {
                         method: proposed.method,
                         refined,
@@ -109,7 +110,7 @@ impl Robust {
                 let is_agreed = candidate.from_features && candidate.accepted;
                 let credit = if is_agreed { self.params.credit } else { 0.0 };
                 let Refined { pose, cost, .. } = candidate.refined;
-                -spread.deviations(self.six.price(&spread, &pose, cost)) - credit
+                -spread.deviations(self.six.starts.price(&spread, &pose, cost)) - credit
             };
             candidates.sort_by(|a, b| price(a).total_cmp(&price(b)));
             let best = candidates[0].clone();
