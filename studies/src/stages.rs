@@ -1,6 +1,8 @@
 //! The stages by name: the same work for the benches and for the comparison with others.
 
-use posescope::cost::{self, Entropies, IntensityPair, LesserHalfFinder, Statistic};
+use posescope::cost::{
+    self, BinPair, Entropies, IntensityPair, LesserHalfFinder, Statistic, byte_bin,
+};
 use posescope::estimator;
 use posescope::features::{SurfParams, nearest_neighbours, surf};
 use posescope::geometry::Pose;
@@ -108,11 +110,17 @@ fn both_costs<R>(splat_px: usize, measure: impl FnOnce(usize, &mut Work<'_>) -> 
         unreachable!("MI looks at a joint histogram");
     };
     let mut halves = LesserHalfFinder::default();
-    let of_points: Vec<f32> = cloud.points.iter().map(|point| point.intensity).collect();
-    let values = Values { query: &query, points: &of_points };
+    // What PM and MI look at.
+    let both = |value: f32| (value, byte_bin(value, bins));
+    let of_points: Vec<_> = cloud.points.iter().map(|point| both(point.intensity)).collect();
+    let of_query: Vec<_> = query.iter().copied().map(both).collect();
+    let values = Values { query: &of_query, points: &of_points };
     let points = PointArrays::new(cloud.points.iter().map(|point| point.position));
     let mut canvas = DepthCanvas::new(&PAIR.query.intrinsics, splat_px);
-    let keep = |query, synthetic| IntensityPair { query, synthetic };
+    let keep = |query: (f32, u8), synthetic: (f32, u8)| {
+        let pair = IntensityPair { query: query.0, synthetic: synthetic.0 };
+        (pair.squared_difference(), BinPair { query: query.1, synthetic: synthetic.1 })
+    };
     let (mut differences, mut bin_pairs, mut counts) = (Vec::new(), Vec::new(), Vec::new());
     let poses = poses_of_a_disc();
     measure(poses.len(), &mut || {
@@ -120,8 +128,9 @@ fn both_costs<R>(splat_px: usize, measure: impl FnOnce(usize, &mut Work<'_>) -> 
         for pose in &poses {
             let pairs = canvas.draw(&points, values, &pose.inverse(), keep);
             differences.clear();
-            differences.extend(pairs.iter().map(IntensityPair::squared_difference));
-            cost::put_into_bins(pairs, bins, &mut bin_pairs);
+            differences.extend(pairs.iter().map(|pair| pair.0));
+            bin_pairs.clear();
+            bin_pairs.extend(pairs.iter().map(|pair| pair.1));
             cost::count_pairs(&bin_pairs, bins, &mut counts);
             covered += pairs.len();
             let information = cost(&Entropies::of(&counts, bins));

@@ -185,7 +185,7 @@ fn the_nmi_that_is_shown_is_one_less_the_recorded_cost() {
         let Some(Explanation::JointHistogram(histogram)) = &view.comparison.explanation else {
             panic!("MI explains itself by a histogram");
         };
-        let bits = histogram.query_entropy / 2_f64.ln();
+        let bits = histogram.entropies.query / 2_f64.ln();
         let entropies = text(&window, "H(Q) = ");
         assert!(entropies.starts_with(&format!("H(Q) = {bits:.3} bit, ")), "{entropies}");
     }

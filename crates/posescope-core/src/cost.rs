@@ -23,7 +23,6 @@ use rand_pcg::Pcg64;
 
 pub use joint_histogram::{
     Entropies, JointHistogram, LEAST_ENTROPY, MOST_BYTE_BINS, bin, byte_bin, count_pairs,
-    put_into_bins,
 };
 pub use lesser_half::{LesserHalf, LesserHalfFinder};
 pub use mutual_information::MutualInformation;
@@ -103,12 +102,14 @@ pub enum SearchRule {
     /// It scans a coarse-to-fine grid, as the paper does.
     #[default]
     Grid,
+    /// It refines many minima of a coarse grid in six freedoms, as `mi6` does.
+    Starts,
     /// It goes down from the reference pose by derivatives, as the methods do that the paper takes its
     /// costs from.
     Descent,
 }
 
-choice!(SearchRule: Grid = "grid", Descent = "descent");
+choice!(SearchRule: Grid = "grid", Starts = "starts", Descent = "descent");
 
 /// A cost whose parameters describe themselves.
 pub trait RegisteredCost: Cost + Describe + fmt::Debug {
@@ -180,7 +181,8 @@ impl Describe for CostSetting {
     fn fields(&mut self) -> Vec<Field<'_>> {
         let mut fields = self.cost.fields();
         if self.is_smooth {
-            let doc = "How the pose of least cost is found: over the grid, or from the reference pose downhill.";
+            let doc = "How the pose of least cost is found: over the grid, from many starts, or from the reference \
+                       pose downhill.";
             let about = About { name: "search", unit: "", doc };
             fields.push(Field::choice(about, &mut self.search));
         }

@@ -4,7 +4,6 @@
 //! A direct estimator is a registered [cost](crate::cost::ALL) with a search, so a new cost is a new
 //! method. Any other estimator is one file, its `mod` line and its [`Entry`] in [`all`].
 
-mod consensus;
 mod direct;
 mod failure;
 mod family;
@@ -15,6 +14,7 @@ mod hybrid;
 mod joint;
 mod mi6;
 mod robust;
+mod starts;
 
 pub use direct::Direct;
 pub use failure::Failure;
@@ -27,8 +27,9 @@ pub use hybrid::{Hybrid, HybridParts, hybrid_outcome};
 pub use joint::{
     JointDirect, JointEstimator, JointFeatures, JointHybrid, JointOutcome, JointReference,
 };
-pub use mi6::{SixFreedoms, SixParams};
+pub use mi6::SixFreedoms;
 pub use robust::{Robust, RobustParams};
+pub use starts::SixParams;
 
 use std::str::FromStr;
 use std::sync::LazyLock;
@@ -103,9 +104,22 @@ pub struct Outcome {
 }
 
 impl Outcome {
+    /// A pose, or why there is none, and nothing else.
+    pub fn of(pose: Result<Pose, Failure>) -> Self {
+        Self { pose, counts: None, cost: None, fell_back: false }
+    }
+
     /// No pose, and nothing to say but why.
     pub fn failed(failure: Failure) -> Self {
-        Self { pose: Err(failure), counts: None, cost: None, fell_back: false }
+        Self::of(Err(failure))
+    }
+
+    /// The end of a search.
+    fn searched(found: Result<(Pose, CostSummary), Failure>) -> Self {
+        match found {
+            Ok((pose, cost)) => Self { cost: Some(cost), ..Self::of(Ok(pose)) },
+            Err(failure) => Self::failed(failure),
+        }
     }
 }
 

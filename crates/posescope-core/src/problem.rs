@@ -204,6 +204,11 @@ impl Problem {
         xxhash_rust::xxh3::xxh3_64(text.as_bytes())
     }
 
+    /// The seed of the pixels that are shuffled to see what chance costs.
+    pub(crate) fn shuffle_seed(&self) -> u64 {
+        self.random_seed("shuffled pixels")
+    }
+
     /// A value that depends on these inputs, the query and the reference, kept with the query where both keep
     /// what is computed of them; else made now.
     pub(crate) fn try_recall<T: Send + Sync + 'static, E>(

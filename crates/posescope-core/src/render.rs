@@ -19,7 +19,7 @@ pub use points::{PointArrays, Values};
 pub use pool::MOST_AT_A_TIME;
 pub(crate) use pool::{Pool, ShownPoints, at_a_time};
 pub use projection::ProjectionRows;
-pub use score::Score;
+pub use score::{Objective, Score};
 pub use scorer::{Comparison, Scorer};
 pub use splat::{Rasterizer, SplattedPixel, SyntheticView};
 

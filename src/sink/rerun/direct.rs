@@ -10,7 +10,7 @@ use super::event_context::EventContext;
 use super::indexed;
 use super::stream::Stream;
 use super::surface::{self, CostRange};
-use crate::cost::Explanation;
+use crate::cost::{Entropies, Explanation};
 use crate::event::{Event, Moment, PhaseSearched, PoseScored, ViewRendered};
 use crate::grid::{Offset, Phase};
 use crate::picture::{self, Painter};
@@ -61,9 +61,8 @@ impl DirectContext {
         }
         stream.set_eval(Some(eval));
         if let Some(Explanation::JointHistogram(histogram)) = &comparison.explanation {
-            let entropies =
-                [histogram.query_entropy, histogram.synthetic_entropy, histogram.joint_entropy];
-            stream.log(&path("entropy"), &Scalars::new(entropies));
+            let Entropies { query, synthetic, joint } = histogram.entropies;
+            stream.log(&path("entropy"), &Scalars::new([query, synthetic, joint]));
         }
         if let Some(cost) = comparison.score.cost {
             stream.log(&path("best"), &Scalars::single(cost));

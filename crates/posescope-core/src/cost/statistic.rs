@@ -67,7 +67,7 @@ impl<'a> Statistic<'a> {
     /// The cost of these pairs; `None` where they decide nothing (no pair, constant image).
     pub fn cost(&self, pairs: &[IntensityPair]) -> Option<f64> {
         match self {
-            &Self::Histogram { bins, cost } => cost(&JointHistogram::of(pairs, bins).entropies()),
+            &Self::Histogram { bins, cost } => cost(&JointHistogram::of(pairs, bins).entropies),
             &Self::LesserHalf { power } => mean_of_lesser_half(&errors(pairs), power),
             Self::Pairs(cost) => cost(pairs),
         }
@@ -92,7 +92,7 @@ impl<'a> Statistic<'a> {
         match *self {
             Self::Histogram { bins, cost } => {
                 let histogram = JointHistogram::of(pairs, bins);
-                cost(&histogram.entropies())?;
+                cost(&histogram.entropies)?;
                 Some(Explanation::JointHistogram(histogram))
             }
             Self::LesserHalf { power } => {

@@ -230,6 +230,8 @@ fn left_behind(
             };
             (inliers.signals(evidence), confidence)
         }
+        // The coefficients of a cost were fitted to its search on the grid.
+        Family::Grid if evidence.settled.is_some() => return None,
         Family::Grid => {
             let minimum = Minimum::of(outcome, evidence)?;
             let deviations = minimum.deviations(evidence);

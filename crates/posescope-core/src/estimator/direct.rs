@@ -6,8 +6,9 @@ mod descend;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
+use super::starts::ManyStarts;
 use super::{CostSummary, Estimator, Failure, Halt, Outcome, separate_failure};
-use crate::cost::{self, Cost, CostSetting, SearchRule, shuffled};
+use crate::cost::{self, Cost, CostSetting, SearchRule};
 use crate::descent::DescentParams;
 use crate::event::{CloudColored, Moment, PhaseSearched, PoseScored, Stage, ViewRendered};
 use crate::geometry::Pose;
@@ -17,7 +18,7 @@ use crate::memo::{Key, Recalled, key};
 use crate::method::Method;
 use crate::params::Params;
 use crate::problem::Problem;
-use crate::render::{ColoredCloud, RenderParams, Score, Scorer, leave_out};
+use crate::render::{ColoredCloud, Objective as _, RenderParams, Score, Scorer, leave_out};
 use crate::trace::{Cancelled, Trace};
 
 /// A direct estimator: a cost and the way to search it.
@@ -28,6 +29,7 @@ pub struct Direct {
     render: RenderParams,
     pub(super) grid: GridParams,
     descent: DescentParams,
+    starts: ManyStarts,
     /// Which cost, with all its parameters.
     cost_key: Key,
 }
@@ -45,6 +47,7 @@ impl Direct {
             render: params.render.clone(),
             grid: params.grid.clone(),
             descent: params.descent.clone(),
+            starts: ManyStarts::new(params),
             cost_key,
         }
     }
@@ -63,6 +66,7 @@ impl Direct {
             render: params.render.clone(),
             grid: params.grid.clone(),
             descent: params.descent.clone(),
+            starts: ManyStarts::new(params),
             cost_key: key(("unregistered", MADE.fetch_add(1, Ordering::Relaxed))),
         }
     }
@@ -72,14 +76,10 @@ impl Estimator for Direct {
     fn estimate(&self, problem: &Problem, trace: &mut Trace<'_>) -> Result<Outcome, Cancelled> {
         let found = trace.stage(Stage::Estimator(self.method), |trace| match self.search {
             SearchRule::Grid => self.search_grid(problem, trace),
+            SearchRule::Starts => self.search_starts(problem, trace),
             SearchRule::Descent => self.descend(problem, trace),
         });
-        Ok(match separate_failure(found)? {
-            Ok((pose, cost)) => {
-                Outcome { pose: Ok(pose), counts: None, cost: Some(cost), fell_back: false }
-            }
-            Err(failure) => Outcome::failed(failure),
-        })
+        Ok(Outcome::searched(separate_failure(found)?))
     }
 
     fn scorer(&self, problem: &Problem) -> Option<Scorer<'_>> {
@@ -133,11 +133,8 @@ impl Direct {
             let summary = CostSummary {
                 initial: initial.cost,
                 best: best_cost,
-                shuffled: self.shuffled_cost(
-                    problem,
-                    &scorer,
-                    &best.offset.reference_from_camera(),
-                ),
+                shuffled: scorer
+                    .shuffled(&best.offset.reference_from_camera(), problem.shuffle_seed()),
                 runner_up: coarse
                     .and_then(|surface| surface.local_minima().get(1).map(|minimum| minimum.1)),
                 coverage_best: f64::from(score.covered) / area,
@@ -147,6 +144,21 @@ impl Direct {
             trace.emit(|| summary.assessed(best.offset))?;
             Ok((problem.world_from_query(&best.offset.reference_from_camera()), summary))
         })
+    }
+
+    /// The search of `mi6`, without its levels of smaller photos.
+    fn search_starts(
+        &self,
+        problem: &Problem,
+        trace: &mut Trace<'_>,
+    ) -> Result<(Pose, CostSummary), Halt> {
+        self.starts.check_size(problem)?;
+        self.color(problem, trace)?;
+        let scorer = self.scorer_of(problem);
+        let level = self.starts.level(self.scorer_of(problem));
+        let compare = |pose: &Pose, _| scorer.compare(pose);
+        let found = self.starts.search(problem, &level, None, &compare, trace)?;
+        Ok((problem.world_from_query(&found.refined[0].pose), found.summary))
     }
 
     /// Colours the cloud, and tells of it.
@@ -225,13 +237,6 @@ impl Direct {
         let mut known = found.value.iter().copied();
         let score = |poses: &[Pose]| known.by_ref().take(poses.len()).collect();
         scan(lattice, least_covered, batch, score, |some| tell(some, trace))
-    }
-
-    /// The cost at a pose if the view's pixels had nothing to do with the query's: what a minimum must beat to
-    /// mean anything.
-    fn shuffled_cost(&self, problem: &Problem, scorer: &Scorer<'_>, pose: &Pose) -> Option<f64> {
-        let seed = problem.random_seed("shuffled pixels");
-        self.cost.statistic().cost(&shuffled(&scorer.pairs(pose), seed))
     }
 }
 

@@ -1,38 +1,34 @@
 //! FB, the indirect feature-based method (paper, section 2.1 and appendix A).
 
 mod guide;
+mod lifted;
+mod matched;
 mod params;
 mod several;
 pub(super) mod states;
 
-use std::convert::Infallible;
 use std::sync::Arc;
-
-use nalgebra::Point2;
 
 pub(super) use self::guide::Guide;
 pub use self::guide::GuidedParams;
 use self::guide::last_matches;
+pub use self::lifted::projected_cloud;
+pub use self::matched::count_matches;
+pub(super) use self::matched::{Detected, Detector};
 pub use self::params::{DepthRule, FeatureParams};
 pub(super) use self::several::Gathered;
 use self::states::FeatureStates;
-use super::consensus::FoundConsensus;
 use super::{Estimator, Failure, FeatureCounts, Halt, Outcome, separate_failure};
-use crate::cloud::Cloud;
-use crate::depth::{DepthReading, LiftedMatch, ProjectedCloudIndex};
+use crate::depth::LiftedMatch;
 use crate::event::{
-    DepthsLifted, FeaturesClassified, FeaturesDetected, HypothesisTried, MatchesDecided,
-    MatchesGuided, PoseRefined, ProjectedCloud, Side, Stage,
+    DepthsLifted, FeaturesClassified, HypothesisTried, MatchesDecided, MatchesGuided, PoseRefined,
+    Stage,
 };
-use crate::features::{
-    Features, FoundMatches, Keypoint, Match, MatchVerdict, PairMatches, SiftFeatures, SiftParams,
-    SurfParams, best_matches, kept_surf, sift_interruptible,
-};
+use crate::features::Features;
 use crate::geometry::Pose;
-use crate::memo::Recalled;
 use crate::method::Method;
 use crate::params::Params;
-use crate::problem::{Problem, ReferenceTuple};
+use crate::problem::Problem;
 use crate::render::RenderParams;
 use crate::robust::{Consensus, Trial, mlesac, residuals};
 use crate::solver::Correspondence;
@@ -45,12 +41,6 @@ pub(super) const MINIMUM: usize = 4;
 /// were more, they are drawn again when somebody wants to hear them.
 const REMEMBERED_TRIALS: usize = 20_000;
 
-/// What matching decided about each query feature.
-type Decided = Arc<[Option<Match>]>;
-
-/// Matches lifted between two checkpoints.
-const LIFTED_AT_A_TIME: usize = 256;
-
 /// The feature-based estimator.
 pub struct FeatureBased {
     pub(super) method: Method,
@@ -62,29 +52,6 @@ pub struct FeatureBased {
     pub(super) purpose: &'static str,
     /// How features are matched again where the first pose says that they are.
     pub(super) guide: Option<Guide>,
-}
-
-/// What finds and describes features.
-#[derive(Debug)]
-pub(super) enum Detector {
-    /// SURF, or what somebody brought instead.
-    Surf(SurfParams),
-    Sift(SiftParams),
-}
-
-/// The features of one photo.
-#[derive(Clone)]
-pub(super) struct Described {
-    /// Without descriptors where these are SIFT's.
-    pub(super) features: Arc<Features>,
-    pub(super) sift: Option<Arc<SiftFeatures>>,
-    reused: bool,
-}
-
-/// The features of both photos.
-pub(super) struct Detected {
-    pub(super) query: Described,
-    pub(super) reference: Described,
 }
 
 /// A match and the pixels that it says belong together.
@@ -115,22 +82,15 @@ impl Estimator for FeatureBased {
 pub(super) struct Proposal {
     /// The answer.
     pub(super) outcome: Outcome,
-    /// The consensus that was accepted or refused; `None` where there was none.
-    pub(super) consensus: Option<Agreed>,
-}
-
-/// A consensus, in short.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Agreed {
-    /// The query camera in the reference camera's frame.
-    pub(super) reference_from_query: Pose,
+    /// The pose `reference_from_query` of the consensus that was accepted or refused; `None` where there was none.
+    pub(super) consensus: Option<Pose>,
 }
 
 /// What is known of a run, up to where it stops.
 #[derive(Default)]
 struct Progress {
     counts: FeatureCounts,
-    agreed: Option<Agreed>,
+    agreed: Option<Pose>,
     states: FeatureStates,
 }
 
@@ -186,10 +146,8 @@ impl FeatureBased {
         });
         Ok(Proposal {
             outcome: Outcome {
-                pose: separate_failure(pose)?,
                 counts: Some(progress.counts),
-                cost: None,
-                fell_back: false,
+                ..Outcome::of(separate_failure(pose)?)
             },
             consensus: progress.agreed,
         })
@@ -284,156 +242,10 @@ impl FeatureBased {
         // A feature that was matched again ends in the state of its last match.
         states.after_pose(&best.pairings, &best.residuals_px, threshold_px);
         *counts = states.counts(reference.keypoints.len());
-        *agreed = Some(Agreed { reference_from_query: best.pose.inverse() });
+        *agreed = Some(best.pose.inverse());
         trace.stage(Stage::Accept, |trace| {
-            let found = FoundConsensus {
-                reference_from_query: best.pose.inverse(),
-                acceptance: beyond.acceptance,
-                tested: beyond.tested,
-                counted: beyond.counted,
-                is_enough: self.accepts(&beyond.acceptance),
-                slack: self.slack(),
-            };
-            found.judged(problem, trace)
+            self.judged(&best.pose.inverse(), &beyond, problem, trace)
         })
-    }
-
-    fn detect(&self, problem: &Problem, trace: &mut Trace<'_>) -> Result<Detected, Halt> {
-        Ok(Detected {
-            query: self.describe(Side::Query, problem, trace)?,
-            reference: self.describe(Side::Reference, problem, trace)?,
-        })
-    }
-
-    fn describe(
-        &self,
-        side: Side,
-        problem: &Problem,
-        trace: &mut Trace<'_>,
-    ) -> Result<Described, Halt> {
-        let (photo, memo) = match side {
-            Side::Query => (&problem.query.photo, &problem.query.memo),
-            Side::Reference => (&problem.reference.photo, &problem.reference.memo),
-        };
-        let described = match &self.detector {
-            Detector::Surf(surf) => {
-                let found = match found_elsewhere(problem)? {
-                    Some(found) => Recalled::made(Arc::clone(match side {
-                        Side::Query => &found.query,
-                        Side::Reference => &found.reference,
-                    })),
-                    None => kept_surf(&photo.gray, memo, surf, || trace.checkpoint())?,
-                };
-                Described { features: found.value, sift: None, reused: found.reused }
-            }
-            Detector::Sift(sift) => {
-                let found = memo.try_recall(sift, SiftFeatures::heap_bytes, || {
-                    sift_interruptible(&photo.gray, sift, || trace.checkpoint())
-                })?;
-                let (keypoints, descriptors) = (found.value.keypoints.clone(), Vec::new());
-                let features = Arc::new(Features { keypoints, descriptors });
-                Described { features, sift: Some(found.value), reused: found.reused }
-            }
-        };
-        let features = &described.features;
-        trace.emit(|| FeaturesDetected { side, features: Arc::clone(features) })?;
-        Ok(described)
-    }
-
-    fn best_matches(
-        &self,
-        problem: &Problem,
-        Detected { query, reference }: &Detected,
-        trace: &mut Trace<'_>,
-    ) -> Result<Recalled<Decided>, Halt> {
-        if let Detector::Surf(_) = self.detector
-            && let Some(found) = found_elsewhere(problem)?
-        {
-            return Ok(Recalled::made(Arc::new(Arc::clone(&found.decisions))));
-        }
-        let FeatureParams { ratio, unique, .. } = self.params;
-        let bytes = |decided: &Decided| size_of_val(&**decided);
-        let found = problem.try_recall((&self.detector, ratio, unique), bytes, || {
-            let checkpoint = || trace.checkpoint();
-            match (&query.sift, &reference.sift) {
-                (Some(query), Some(reference)) => {
-                    let (query, reference) = (&query.descriptors, &reference.descriptors);
-                    decided(query, reference, &self.params, checkpoint)
-                }
-                _ => {
-                    let [query, reference] =
-                        [query, reference].map(|one| &one.features.descriptors);
-                    decided(query, reference, &self.params, checkpoint)
-                }
-            }
-        });
-        Ok(found?)
-    }
-
-    /// P = K⁻¹ p_R z: the keypoint's own pixel at the depth of the nearest projected point.
-    fn lift(
-        &self,
-        matches: &[(usize, usize)],
-        reference: &Features,
-        tuple: &ReferenceTuple,
-        trace: &mut Trace<'_>,
-    ) -> Result<Arc<[LiftedMatch]>, Cancelled> {
-        let cloud = projected_cloud(tuple, self.params.visible.then_some(&self.render));
-        trace.emit(|| ProjectedCloud { points: tuple.cloud.len(), in_view: cloud.len() })?;
-        let all = self.guide.as_ref().map(|_| self.lifted(tuple, reference));
-        let mut lifted = Vec::with_capacity(matches.len());
-        for matches in matches.chunks(LIFTED_AT_A_TIME) {
-            trace.checkpoint()?;
-            lifted.extend(matches.iter().map(|&(query, number)| match &all {
-                Some(all) => LiftedMatch { query, ..all[number] },
-                None => {
-                    let pixel = reference.keypoints[number].pixel();
-                    LiftedMatch { query, ..self.lifted_at(number, &pixel, &cloud, tuple) }
-                }
-            }));
-        }
-        Ok(lifted.into())
-    }
-
-    /// The depth of every feature of a reference, whatever it matches.
-    fn lifted(&self, tuple: &ReferenceTuple, reference: &Features) -> Arc<Vec<LiftedMatch>> {
-        let FeatureParams { visible, depth_radius_px, depth, depth_spread, .. } = self.params;
-        let bytes = |lifted: &Vec<LiftedMatch>| size_of_val(lifted.as_slice());
-        let depth = (visible, &self.render, depth_radius_px, depth, depth_spread);
-        let lifted = tuple.memo.recall((&self.detector, depth), bytes, || {
-            let cloud = projected_cloud(tuple, visible.then_some(&self.render));
-            let keypoints = reference.keypoints.iter().enumerate();
-            let lift = |(number, keypoint): (usize, &Keypoint)| {
-                self.lifted_at(number, &keypoint.pixel(), &cloud, tuple)
-            };
-            keypoints.map(lift).collect()
-        });
-        lifted.value
-    }
-
-    fn lifted_at(
-        &self,
-        reference: usize,
-        pixel: &Point2<f64>,
-        cloud: &ProjectedCloudIndex,
-        tuple: &ReferenceTuple,
-    ) -> LiftedMatch {
-        let reading = cloud.read(pixel, self.params.depth_radius_px);
-        LiftedMatch {
-            query: 0,
-            reference,
-            lidar_distance_px: reading.distance_px,
-            depth_range_m: reading.within.map(|depths| (depths.least, depths.greatest)),
-            point: self.depth(&reading).map(|z| tuple.intrinsics.unproject(pixel, z)),
-        }
-    }
-
-    fn depth(&self, reading: &DepthReading) -> Option<f64> {
-        let depths = reading.within?;
-        match self.params.depth {
-            DepthRule::Guarded if depths.relative_spread() > self.params.depth_spread => None,
-            DepthRule::Guarded | DepthRule::Nearest => Some(depths.nearest),
-        }
     }
 
     fn consensus(
@@ -496,13 +308,6 @@ impl FeatureBased {
     }
 }
 
-impl Detected {
-    /// Whether no pose can come of so few.
-    fn is_too_few(&self) -> bool {
-        [&self.query, &self.reference].iter().any(|one| one.features.keypoints.len() < MINIMUM)
-    }
-}
-
 impl Pairing {
     /// That of a match; `None` where it has no depth.
     pub(super) fn of(query: &Features, lifted: &LiftedMatch) -> Option<Self> {
@@ -515,63 +320,4 @@ impl Pairing {
 /// The correspondences of pairings, in their order.
 pub(super) fn correspondences(pairings: &[Pairing]) -> Vec<Correspondence> {
     pairings.iter().map(|pairing| pairing.correspondence).collect()
-}
-
-/// The matches that somebody brought, if any: what finds and matches features else.
-fn found_elsewhere(problem: &Problem) -> Result<Option<&FoundMatches>, Failure> {
-    match problem.matches.as_deref() {
-        None => Ok(None),
-        Some(PairMatches::Found(found)) => Ok(Some(found)),
-        Some(PairMatches::Absent) => Err(Failure::NotAnswered {
-            answers: "the folder of matches".to_owned(),
-            missing: format!("matches of {} with {}", problem.query.name, problem.reference.name),
-        }),
-    }
-}
-
-/// The best match of each query feature, and whether it stands out.
-fn decided<const N: usize, E>(
-    query: &[[f32; N]],
-    reference: &[[f32; N]],
-    params: &FeatureParams,
-    checkpoint: impl FnMut() -> Result<(), E>,
-) -> Result<Decided, E> {
-    let ratio = params.ratio as f32;
-    let mut matches = best_matches(query, reference, ratio, checkpoint)?;
-    if !params.unique {
-        for found in matches.iter_mut().flatten() {
-            if let MatchVerdict::NotUnique { .. } = found.verdict {
-                found.verdict = MatchVerdict::Candidate;
-            }
-        }
-    }
-    Ok(matches.into())
-}
-
-/// The cloud of a reference tuple projected into its own photo, kept with the tuple; where `visible` says how,
-/// without the points that something nearer hides from the camera, which the scanner beside it may have met all
-/// the same.
-pub fn projected_cloud(
-    tuple: &ReferenceTuple,
-    visible: Option<&RenderParams>,
-) -> Arc<ProjectedCloudIndex> {
-    let cloud = tuple.memo.recall(visible, ProjectedCloudIndex::heap_bytes, || match visible {
-        None => ProjectedCloudIndex::new(&tuple.cloud, &tuple.intrinsics),
-        Some(render) => {
-            let points = tuple.visible_cloud(render).positions().collect();
-            ProjectedCloudIndex::new(&Cloud { points }, &tuple.intrinsics)
-        }
-    });
-    cloud.value
-}
-
-/// How many features of the query have a match in the reference: FB's count after the ratio test and
-/// uniqueness, before any depth is looked up. Fusion weighs references by it.
-pub fn count_matches(query: &Features, reference: &Features, params: &FeatureParams) -> usize {
-    if query.keypoints.len() < MINIMUM || reference.keypoints.len() < MINIMUM {
-        return 0;
-    }
-    let (query, reference) = (&query.descriptors, &reference.descriptors);
-    let Ok(matches) = decided(query, reference, params, || Ok::<_, Infallible>(()));
-    matches.iter().flatten().filter(|found| found.verdict == MatchVerdict::Candidate).count()
 }

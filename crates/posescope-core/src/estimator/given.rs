@@ -26,15 +26,11 @@ impl Estimator for Given {
     fn estimate(&self, problem: &Problem, trace: &mut Trace<'_>) -> Result<Outcome, Cancelled> {
         let query = &problem.query.name;
         trace.stage(Stage::Estimator(self.method), |_| {
-            Ok(match self.estimates.get(query) {
-                Some(pose) => {
-                    Outcome { pose: Ok(*pose), counts: None, cost: None, fell_back: false }
-                }
-                None => Outcome::failed(Failure::NotAnswered {
-                    answers: self.method.name().to_owned(),
-                    missing: format!("pose of {query}"),
-                }),
-            })
+            let pose = self.estimates.get(query).copied();
+            Ok(Outcome::of(pose.ok_or_else(|| Failure::NotAnswered {
+                answers: self.method.name().to_owned(),
+                missing: format!("pose of {query}"),
+            })))
         })
     }
 }

@@ -3,33 +3,24 @@
 //! MI searches three freedoms one after the other: position first, with the reference's heading, then
 //! yaw. Three things keep it from the truth where it fails. Only one coarse minimum is followed; height,
 //! pitch and roll stay the reference's, which costs more information than the last decimetres give; and
-//! grey values alone change with the light. So here
-//!
-//! 1. coarse positions are scored at several yaws, at once and not one after the other,
-//! 2. many of their minima are starts, each refined in right, forward and yaw,
-//! 3. the best of those are refined in all six freedoms,
-//! 4. the cost is that of the [judge](crate::judge): three channels, less what chance gives,
-//! 5. and of minima that cost about the same the likelier pose stands.
+//! grey values alone change with the light. So here the [search](super::starts) has many starts and six freedoms,
+//! and the cost is that of the [judge](crate::judge): three channels, less what chance gives.
 
-mod basin;
-mod params;
-mod prior;
-
+use std::convert::Infallible;
 use std::sync::Arc;
 
-pub use params::SixParams;
-
 use super::direct::Direct;
-use super::{CostSummary, Entry, Estimator, Failure, Family, Halt, Outcome, separate_failure};
+use super::starts::{Found, Level, ManyStarts, Spread};
+use super::{Entry, Estimator, Family, Halt, Outcome, separate_failure};
 use crate::cost;
-use crate::event::{Moment, PhaseSearched, PoseScored, Stage, StartsRefined, ViewRendered};
-use crate::geometry::{Pose, PoseError};
-use crate::grid::{GridParams, Lattice, Offset, Phase, Scored, ScoredLattice, least_covered, scan};
-use crate::judge::{Freedoms, Judge, JudgeParams, Refined, Shrinking, Start, shrink};
+use crate::event::Stage;
+use crate::geometry::Pose;
+use crate::grid::ScoredLattice;
+use crate::judge::{Judge, JudgeParams, Refined};
 use crate::method::Method;
 use crate::params::Params;
 use crate::problem::Problem;
-use crate::render::{Comparison, RenderParams, Score, leave_out};
+use crate::render::{Comparison, Objective as _, RenderParams, Score, leave_out};
 use crate::trace::{Cancelled, Trace};
 
 /// The method.
@@ -51,126 +42,32 @@ pub(super) fn shown() -> &'static cost::Entry {
     shown.expect("the paper's cost is registered")
 }
 
-/// The step below which the refinement of all starts ends, before the best go on in six freedoms \[m\].
-const PLANE_LAST_M: f64 = 0.05;
-
 /// Why no graphics card takes what the judge scores.
 pub(super) const JUDGED: &str = "compares three channels at once";
 
-/// Starts nearer to each other than this are one, unless their headings differ.
-const SAME_M: f64 = 0.3;
-/// Starts whose headings differ by less are one where they are at one place.
-const SAME_DEG: f64 = 1.0;
-
 /// The search in six freedoms.
 pub struct SixFreedoms {
-    params: SixParams,
-    grid: GridParams,
+    pub(super) starts: ManyStarts,
     render: RenderParams,
     judge: JudgeParams,
-    /// How far outside the disc a pose may be, as a share of its radius.
-    radius_slack: f64,
     /// What draws the pictures: grey values, explained by the joint histogram of MI.
     view: Direct,
-}
-
-/// What the search found, in the frame of the reference camera.
-pub(super) struct Found {
-    /// The refined minima, the answer first; at least one.
-    pub(super) refined: Vec<Refined>,
-    /// What the least is worth.
-    pub(super) summary: CostSummary,
-    /// What the coarse positions cost.
-    pub(super) spread: Spread,
-}
-
-/// Middle and width of many costs.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Spread {
-    median: f64,
-    /// 1.4826 times the median distance from the median: the standard deviation, were they Gaussian.
-    deviation: f64,
-}
-
-impl Spread {
-    pub(super) fn of(surfaces: &[Arc<ScoredLattice>]) -> Self {
-        let cells = surfaces
-            .iter()
-            .flat_map(|surface| (0..surface.scores.len()).map(move |cell| (surface, cell)));
-        let mut costs: Vec<f64> =
-            cells.filter_map(|(surface, cell)| surface.eligible_cost(cell)).collect();
-        let median = middle(&mut costs);
-        let mut away: Vec<f64> = costs.iter().map(|cost| (cost - median).abs()).collect();
-        Self { median, deviation: 1.4826 * middle(&mut away) }
-    }
-
-    /// How far a cost is below the middle, in standard deviations.
-    pub(super) fn deviations(&self, cost: f64) -> f64 {
-        (self.median - cost) / self.deviation()
-    }
-
-    /// The standard deviation, which is never nothing.
-    pub(super) fn deviation(&self) -> f64 {
-        self.deviation.max(1e-9)
-    }
-}
-
-fn middle(values: &mut [f64]) -> f64 {
-    values.sort_unstable_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
 }
 
 impl SixFreedoms {
     /// The estimator with these parameters.
     pub fn new(params: &Params) -> Self {
         Self {
-            params: params.mi6.clone(),
-            grid: params.grid.clone(),
+            starts: ManyStarts::new(params),
             render: params.render.clone(),
             judge: params.judge.clone(),
-            radius_slack: params.fb.radius_slack,
             view: Direct::new(shown(), params),
         }
     }
 
-    /// The plan for the last refinement, in six freedoms.
-    pub(super) fn in_six(&self) -> Shrinking {
-        Shrinking {
-            freedoms: Freedoms::Six,
-            first_m: self.params.six_step_m.min(self.most_m()),
-            last_m: self.params.last_step_m,
-            rad_per_m: self.params.deg_per_m.to_radians(),
-        }
-    }
-
-    fn in_the_plane(&self) -> Shrinking {
-        Shrinking {
-            freedoms: Freedoms::Plane,
-            first_m: self.params.first_step_m.min(self.most_m()),
-            last_m: PLANE_LAST_M.min(self.most_m()),
-            rad_per_m: self.params.deg_per_m.to_radians(),
-        }
-    }
-
-    /// No step is longer than half of one between coarse positions \[m\]: it would only lead to where
-    /// another start is.
-    fn most_m(&self) -> f64 {
-        0.5 * self.grid.coarse_step_m
-    }
-
-    /// The judge of a problem, with the parameters of this estimator.
-    pub(super) fn judge(&self, problem: &Problem) -> Judge {
-        Judge::new(problem, &self.render, &self.judge, 1)
-    }
-
-    /// Pixels that a pose must cover to have a say, given what the reference pose covers.
-    pub(super) fn least_covered(&self, initial: Score) -> u32 {
-        least_covered(self.grid.coverage_floor, initial.covered)
-    }
-
-    /// How far from the reference an answer may be \[m\]: a little farther than the disc, as for FB.
-    pub(super) fn reach(&self, problem: &Problem) -> f64 {
-        problem.uncertainty_radius_m * (1.0 + self.radius_slack)
+    /// The cost with photos that are so many times smaller.
+    pub(super) fn level(&self, problem: &Problem, shrink: u32) -> Level<'static> {
+        self.starts.level(Judge::new(problem, &self.render, &self.judge, shrink))
     }
 
     /// The view at a pose beside the query, with the score that the judge gave it.
@@ -182,157 +79,26 @@ impl SixFreedoms {
     pub(super) fn search(
         &self,
         problem: &Problem,
-        judge: &Judge,
+        level: &Level<'_>,
         trace: &mut Trace<'_>,
     ) -> Result<Found, Halt> {
-        let lattices = self.lattices(problem, self.params.yaws)?;
+        self.starts.check_size(problem)?;
         self.view.color(problem, trace)?;
-        let initial = judge.score(&[Pose::identity()])[0];
-        let rendered = |moment, evaluation, pose: &Pose, score| ViewRendered {
-            moment,
-            evaluation,
-            offset: Offset::of(pose),
-            comparison: Arc::new(self.compare(problem, pose, score)),
-        };
-        trace.emit(|| rendered(Moment::Start, 0, &Pose::identity(), initial))?;
-        let mut search = Search {
-            judge,
-            covered_at_reference: initial.covered,
-            least_covered: self.least_covered(initial),
-            evaluations: 1,
-        };
-        let surfaces = trace.stage(Stage::Search(Phase::PositionCoarse), |trace| {
-            let mut surfaces = Vec::new();
-            for lattice in lattices {
-                surfaces.push(search.score(lattice, trace)?);
-            }
-            Ok::<_, Halt>(surfaces)
-        })?;
-        let spread = Spread::of(&surfaces);
-        let price = |pose: &Pose, cost: f64| self.price(&spread, pose, cost);
-        let starts = starts(&surfaces, self.params.starts, price);
-        if starts.is_empty() {
-            return Err(Halt::from(Failure::NothingComparable {
-                hypotheses: search.evaluations as usize,
-            }));
-        }
-        let flat: Vec<_> = surfaces.iter().map(|surface| surface.flat_cost()).collect();
-        if let Some(&Some((cost, hypotheses))) = flat.first()
-            && flat.iter().all(Option::is_some)
-        {
-            return Err(Halt::from(Failure::FlatCost { cost, hypotheses }));
-        }
-        let refined = trace.stage(Stage::RefinePlane, |trace| {
-            search.refine(&starts, &self.in_the_plane(), price, trace)
-        })?;
-        let mut finalists = apart(refined, self.params.finalists, price);
-        if self.params.coarse_shrink > 1 {
-            let more =
-                trace.stage(Stage::SearchCoarse, |trace| self.coarse_poses(problem, trace))?;
-            search.evaluations += more.len() as u64;
-            let costs = judge.costs(&more, search.least_covered);
-            let more = more.into_iter().zip(costs);
-            finalists.extend(more.filter_map(|(pose, cost)| Some(Start { pose, cost: cost? })));
-        }
-        let mut refined = trace.stage(Stage::RefineSix, |trace| {
-            search.refine(&finalists, &self.in_six(), price, trace)
-        })?;
-        // A walk may leave the disc, where no query can be.
-        let reach_m = self.reach(problem);
-        let minima = refined.len();
-        refined.retain(|one| one.pose.translation.vector.norm() <= reach_m);
-        if refined.is_empty() {
-            return Err(Halt::from(Failure::LedOutside { minima, reach_m }));
-        }
-        trace.stage(Stage::Assess, |trace| {
-            let best = refined[0];
-            let score = judge.score(&[best.pose])[0];
-            let area = problem.query.intrinsics.area();
-            let seed = problem.random_seed("shuffled pixels");
-            let shuffled = judge.shuffled(&best.pose, seed);
-            let summary = CostSummary {
-                initial: initial.cost,
-                best: best.cost,
-                shuffled,
-                runner_up: refined
-                    .iter()
-                    .skip(1)
-                    .find(|other| is_apart(&best.pose, &other.pose))
-                    .map(|other| other.cost),
-                coverage_best: f64::from(score.covered) / area,
-                coverage_reference: f64::from(initial.covered) / area,
-                evaluations: search.evaluations,
-            };
-            trace.emit(|| rendered(Moment::End, search.evaluations - 1, &best.pose, score))?;
-            trace.emit(|| summary.assessed(Offset::of(&best.pose)))?;
-            Ok(Found { refined, summary, spread })
-        })
+        let smaller = |shrink| self.level(problem, shrink);
+        let compare = |pose: &Pose, score| self.compare(problem, pose, score);
+        self.starts.search(problem, level, Some(&smaller), &compare, trace)
     }
 
-    /// A lattice of coarse positions for each yaw, the reference's own heading last: that one stays
-    /// where only one is shown.
-    fn lattices(&self, problem: &Problem, yaws: usize) -> Result<Vec<Lattice>, Failure> {
-        let middle = yaws / 2;
-        let mut yaws: Vec<f64> = (0..yaws)
-            .map(|k| (k as f64 - middle as f64) * self.params.yaw_step_deg.to_radians())
-            .collect();
-        yaws.sort_by(|a, b| b.abs().total_cmp(&a.abs()).then(a.total_cmp(b)));
-        let lattices = yaws.into_iter().map(|yaw_rad| {
-            let centre = Offset { yaw_rad, ..Offset::default() };
-            let radius = problem.uncertainty_radius_m;
-            Lattice::new(Phase::PositionCoarse, centre, radius, &self.grid).map_err(Failure::from)
-        });
-        lattices.collect()
+    /// Where a pose leads that nobody searched from, as [`ManyStarts::refined`] says.
+    pub fn basin_of(&self, problem: &Problem, reference_from_camera: &Pose) -> Option<Refined> {
+        let (level, never) = (self.level(problem, 1), || Ok::<_, Infallible>(()));
+        let Ok(refined) = self.starts.refined(problem, &level, *reference_from_camera, never);
+        refined
     }
 
-    /// Poses that two smaller copies of the photos lead to: the minima of the smallest, over a wider range
-    /// of headings, refined there in six freedoms and again at half the size. Their basins are wider, so
-    /// that they find what lies between the fine level's cells.
-    fn coarse_poses(&self, problem: &Problem, trace: &mut Trace<'_>) -> Result<Vec<Pose>, Halt> {
-        let shrink_by = self.params.coarse_shrink as u32;
-        let judge = Judge::new(problem, &self.render, &self.judge, shrink_by);
-        let least_covered = self.least_covered(judge.score(&[Pose::identity()])[0]);
-        let mut surfaces = Vec::new();
-        for lattice in self.lattices(problem, self.params.coarse_yaws)? {
-            let score = |poses: &[Pose]| judge.score(poses);
-            let silently = |_: &[Scored]| trace.checkpoint();
-            let surface = scan(lattice, least_covered, judge.at_a_time(), score, silently)?;
-            surfaces.push(Arc::new(surface));
-        }
-        let mut costs = |poses: &[Pose]| {
-            trace.checkpoint()?;
-            Ok::<_, Cancelled>(judge.costs(poses, least_covered))
-        };
-        let spread = Spread::of(&surfaces);
-        let price = |pose: &Pose, cost: f64| self.price(&spread, pose, cost);
-        let starts = starts(&surfaces, 2 * self.params.starts, price);
-        let most_m = self.most_m();
-        let plan = Shrinking { last_m: most_m.min(0.1), ..self.in_the_plane() };
-        let plane = shrink(&starts, &plan, &mut costs)?;
-        let plan = Shrinking {
-            freedoms: Freedoms::Six,
-            first_m: most_m.min(0.2),
-            last_m: most_m.min(0.05),
-            ..plan
-        };
-        let six = shrink(&apart(plane, self.params.starts, price), &plan, &mut costs)?;
-
-        let judge = Judge::new(problem, &self.render, &self.judge, shrink_by.div_ceil(2));
-        let least_covered = self.least_covered(judge.score(&[Pose::identity()])[0]);
-        let mut costs = |poses: &[Pose]| {
-            trace.checkpoint()?;
-            Ok::<_, Cancelled>(judge.costs(poses, least_covered))
-        };
-        let poses: Vec<Pose> = six.iter().map(|refined| refined.pose).collect();
-        let starts: Vec<Start> = poses
-            .iter()
-            .zip(costs(&poses)?)
-            .filter_map(|(&pose, cost)| Some(Start { pose, cost: cost? }))
-            .collect();
-        let plan = Shrinking { last_m: most_m.min(0.025), ..plan };
-        let refined = shrink(&starts, &plan, &mut costs)?;
-        let best = apart(refined, self.params.finalists, price);
-        Ok(best.into_iter().map(|start| start.pose).collect())
+    /// How much a pose costs more for being unlikely, where these are the coarse costs.
+    pub fn dearer(&self, coarse: &[Arc<ScoredLattice>], pose: &Pose) -> f64 {
+        self.starts.price(&Spread::of(coarse), pose, 0.0)
     }
 }
 
@@ -340,118 +106,18 @@ impl Estimator for SixFreedoms {
     fn estimate(&self, problem: &Problem, trace: &mut Trace<'_>) -> Result<Outcome, Cancelled> {
         leave_out(METHOD, JUDGED);
         let found = trace.stage(Stage::Estimator(METHOD), |trace| {
-            let judge = self.judge(problem);
-            self.search(problem, &judge, trace)
+            self.search(problem, &self.level(problem, 1), trace)
         });
-        Ok(match separate_failure(found)? {
-            Ok(found) => Outcome {
-                pose: Ok(problem.world_from_query(&found.refined[0].pose)),
-                counts: None,
-                cost: Some(found.summary),
-                fell_back: false,
-            },
-            Err(failure) => Outcome::failed(failure),
-        })
+        Ok(Outcome::searched(separate_failure(found)?.map(|found| {
+            let pose = problem.world_from_query(&found.refined[0].pose);
+            (pose, found.summary)
+        })))
     }
 
     fn compare_at(&self, problem: &Problem, world_from_query: &Pose) -> Option<Comparison> {
         let pose = problem.reference_from_query(world_from_query);
-        let score = self.judge(problem).score(&[pose])[0];
+        let judge = Judge::new(problem, &self.render, &self.judge, 1);
+        let score = judge.score(&[pose])[0];
         Some(self.compare(problem, &pose, score))
     }
-}
-
-/// The state of a search.
-struct Search<'a> {
-    judge: &'a Judge,
-    covered_at_reference: u32,
-    least_covered: u32,
-    evaluations: u64,
-}
-
-impl Search<'_> {
-    fn score(
-        &mut self,
-        lattice: Lattice,
-        trace: &mut Trace<'_>,
-    ) -> Result<Arc<ScoredLattice>, Cancelled> {
-        let &mut Self { judge, covered_at_reference, least_covered, .. } = self;
-        let phase = lattice.phase;
-        let score = |poses: &[Pose]| judge.score(poses);
-        let tell = |some: &[Scored]| {
-            trace.checkpoint()?;
-            for &one in some {
-                let evaluation = self.evaluations;
-                self.evaluations += 1;
-                trace.emit(|| PoseScored::new(phase, evaluation, one, covered_at_reference))?;
-            }
-            Ok(())
-        };
-        let surface = Arc::new(scan(lattice, least_covered, judge.at_a_time(), score, tell)?);
-        trace.emit(|| PhaseSearched {
-            best: surface.minimum().and_then(|cell| surface.lattice.offset(cell)),
-            surface: Arc::clone(&surface),
-        })?;
-        Ok(surface)
-    }
-
-    /// Refines the starts and tells where they came; the least price is first.
-    fn refine(
-        &mut self,
-        starts: &[Start],
-        plan: &Shrinking,
-        price: impl Fn(&Pose, f64) -> f64,
-        trace: &mut Trace<'_>,
-    ) -> Result<Vec<Refined>, Cancelled> {
-        let costs = |poses: &[Pose]| {
-            trace.checkpoint()?;
-            Ok::<_, Cancelled>(self.judge.costs(poses, self.least_covered))
-        };
-        let mut refined = shrink(starts, plan, costs)?;
-        self.evaluations += refined.iter().map(|one| one.evaluations).sum::<u64>();
-        refined.sort_by(|a, b| price(&a.pose, a.cost).total_cmp(&price(&b.pose, b.cost)));
-        trace.emit(|| StartsRefined {
-            freedoms: plan.freedoms,
-            refinements: refined.as_slice().into(),
-        })?;
-        Ok(refined)
-    }
-}
-
-/// The best minima of all lattices, no two of them at one place with one heading.
-fn starts(
-    surfaces: &[Arc<ScoredLattice>],
-    most: usize,
-    price: impl Fn(&Pose, f64) -> f64,
-) -> Vec<Start> {
-    let mut minima: Vec<Start> = surfaces
-        .iter()
-        .flat_map(|surface| {
-            let minima = surface.local_minima().into_iter();
-            minima.filter_map(|(cell, cost)| {
-                let offset = surface.lattice.offset(cell)?;
-                Some(Start { pose: offset.reference_from_camera(), cost })
-            })
-        })
-        .collect();
-    minima.sort_by(|a, b| price(&a.pose, a.cost).total_cmp(&price(&b.pose, b.cost)));
-    minima.truncate(most);
-    minima
-}
-
-/// The best of those that are refined, each at a place of its own.
-fn apart(mut refined: Vec<Refined>, most: usize, price: impl Fn(&Pose, f64) -> f64) -> Vec<Start> {
-    refined.sort_by(|a, b| price(&a.pose, a.cost).total_cmp(&price(&b.pose, b.cost)));
-    let mut kept: Vec<Start> = Vec::new();
-    for one in refined {
-        if kept.len() < most && kept.iter().all(|known| is_apart(&known.pose, &one.pose)) {
-            kept.push(Start { pose: one.pose, cost: one.cost });
-        }
-    }
-    kept
-}
-
-fn is_apart(a: &Pose, b: &Pose) -> bool {
-    let between = PoseError::between(a, b);
-    between.translation_m > SAME_M || between.rotation_deg > SAME_DEG
 }

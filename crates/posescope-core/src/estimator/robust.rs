@@ -12,8 +12,8 @@ use std::sync::Arc;
 
 pub use params::RobustParams;
 
-use super::feature::Agreed;
-use super::mi6::{self, Found, JUDGED, shown};
+use super::mi6::{self, JUDGED, shown};
+use super::starts::Found;
 use super::{
     CostSummary, Entry, Estimator, Failure, Family, FeatureBased, Halt, Outcome, SixFreedoms, fb2,
     separate_failure,
@@ -52,7 +52,8 @@ pub struct Robust {
 /// A consensus of features, accepted by its method or not.
 struct Proposed {
     method: Method,
-    agreed: Agreed,
+    /// `reference_from_query`.
+    agreed: Pose,
     accepted: bool,
 }
 
@@ -73,9 +74,9 @@ impl Robust {
         proposed: &[Proposed],
         trace: &mut Trace<'_>,
     ) -> Result<(Pose, Option<CostSummary>), Halt> {
-        let judge = self.six.judge(problem);
+        let level = self.six.level(problem, 1);
         let found = trace
-            .stage(Stage::Estimator(mi6::METHOD), |trace| self.six.search(problem, &judge, trace));
+            .stage(Stage::Estimator(mi6::METHOD), |trace| self.six.search(problem, &level, trace));
         let found = separate_failure(found)?;
         trace.stage(Stage::Judge, |trace| {
             let Found { refined, summary, spread } = match found {
@@ -92,9 +93,9 @@ impl Robust {
                 })
                 .collect();
             for proposed in proposed {
-                let pose = proposed.agreed.reference_from_query;
+                let pose = proposed.agreed;
                 let checkpoint = || trace.checkpoint();
-                if let Some(refined) = self.six.refined(problem, &judge, pose, checkpoint)? {
+                if let Some(refined) = self.six.starts.refined(problem, &level, pose, checkpoint)? {
                     candidates.push(JudgedPose {
                         method: proposed.method,
                         refined,
@@ -109,7 +110,7 @@ impl Robust {
                 let is_agreed = candidate.from_features && candidate.accepted;
                 let credit = if is_agreed { self.params.credit } else { 0.0 };
                 let Refined { pose, cost, .. } = candidate.refined;
-                -spread.deviations(self.six.price(&spread, &pose, cost)) - credit
+                -spread.deviations(self.six.starts.price(&spread, &pose, cost)) - credit
             };
             candidates.sort_by(|a, b| price(a).total_cmp(&price(b)));
             let best = candidates[0].clone();
@@ -152,7 +153,7 @@ fn unjudged(
         method: accepted.method,
         why: format!("there is no search to compare with: {failure}"),
     })?;
-    let pose = problem.world_from_query(&accepted.agreed.reference_from_query);
+    let pose = problem.world_from_query(&accepted.agreed);
     Ok((pose, None))
 }
 

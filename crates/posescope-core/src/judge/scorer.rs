@@ -16,8 +16,8 @@ use crate::geometry::Pose;
 use crate::image::{GrayImage, cubic_interpolated};
 use crate::problem::Problem;
 use crate::render::{
-    ColoredPoint, DepthCanvas, PointArrays, Pool, Rasterizer, RenderParams, Score, ShownPoints,
-    SplattedPixel, Values, at_a_time,
+    ColoredPoint, DepthCanvas, Objective, PointArrays, Pool, Rasterizer, RenderParams, Score,
+    ShownPoints, SplattedPixel, Values, at_a_time,
 };
 
 /// The bins of the three channels at one place.
@@ -66,11 +66,13 @@ impl Judge {
     pub fn points(&self) -> usize {
         self.reference.values.len()
     }
+}
 
+impl Objective for Judge {
     /// The scores of many cameras `reference_from_camera`, in their order, on all threads. `None` for
     /// the cost where no pixel is covered or all channels are constant, and for images of more than 16
     /// million pixels, which cannot be drawn.
-    pub fn score(&self, reference_from_camera: &[Pose]) -> Vec<Score> {
+    fn score(&self, reference_from_camera: &[Pose]) -> Vec<Score> {
         if !DepthCanvas::<u8>::can_draw(&self.intrinsics, self.splat_px) {
             return vec![Score { cost: None, covered: 0 }; reference_from_camera.len()];
         }
@@ -84,15 +86,11 @@ impl Judge {
         })
     }
 
-    /// The costs of some poses, `None` for those that cover fewer than `least_covered` pixels.
-    pub fn costs(&self, reference_from_camera: &[Pose], least_covered: u32) -> Vec<Option<f64>> {
-        let scores = self.score(reference_from_camera).into_iter();
-        scores.map(|score| score.eligible_cost(least_covered)).collect()
+    fn batch(&self, _hypotheses: usize) -> usize {
+        at_a_time()
     }
 
-    /// The cost at a pose if the view's pixels had nothing to do with the query's: what a minimum must
-    /// beat to mean anything.
-    pub fn shuffled(&self, reference_from_camera: &Pose, seed: u64) -> Option<f64> {
+    fn shuffled(&self, reference_from_camera: &Pose, seed: u64) -> Option<f64> {
         // What is dealt to whom depends on the order of the pixels. Each point shows its own number.
         let numbered = self.reference.positions.iter().zip(0_u32..);
         let points: Vec<ColoredPoint> = numbered
@@ -109,12 +107,6 @@ impl Judge {
         };
         let pairs: Vec<Pair<Bins>> = pixels.iter().zip(dealt).map(pair).collect();
         cost_of(&pairs, &self.params, &mut Vec::new())
-    }
-
-    /// How many poses to score at a time, so that a run can be stopped soon: at most
-    /// [`MOST_AT_A_TIME`](crate::render::MOST_AT_A_TIME).
-    pub fn at_a_time(&self) -> usize {
-        at_a_time()
     }
 }
 

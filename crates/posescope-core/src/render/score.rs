@@ -1,5 +1,7 @@
 //! What a hypothesis is worth.
 
+use crate::geometry::Pose;
+
 /// What a hypothesis is worth. The support always comes with the cost, because a mean over whatever
 /// is left in view rewards looking away.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
@@ -15,4 +17,17 @@ impl Score {
     pub fn eligible_cost(&self, least_covered: u32) -> Option<f64> {
         self.cost.filter(|cost| self.covered >= least_covered && !cost.is_nan())
     }
+}
+
+/// What a search minimises: a cost that scores many poses at once.
+pub trait Objective: Sync {
+    /// The scores of many cameras `reference_from_camera`, in their order.
+    fn score(&self, reference_from_camera: &[Pose]) -> Vec<Score>;
+
+    /// How many of so many hypotheses to score at a time, so that a run can be stopped soon.
+    fn batch(&self, hypotheses: usize) -> usize;
+
+    /// The cost at a pose if the view's pixels had nothing to do with the query's: what a minimum must beat to
+    /// mean anything.
+    fn shuffled(&self, reference_from_camera: &Pose, seed: u64) -> Option<f64>;
 }

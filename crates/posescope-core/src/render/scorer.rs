@@ -7,12 +7,13 @@ use std::sync::{Arc, OnceLock};
 use super::device::device_in_use;
 use super::pool::{Pool, ShownPoints, at_a_time};
 use super::{
-    ColoredCloud, DepthCanvas, PointArrays, Rasterizer, Score, SplattedPixel, SyntheticView, Values,
+    ColoredCloud, DepthCanvas, Objective, PointArrays, Rasterizer, Score, SplattedPixel,
+    SyntheticView, Values,
 };
 use crate::camera::Intrinsics;
 use crate::cost::{
     BinPair, Cost, Entropies, Explanation, IntensityPair, LesserHalfFinder, MOST_BYTE_BINS,
-    Statistic, byte_bin, count_pairs,
+    Statistic, byte_bin, count_pairs, shuffled,
 };
 use crate::geometry::Pose;
 use crate::image::FloatImage;
@@ -202,6 +203,20 @@ impl<'a> Scorer<'a> {
             synthetic: pixel.intensity,
         };
         pixels.iter().map(pair).collect()
+    }
+}
+
+impl Objective for Scorer<'_> {
+    fn score(&self, reference_from_camera: &[Pose]) -> Vec<Score> {
+        Scorer::score(self, reference_from_camera)
+    }
+
+    fn batch(&self, hypotheses: usize) -> usize {
+        self.at_a_time_of(hypotheses)
+    }
+
+    fn shuffled(&self, reference_from_camera: &Pose, seed: u64) -> Option<f64> {
+        self.statistic.cost(&shuffled(&self.pairs(reference_from_camera), seed))
     }
 }
 

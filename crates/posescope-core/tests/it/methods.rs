@@ -12,7 +12,7 @@ use posescope_core::judge::{Channels, Judge, JudgeParams, Refined};
 use posescope_core::method::Method;
 use posescope_core::params::Params;
 use posescope_core::problem::Problem;
-use posescope_core::render::RenderParams;
+use posescope_core::render::{Objective as _, RenderParams};
 use posescope_core::trace::Trace;
 
 use crate::two_walls::{cloud_of_the_walls, photo, problem, solvable};
@@ -121,6 +121,31 @@ fn refinements_take_no_steps_beyond_the_next_coarse_position() {
     let (_, usual) = usual.all::<StartsRefined>().next().expect("in the plane");
     let farthest = |of: &StartsRefined| of.refinements.iter().map(moved).fold(0.0, f64::max);
     assert!(farthest(refined) < farthest(usual));
+}
+
+#[test]
+fn any_cost_is_searched_from_many_starts_where_that_is_asked_for() {
+    let problem = solvable();
+    for (method, setting) in [("pm", "pm.search=starts"), ("mi", "mi.search=starts")] {
+        let (outcome, history) = told(method, &problem, &params(&[setting]));
+        let off = error(&problem, &outcome);
+        assert!(off.translation_m < 0.1, "{method}: {off}");
+        let cost = outcome.cost.expect("it searched");
+        assert!(cost.shuffled.expect("textured") > cost.best, "{method}");
+        for (_, searched) in history.all::<PhaseSearched>() {
+            let cell = searched.surface.minimum().expect("textured");
+            let on_lattice = searched.surface.eligible_cost(cell).expect("a cost");
+            assert!(cost.best < on_lattice, "{method}");
+        }
+        let (_, last) = history.all::<StartsRefined>().last().expect("refined");
+        assert_eq!(last.refinements[0].cost, cost.best, "{method}");
+        // The cost is the method's own.
+        let estimator = estimator::entry(method.parse().expect("a method"));
+        let estimator = estimator.make(&Params::default());
+        let pose = outcome.pose.as_ref().expect("a pose");
+        let compared = estimator.compare_at(&problem, pose).expect("a cost").score.cost;
+        assert!((compared.expect("textured") - cost.best).abs() < 1e-3, "{method}");
+    }
 }
 
 #[test]

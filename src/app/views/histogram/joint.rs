@@ -147,9 +147,9 @@ fn numbers(ui: &mut Ui, method: Method, shown: &Comparison, histogram: &JointHis
     let cost = estimator::find(method).and_then(Entry::cost);
     // The histogram's entropies are natural ones.
     let bits = |nats: f64| nats / std::f64::consts::LN_2;
-    let query = bits(histogram.query_entropy);
-    let synthetic = bits(histogram.synthetic_entropy);
-    let joint = bits(histogram.joint_entropy);
+    let query = bits(histogram.entropies.query);
+    let synthetic = bits(histogram.entropies.synthetic);
+    let joint = bits(histogram.entropies.joint);
     ui.label(format!("H(Q) = {query:.3} bit, H(S) = {synthetic:.3} bit, H(Q,S) = {joint:.3} bit"));
     let shared = query + synthetic - joint;
     ui.label(format!(

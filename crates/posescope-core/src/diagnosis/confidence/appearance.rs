@@ -12,7 +12,7 @@ use crate::geometry::{Pose, yaw};
 use crate::judge::{Judge, moved};
 use crate::params::Params;
 use crate::problem::Problem;
-use crate::render::Score;
+use crate::render::{Objective as _, Score};
 use crate::stats::median_and_deviation;
 
 /// How closely one looks. A method's coefficients belong to its look.

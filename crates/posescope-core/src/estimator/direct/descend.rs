@@ -14,7 +14,7 @@ use crate::geometry::Pose;
 use crate::grid::{Lattice, Offset, Phase, Scored, least_covered};
 use crate::image::{FloatImage, gaussian_smoothed};
 use crate::problem::Problem;
-use crate::render::{ColoredCloud, Score, Scorer};
+use crate::render::{ColoredCloud, Objective as _, Score, Scorer};
 use crate::trace::Trace;
 
 /// Where a descent stands.
@@ -104,7 +104,7 @@ impl Direct {
             let summary = CostSummary {
                 initial: initial.cost,
                 best,
-                shuffled: self.shuffled_cost(problem, &scorer, &pose),
+                shuffled: scorer.shuffled(&pose, problem.shuffle_seed()),
                 runner_up: None,
                 coverage_best: f64::from(score.covered) / area,
                 coverage_reference: f64::from(initial.covered) / area,

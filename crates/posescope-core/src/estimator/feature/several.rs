@@ -4,6 +4,8 @@ use super::states::FeatureStates;
 use super::{FeatureBased, Pairing};
 use crate::camera::Intrinsics;
 use crate::estimator::{Failure, Halt};
+use crate::event::ConsensusJudged;
+use crate::geometry::Pose;
 use crate::problem::Problem;
 use crate::robust::{
     Acceptance, AcceptanceRule, Counted, MlesacError, MlesacParams, Places, effective_area_px,
@@ -131,15 +133,40 @@ impl FeatureBased {
     }
 
     /// Whether the rule accepts a verdict.
-    pub(in crate::estimator) fn accepts(&self, acceptance: &Acceptance) -> bool {
+    fn accepts(&self, acceptance: &Acceptance) -> bool {
         self.params.accept.accepts(acceptance)
     }
 
-    /// How far outside the prior a pose may be, as a share of that; `None` for anywhere. The paper's rule
-    /// asks for inliers alone.
-    pub(in crate::estimator) fn slack(&self) -> Option<f64> {
-        let is_asked = self.params.accept == AcceptanceRule::Consensus;
-        is_asked.then_some(self.params.radius_slack)
+    /// The query's pose in the world, if a consensus becomes one.
+    ///
+    /// # Errors
+    /// [`Failure::ChanceConsensus`], [`Failure::OutsideRadius`], or a run that was cancelled.
+    pub(in crate::estimator) fn judged(
+        &self,
+        reference_from_query: &Pose,
+        &BeyondChance { acceptance, tested, counted }: &BeyondChance,
+        problem: &Problem,
+        trace: &mut Trace<'_>,
+    ) -> Result<Pose, Halt> {
+        let distance_m = reference_from_query.translation.vector.norm();
+        let radius_m = problem.believed_within_m();
+        // The paper's rule asks for inliers alone.
+        let is_bounded = self.params.accept == AcceptanceRule::Consensus;
+        let verdict = if !self.accepts(&acceptance) {
+            let needed = acceptance.needed.unwrap_or(tested + 1);
+            let inliers = acceptance.inliers;
+            Err(Failure::ChanceConsensus { inliers, tested, needed, counted })
+        } else if is_bounded && distance_m > radius_m * (1.0 + self.params.radius_slack) {
+            Err(Failure::OutsideRadius { distance_m, radius_m })
+        } else {
+            Ok(())
+        };
+        trace.emit(|| {
+            let accepted = verdict.is_ok();
+            ConsensusJudged { acceptance, counted, distance_m, accepted }
+        })?;
+        verdict?;
+        Ok(problem.world_from_query(reference_from_query))
     }
 }
 

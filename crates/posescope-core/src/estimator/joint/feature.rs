@@ -1,7 +1,6 @@
 //! FB of several references: the correspondences of all in one MLESAC.
 
 use super::{JointEstimator, JointOutcome, JointReference, between, lead};
-use crate::estimator::consensus::FoundConsensus;
 use crate::estimator::feature::{FeatureBased, Gathered, MINIMUM};
 use crate::estimator::{Failure, Halt, separate_failure};
 use crate::event::Stage;
@@ -106,15 +105,9 @@ impl JointFeatures {
             .max_by(|&a, &b| inliers(a).total_cmp(&inliers(b)))
             .unwrap_or_default();
         let nearest = references[most].problem;
-        let found = FoundConsensus {
-            reference_from_query: between(nearest, lead) * consensus.pose.inverse(),
-            acceptance: beyond.acceptance,
-            tested: beyond.tested,
-            counted: beyond.counted,
-            is_enough: self.features.accepts(&beyond.acceptance),
-            slack: self.features.slack(),
-        };
-        let pose = found.judged(nearest, &mut Trace::off())?;
+        let reference_from_query = between(nearest, lead) * consensus.pose.inverse();
+        let features = &self.features;
+        let pose = features.judged(&reference_from_query, &beyond, nearest, &mut Trace::off())?;
         Ok((pose, supports))
     }
 }

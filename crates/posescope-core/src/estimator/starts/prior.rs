@@ -6,24 +6,17 @@
 //! a weak belief, and is worth little: what it takes off never exceeds a few standard deviations of the coarse
 //! costs, where minima of one condition are tens of them deep.
 
-use std::sync::Arc;
-
 use nalgebra::Vector3;
 
-use super::{SixFreedoms, SixParams, Spread};
+use super::{ManyStarts, SixParams, Spread};
 use crate::geometry::Pose;
-use crate::grid::{Offset, ScoredLattice};
+use crate::grid::Offset;
 
-impl SixFreedoms {
+impl ManyStarts {
     /// What a pose and its cost are worth: the cost, and more for a pose that is less likely, by the
     /// standard deviation of the coarse costs.
     pub(in crate::estimator) fn price(&self, spread: &Spread, pose: &Pose, cost: f64) -> f64 {
         cost + spread.deviation() * unlikeliness(&self.params, pose)
-    }
-
-    /// How much dearer a pose is for being unlikely, where these are the coarse costs.
-    pub fn dearer(&self, coarse: &[Arc<ScoredLattice>], pose: &Pose) -> f64 {
-        self.price(&Spread::of(coarse), pose, 0.0)
     }
 }
 
@@ -74,7 +67,7 @@ mod tests {
 
     #[test]
     fn of_refined_poses_the_likelier_comes_first_where_the_other_is_hardly_cheaper() {
-        let six = SixFreedoms::new(&Params::default());
+        let six = ManyStarts::new(&Params::default());
         let spread = Spread { median: 1.0, deviation: 0.01 };
         let lifted = Pose::translation(5.0, -six.params.usual_height_m, 0.0);
         let refined = |pose: Pose, cost: f64| Refined {

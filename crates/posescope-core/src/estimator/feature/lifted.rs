@@ -1,0 +1,106 @@
+//! The depth of features, from the points that are projected near them.
+
+use std::sync::Arc;
+
+use nalgebra::Point2;
+
+use super::{DepthRule, FeatureBased, FeatureParams};
+use crate::cloud::Cloud;
+use crate::depth::{DepthReading, LiftedMatch, ProjectedCloudIndex};
+use crate::event::ProjectedCloud;
+use crate::features::{Features, Keypoint};
+use crate::problem::ReferenceTuple;
+use crate::render::RenderParams;
+use crate::trace::{Cancelled, Trace};
+
+/// Matches lifted between two checkpoints.
+const LIFTED_AT_A_TIME: usize = 256;
+
+impl FeatureBased {
+    /// P = K⁻¹ p_R z: the keypoint's own pixel at the depth of the nearest projected point.
+    pub(super) fn lift(
+        &self,
+        matches: &[(usize, usize)],
+        reference: &Features,
+        tuple: &ReferenceTuple,
+        trace: &mut Trace<'_>,
+    ) -> Result<Arc<[LiftedMatch]>, Cancelled> {
+        let cloud = projected_cloud(tuple, self.params.visible.then_some(&self.render));
+        trace.emit(|| ProjectedCloud { points: tuple.cloud.len(), in_view: cloud.len() })?;
+        let all = self.guide.as_ref().map(|_| self.lifted(tuple, reference));
+        let mut lifted = Vec::with_capacity(matches.len());
+        for matches in matches.chunks(LIFTED_AT_A_TIME) {
+            trace.checkpoint()?;
+            lifted.extend(matches.iter().map(|&(query, number)| match &all {
+                Some(all) => LiftedMatch { query, ..all[number] },
+                None => {
+                    let pixel = reference.keypoints[number].pixel();
+                    LiftedMatch { query, ..self.lifted_at(number, &pixel, &cloud, tuple) }
+                }
+            }));
+        }
+        Ok(lifted.into())
+    }
+
+    /// The depth of every feature of a reference, whatever it matches.
+    pub(super) fn lifted(
+        &self,
+        tuple: &ReferenceTuple,
+        reference: &Features,
+    ) -> Arc<Vec<LiftedMatch>> {
+        let FeatureParams { visible, depth_radius_px, depth, depth_spread, .. } = self.params;
+        let bytes = |lifted: &Vec<LiftedMatch>| size_of_val(lifted.as_slice());
+        let depth = (visible, &self.render, depth_radius_px, depth, depth_spread);
+        let lifted = tuple.memo.recall((&self.detector, depth), bytes, || {
+            let cloud = projected_cloud(tuple, visible.then_some(&self.render));
+            let keypoints = reference.keypoints.iter().enumerate();
+            let lift = |(number, keypoint): (usize, &Keypoint)| {
+                self.lifted_at(number, &keypoint.pixel(), &cloud, tuple)
+            };
+            keypoints.map(lift).collect()
+        });
+        lifted.value
+    }
+
+    fn lifted_at(
+        &self,
+        reference: usize,
+        pixel: &Point2<f64>,
+        cloud: &ProjectedCloudIndex,
+        tuple: &ReferenceTuple,
+    ) -> LiftedMatch {
+        let reading = cloud.read(pixel, self.params.depth_radius_px);
+        LiftedMatch {
+            query: 0,
+            reference,
+            lidar_distance_px: reading.distance_px,
+            depth_range_m: reading.within.map(|depths| (depths.least, depths.greatest)),
+            point: self.depth(&reading).map(|z| tuple.intrinsics.unproject(pixel, z)),
+        }
+    }
+
+    fn depth(&self, reading: &DepthReading) -> Option<f64> {
+        let depths = reading.within?;
+        match self.params.depth {
+            DepthRule::Guarded if depths.relative_spread() > self.params.depth_spread => None,
+            DepthRule::Guarded | DepthRule::Nearest => Some(depths.nearest),
+        }
+    }
+}
+
+/// The cloud of a reference tuple projected into its own photo, kept with the tuple; where `visible` says how,
+/// without the points that something nearer hides from the camera, which the scanner beside it may have met all
+/// the same.
+pub fn projected_cloud(
+    tuple: &ReferenceTuple,
+    visible: Option<&RenderParams>,
+) -> Arc<ProjectedCloudIndex> {
+    let cloud = tuple.memo.recall(visible, ProjectedCloudIndex::heap_bytes, || match visible {
+        None => ProjectedCloudIndex::new(&tuple.cloud, &tuple.intrinsics),
+        Some(render) => {
+            let points = tuple.visible_cloud(render).positions().collect();
+            ProjectedCloudIndex::new(&Cloud { points }, &tuple.intrinsics)
+        }
+    });
+    cloud.value
+}

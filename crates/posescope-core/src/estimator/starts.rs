@@ -1,0 +1,366 @@
+//! The search from many starts, in six freedoms, for any cost.
+//!
+//! 1. Coarse positions are scored at several yaws, at once and not one after the other,
+//! 2. many of their minima are starts, each refined in right, forward and yaw,
+//! 3. the best of those are refined in all six freedoms,
+//! 4. and of minima that cost about the same the likelier pose stands.
+
+mod level;
+mod params;
+mod prior;
+
+use std::sync::Arc;
+
+pub(super) use level::Level;
+pub use params::SixParams;
+
+use super::{CostSummary, Failure, Halt};
+use crate::event::{Moment, PhaseSearched, PoseScored, Stage, StartsRefined, ViewRendered};
+use crate::geometry::{Pose, PoseError};
+use crate::grid::{GridParams, Lattice, Offset, Phase, Scored, ScoredLattice, scan};
+use crate::judge::{Freedoms, Refined, Shrinking, Start};
+use crate::params::Params;
+use crate::problem::Problem;
+use crate::render::{Comparison, Score};
+use crate::trace::{Cancelled, Trace};
+
+/// The step below which the refinement of all starts ends, before the best go on in six freedoms \[m\].
+const PLANE_LAST_M: f64 = 0.05;
+
+/// Starts nearer to each other than this are one, unless their headings differ.
+const SAME_M: f64 = 0.3;
+/// Starts whose headings differ by less are one where they are at one place.
+const SAME_DEG: f64 = 1.0;
+
+/// The search from many starts.
+pub(super) struct ManyStarts {
+    params: SixParams,
+    grid: GridParams,
+    /// How far outside the disc a pose may be, as a share of its radius.
+    radius_slack: f64,
+}
+
+/// What the search found, in the frame of the reference camera.
+pub(super) struct Found {
+    /// The refined minima, the answer first; at least one.
+    pub(super) refined: Vec<Refined>,
+    /// What the least is worth.
+    pub(super) summary: CostSummary,
+    /// What the coarse positions cost.
+    pub(super) spread: Spread,
+}
+
+/// Middle and width of many costs.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Spread {
+    median: f64,
+    /// 1.4826 times the median distance from the median: the standard deviation, were they Gaussian.
+    deviation: f64,
+}
+
+impl Spread {
+    pub(super) fn of(surfaces: &[Arc<ScoredLattice>]) -> Self {
+        let cells = surfaces
+            .iter()
+            .flat_map(|surface| (0..surface.scores.len()).map(move |cell| (surface, cell)));
+        let mut costs: Vec<f64> =
+            cells.filter_map(|(surface, cell)| surface.eligible_cost(cell)).collect();
+        let median = middle(&mut costs);
+        let mut away: Vec<f64> = costs.iter().map(|cost| (cost - median).abs()).collect();
+        Self { median, deviation: 1.4826 * middle(&mut away) }
+    }
+
+    /// How far a cost is below the middle, in standard deviations.
+    pub(super) fn deviations(&self, cost: f64) -> f64 {
+        (self.median - cost) / self.deviation()
+    }
+
+    /// The standard deviation, which is never nothing.
+    pub(super) fn deviation(&self) -> f64 {
+        self.deviation.max(1e-9)
+    }
+}
+
+fn middle(values: &mut [f64]) -> f64 {
+    values.sort_unstable_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
+}
+
+impl ManyStarts {
+    /// The search with these parameters.
+    pub(super) fn new(params: &Params) -> Self {
+        Self {
+            params: params.mi6.clone(),
+            grid: params.grid.clone(),
+            radius_slack: params.fb.radius_slack,
+        }
+    }
+
+    /// The plan for the last refinement, in six freedoms.
+    fn in_six(&self) -> Shrinking {
+        Shrinking {
+            freedoms: Freedoms::Six,
+            first_m: self.params.six_step_m.min(self.most_m()),
+            last_m: self.params.last_step_m,
+            rad_per_m: self.params.deg_per_m.to_radians(),
+        }
+    }
+
+    fn in_the_plane(&self) -> Shrinking {
+        Shrinking {
+            freedoms: Freedoms::Plane,
+            first_m: self.params.first_step_m.min(self.most_m()),
+            last_m: PLANE_LAST_M.min(self.most_m()),
+            rad_per_m: self.params.deg_per_m.to_radians(),
+        }
+    }
+
+    /// No step is longer than half of one between coarse positions \[m\]: it would only lead to where
+    /// another start is.
+    fn most_m(&self) -> f64 {
+        0.5 * self.grid.coarse_step_m
+    }
+
+    /// How far from the reference an answer may be \[m\]: a little farther than the disc, as for FB.
+    fn reach(&self, problem: &Problem) -> f64 {
+        problem.uncertainty_radius_m * (1.0 + self.radius_slack)
+    }
+
+    /// Fails where a lattice is too large.
+    pub(super) fn check_size(&self, problem: &Problem) -> Result<(), Failure> {
+        self.lattices(problem, self.params.yaws).map(|_| ())
+    }
+
+    /// Searches all of the disc. `level` has the photos as they are, and `smaller` makes levels of smaller ones,
+    /// where there are any; `compare` shows a pose.
+    pub(super) fn search(
+        &self,
+        problem: &Problem,
+        level: &Level<'_>,
+        smaller: Option<&dyn Fn(u32) -> Level<'static>>,
+        compare: &dyn Fn(&Pose, Score) -> Comparison,
+        trace: &mut Trace<'_>,
+    ) -> Result<Found, Halt> {
+        let lattices = self.lattices(problem, self.params.yaws)?;
+        let initial = level.initial;
+        let rendered = |moment, evaluation, pose: &Pose, score| ViewRendered {
+            moment,
+            evaluation,
+            offset: Offset::of(pose),
+            comparison: Arc::new(compare(pose, score)),
+        };
+        trace.emit(|| rendered(Moment::Start, 0, &Pose::identity(), initial))?;
+        let mut search = Search { level, evaluations: 1 };
+        let surfaces = trace.stage(Stage::Search(Phase::PositionCoarse), |trace| {
+            let mut surfaces = Vec::new();
+            for lattice in lattices {
+                surfaces.push(search.score(lattice, trace)?);
+            }
+            Ok::<_, Halt>(surfaces)
+        })?;
+        let spread = Spread::of(&surfaces);
+        let price = |pose: &Pose, cost: f64| self.price(&spread, pose, cost);
+        let starts = starts(&surfaces, self.params.starts, price);
+        if starts.is_empty() {
+            return Err(Halt::from(Failure::NothingComparable {
+                hypotheses: search.evaluations as usize,
+            }));
+        }
+        let flat: Vec<_> = surfaces.iter().map(|surface| surface.flat_cost()).collect();
+        if let Some(&Some((cost, hypotheses))) = flat.first()
+            && flat.iter().all(Option::is_some)
+        {
+            return Err(Halt::from(Failure::FlatCost { cost, hypotheses }));
+        }
+        let refined = trace.stage(Stage::RefinePlane, |trace| {
+            search.refine(&starts, &self.in_the_plane(), price, trace)
+        })?;
+        let mut finalists = apart(refined, self.params.finalists, price);
+        if let Some(smaller) = smaller.filter(|_| self.params.coarse_shrink > 1) {
+            let more = trace
+                .stage(Stage::SearchCoarse, |trace| self.coarse_poses(problem, smaller, trace))?;
+            search.evaluations += more.len() as u64;
+            finalists.extend(level.starts(&more));
+        }
+        let mut refined = trace.stage(Stage::RefineSix, |trace| {
+            search.refine(&finalists, &self.in_six(), price, trace)
+        })?;
+        // A walk may leave the disc, where no query can be.
+        let reach_m = self.reach(problem);
+        let minima = refined.len();
+        refined.retain(|one| one.pose.translation.vector.norm() <= reach_m);
+        if refined.is_empty() {
+            return Err(Halt::from(Failure::LedOutside { minima, reach_m }));
+        }
+        trace.stage(Stage::Assess, |trace| {
+            let best = refined[0];
+            let score = level.objective.score(&[best.pose])[0];
+            let area = problem.query.intrinsics.area();
+            let shuffled = level.objective.shuffled(&best.pose, problem.shuffle_seed());
+            let summary = CostSummary {
+                initial: initial.cost,
+                best: best.cost,
+                shuffled,
+                runner_up: refined
+                    .iter()
+                    .skip(1)
+                    .find(|other| is_apart(&best.pose, &other.pose))
+                    .map(|other| other.cost),
+                coverage_best: f64::from(score.covered) / area,
+                coverage_reference: f64::from(initial.covered) / area,
+                evaluations: search.evaluations,
+            };
+            trace.emit(|| rendered(Moment::End, search.evaluations - 1, &best.pose, score))?;
+            trace.emit(|| summary.assessed(Offset::of(&best.pose)))?;
+            Ok(Found { refined, summary, spread })
+        })
+    }
+
+    /// A lattice of coarse positions for each yaw, the reference's own heading last: that one stays
+    /// where only one is shown.
+    fn lattices(&self, problem: &Problem, yaws: usize) -> Result<Vec<Lattice>, Failure> {
+        let middle = yaws / 2;
+        let mut yaws: Vec<f64> = (0..yaws)
+            .map(|k| (k as f64 - middle as f64) * self.params.yaw_step_deg.to_radians())
+            .collect();
+        yaws.sort_by(|a, b| b.abs().total_cmp(&a.abs()).then(a.total_cmp(b)));
+        let lattices = yaws.into_iter().map(|yaw_rad| {
+            let centre = Offset { yaw_rad, ..Offset::default() };
+            let radius = problem.uncertainty_radius_m;
+            Lattice::new(Phase::PositionCoarse, centre, radius, &self.grid).map_err(Failure::from)
+        });
+        lattices.collect()
+    }
+
+    /// Poses that two smaller copies of the photos lead to: the minima of the smallest, over a wider range
+    /// of headings, refined there in six freedoms and again at half the size. Their basins are wider, so
+    /// that they find what lies between the fine level's cells.
+    fn coarse_poses(
+        &self,
+        problem: &Problem,
+        smaller: &dyn Fn(u32) -> Level<'static>,
+        trace: &mut Trace<'_>,
+    ) -> Result<Vec<Pose>, Halt> {
+        let shrink_by = self.params.coarse_shrink as u32;
+        let level = smaller(shrink_by);
+        let mut surfaces = Vec::new();
+        for lattice in self.lattices(problem, self.params.coarse_yaws)? {
+            let score = |poses: &[Pose]| level.objective.score(poses);
+            let silently = |_: &[Scored]| trace.checkpoint();
+            let batch = level.objective.batch(lattice.cells());
+            let surface = scan(lattice, level.least_covered, batch, score, silently)?;
+            surfaces.push(Arc::new(surface));
+        }
+        let spread = Spread::of(&surfaces);
+        let price = |pose: &Pose, cost: f64| self.price(&spread, pose, cost);
+        let starts = starts(&surfaces, 2 * self.params.starts, price);
+        let most_m = self.most_m();
+        let plan = Shrinking { last_m: most_m.min(0.1), ..self.in_the_plane() };
+        let plane = level.refined(&starts, &plan, || trace.checkpoint())?;
+        let plan = Shrinking {
+            freedoms: Freedoms::Six,
+            first_m: most_m.min(0.2),
+            last_m: most_m.min(0.05),
+            ..plan
+        };
+        let best = apart(plane, self.params.starts, price);
+        let six = level.refined(&best, &plan, || trace.checkpoint())?;
+
+        let level = smaller(shrink_by.div_ceil(2));
+        trace.checkpoint()?;
+        let poses: Vec<Pose> = six.iter().map(|refined| refined.pose).collect();
+        let plan = Shrinking { last_m: most_m.min(0.025), ..plan };
+        let refined = level.refined(&level.starts(&poses), &plan, || trace.checkpoint())?;
+        let best = apart(refined, self.params.finalists, price);
+        Ok(best.into_iter().map(|start| start.pose).collect())
+    }
+}
+
+/// The state of a search.
+struct Search<'a> {
+    level: &'a Level<'a>,
+    evaluations: u64,
+}
+
+impl Search<'_> {
+    fn score(
+        &mut self,
+        lattice: Lattice,
+        trace: &mut Trace<'_>,
+    ) -> Result<Arc<ScoredLattice>, Cancelled> {
+        let &Level { ref objective, initial, least_covered } = self.level;
+        let (phase, batch) = (lattice.phase, objective.batch(lattice.cells()));
+        let score = |poses: &[Pose]| objective.score(poses);
+        let tell = |some: &[Scored]| {
+            trace.checkpoint()?;
+            for &one in some {
+                let evaluation = self.evaluations;
+                self.evaluations += 1;
+                trace.emit(|| PoseScored::new(phase, evaluation, one, initial.covered))?;
+            }
+            Ok(())
+        };
+        let surface = Arc::new(scan(lattice, least_covered, batch, score, tell)?);
+        trace.emit(|| PhaseSearched {
+            best: surface.minimum().and_then(|cell| surface.lattice.offset(cell)),
+            surface: Arc::clone(&surface),
+        })?;
+        Ok(surface)
+    }
+
+    /// Refines the starts and tells where they came; the least price is first.
+    fn refine(
+        &mut self,
+        starts: &[Start],
+        plan: &Shrinking,
+        price: impl Fn(&Pose, f64) -> f64,
+        trace: &mut Trace<'_>,
+    ) -> Result<Vec<Refined>, Cancelled> {
+        let mut refined = self.level.refined(starts, plan, || trace.checkpoint())?;
+        self.evaluations += refined.iter().map(|one| one.evaluations).sum::<u64>();
+        refined.sort_by(|a, b| price(&a.pose, a.cost).total_cmp(&price(&b.pose, b.cost)));
+        trace.emit(|| StartsRefined {
+            freedoms: plan.freedoms,
+            refinements: refined.as_slice().into(),
+        })?;
+        Ok(refined)
+    }
+}
+
+/// The best minima of all lattices, no two of them at one place with one heading.
+fn starts(
+    surfaces: &[Arc<ScoredLattice>],
+    most: usize,
+    price: impl Fn(&Pose, f64) -> f64,
+) -> Vec<Start> {
+    let mut minima: Vec<Start> = surfaces
+        .iter()
+        .flat_map(|surface| {
+            let minima = surface.local_minima().into_iter();
+            minima.filter_map(|(cell, cost)| {
+                let offset = surface.lattice.offset(cell)?;
+                Some(Start { pose: offset.reference_from_camera(), cost })
+            })
+        })
+        .collect();
+    minima.sort_by(|a, b| price(&a.pose, a.cost).total_cmp(&price(&b.pose, b.cost)));
+    minima.truncate(most);
+    minima
+}
+
+/// The best of those that are refined, each at a place of its own.
+fn apart(mut refined: Vec<Refined>, most: usize, price: impl Fn(&Pose, f64) -> f64) -> Vec<Start> {
+    refined.sort_by(|a, b| price(&a.pose, a.cost).total_cmp(&price(&b.pose, b.cost)));
+    let mut kept: Vec<Start> = Vec::new();
+    for one in refined {
+        if kept.len() < most && kept.iter().all(|known| is_apart(&known.pose, &one.pose)) {
+            kept.push(Start { pose: one.pose, cost: one.cost });
+        }
+    }
+    kept
+}
+
+fn is_apart(a: &Pose, b: &Pose) -> bool {
+    let between = PoseError::between(a, b);
+    between.translation_m > SAME_M || between.rotation_deg > SAME_DEG
+}

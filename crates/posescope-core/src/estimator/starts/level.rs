@@ -1,0 +1,76 @@
+//! The cost of the search at one size of the photos.
+
+use super::ManyStarts;
+use crate::geometry::Pose;
+use crate::grid::least_covered;
+use crate::judge::{Refined, Shrinking, Start, shrink};
+use crate::problem::Problem;
+use crate::render::{Objective, Score};
+
+/// A cost at one size of the photos.
+pub(in crate::estimator) struct Level<'a> {
+    pub(super) objective: Box<dyn Objective + 'a>,
+    /// Of the reference pose.
+    pub(super) initial: Score,
+    /// Pixels that a pose must cover to be eligible.
+    pub(super) least_covered: u32,
+}
+
+impl ManyStarts {
+    /// The level of a cost.
+    pub(in crate::estimator) fn level<'a>(&self, objective: impl Objective + 'a) -> Level<'a> {
+        let initial = objective.score(&[Pose::identity()])[0];
+        let least_covered = least_covered(self.grid.coverage_floor, initial.covered);
+        Level { objective: Box::new(objective), initial, least_covered }
+    }
+
+    /// Refines a pose (`reference_from_camera`) in all six freedoms, as the search does with its best
+    /// starts; `None` where it lies outside the disc, leads out of it, or covers too little to have a cost.
+    ///
+    /// # Errors
+    /// What the checkpoint says, which is asked before each round.
+    pub(in crate::estimator) fn refined<E>(
+        &self,
+        problem: &Problem,
+        level: &Level<'_>,
+        pose: Pose,
+        checkpoint: impl FnMut() -> Result<(), E>,
+    ) -> Result<Option<Refined>, E> {
+        let reach = self.reach(problem);
+        if pose.translation.vector.norm() > reach {
+            return Ok(None);
+        }
+        let refined = level.refined(&level.starts(&[pose]), &self.in_six(), checkpoint)?;
+        let inside = refined.first().filter(|one| one.pose.translation.vector.norm() <= reach);
+        Ok(inside.copied())
+    }
+}
+
+impl Level<'_> {
+    fn costs(&self, poses: &[Pose]) -> Vec<Option<f64>> {
+        let scores = self.objective.score(poses).into_iter();
+        scores.map(|score| score.eligible_cost(self.least_covered)).collect()
+    }
+
+    /// Those of the poses that have a cost.
+    pub(super) fn starts(&self, poses: &[Pose]) -> Vec<Start> {
+        let both = poses.iter().zip(self.costs(poses));
+        both.filter_map(|(&pose, cost)| Some(Start { pose, cost: cost? })).collect()
+    }
+
+    /// Refines the starts.
+    ///
+    /// # Errors
+    /// Those of `checkpoint`, which is asked before each round.
+    pub(super) fn refined<E>(
+        &self,
+        starts: &[Start],
+        plan: &Shrinking,
+        mut checkpoint: impl FnMut() -> Result<(), E>,
+    ) -> Result<Vec<Refined>, E> {
+        shrink(starts, plan, |poses| {
+            checkpoint()?;
+            Ok(self.costs(poses))
+        })
+    }
+}
