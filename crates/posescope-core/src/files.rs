@@ -25,10 +25,6 @@ pub fn write_whole_with(
     path: &Path,
     write: impl FnOnce(&mut File) -> io::Result<()>,
 ) -> io::Result<()> {
-    let folder = match path.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() => folder,
-        _ => Path::new("."),
-    };
     let suffix = path
         .extension()
         .map(|extension| format!(".{}", extension.to_string_lossy()))
@@ -38,10 +34,18 @@ pub fn write_whole_with(
     // Not private to the user, as temporary files are, but what the umask says.
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    let mut file = builder.tempfile_in(folder)?;
+    let mut file = builder.tempfile_in(folder_of(path))?;
     write(file.as_file_mut())?;
     file.persist(path).map(drop::<File>)?;
     Ok(())
+}
+
+/// The folder that a file is in.
+pub(crate) fn folder_of(path: &Path) -> &Path {
+    match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    }
 }
 
 /// Names the cache directory; empty turns caching off.

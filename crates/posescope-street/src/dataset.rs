@@ -31,18 +31,6 @@ pub const WORLD_SEED: u64 = 7;
 /// Time between two frames, about 1 m apart at the speed of a town \[s\].
 const FRAME_INTERVAL_S: f64 = 0.1;
 
-/// The conditions by their names.
-const CONDITIONS: &[(&str, Condition)] = &[
-    ("overcast", Condition::Overcast),
-    ("sun", Condition::Sun),
-    ("night", Condition::Night),
-    ("rain", Condition::Rain),
-    ("snow", Condition::Snow),
-];
-
-/// The sizes by their names.
-const SIZES: &[(&str, Size)] = &[("half", Size::Half), ("full", Size::Full)];
-
 /// A traversal of the street. Nothing is made before it is asked for, and what was made before comes
 /// from the cache: a second look at a frame does not even build the town.
 pub struct Street {
@@ -64,8 +52,7 @@ impl Street {
     /// When there is no such condition.
     pub fn open(argument: &str) -> Result<Self, SceneError> {
         let wanted = argument.split_once(':').map(|(_, condition)| condition);
-        let (default, _) = CONDITIONS[0];
-        Self::new(wanted.unwrap_or(default), Size::Full)
+        Self::new(wanted.unwrap_or(Condition::Overcast.name()), Size::Full)
     }
 
     /// The traversal in a condition, with images of a size.
@@ -77,20 +64,16 @@ impl Street {
     }
 
     fn with_cache(wanted: &str, size: Size, cache: Arc<FrameCache>) -> Result<Self, SceneError> {
-        let &(name, condition) =
-            CONDITIONS.iter().find(|(name, _)| *name == wanted).ok_or_else(|| {
-                SceneError::UnknownCondition {
-                    argument: format!("{NAME}:{wanted}"),
-                    known: Self::conditions().collect::<Vec<_>>().join(", "),
-                }
-            })?;
-        let size_name = SIZES.iter().find(|(_, known)| *known == size);
-        let size_name = size_name.map_or("other", |(name, _)| name);
+        let known = Condition::ALL.into_iter().find(|known| known.name() == wanted);
+        let condition = known.ok_or_else(|| SceneError::UnknownCondition {
+            argument: format!("{NAME}:{wanted}"),
+            known: Self::conditions().collect::<Vec<_>>().join(", "),
+        })?;
         Ok(Self {
-            name: format!("{NAME}:{name}"),
+            name: format!("{NAME}:{wanted}"),
             condition,
             size,
-            key: frame_cache::key(&format!("{WORLD_SEED}-{name}-{size_name}")),
+            key: frame_cache::key(&format!("{WORLD_SEED}-{wanted}-{}", size.name())),
             cache,
             traversal: OnceLock::new(),
             poses: OnceLock::new(),
@@ -100,18 +83,7 @@ impl Street {
 
     /// The names of all conditions.
     pub fn conditions() -> impl Iterator<Item = &'static str> {
-        CONDITIONS.iter().map(|(name, _)| *name)
-    }
-
-    /// The names of all sizes.
-    pub fn sizes() -> impl Iterator<Item = &'static str> {
-        SIZES.iter().map(|(name, _)| *name)
-    }
-
-    /// The size of a name.
-    pub fn size(name: &str) -> Option<Size> {
-        let found = SIZES.iter().find(|(known, _)| *known == name);
-        found.map(|(_, size)| *size)
+        Condition::ALL.into_iter().map(Condition::name)
     }
 
     /// Where the laser scanner is in the camera's frame \[m\].

@@ -12,6 +12,17 @@ pub enum Size {
 }
 
 impl Size {
+    /// All of them.
+    pub const ALL: [Self; 2] = [Self::Half, Self::Full];
+
+    /// Its name, in lower case.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Half => "half",
+            Self::Full => "full",
+        }
+    }
+
     /// The camera that takes images of this size.
     pub fn intrinsics(self) -> Intrinsics {
         let full = Intrinsics {

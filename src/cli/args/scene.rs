@@ -29,8 +29,10 @@ pub struct SynthArgs {
     #[arg(
         long,
         default_value = "full",
-        value_parser = PossibleValuesParser::new(Street::sizes())
-            .try_map(|name: String| Street::size(&name).ok_or("a size expected"))
+        value_parser = PossibleValuesParser::new(Size::ALL.map(Size::name))
+            .try_map(|name: String| {
+                Size::ALL.into_iter().find(|size| size.name() == name).ok_or("a size expected")
+            })
     )]
     pub size: Size,
     /// Write only every Nth frame; frames keep their numbers, poses and times stay complete

@@ -33,8 +33,11 @@ pub enum Selection {
     Retrieved(usize),
 }
 
-/// The ways of choosing by their names, in the order of the variants.
-const WAYS: [(&str, fn(usize) -> Selection); 4] = [
+/// A name, and what it makes of a count.
+type Way = (&'static str, fn(usize) -> Selection);
+
+/// The ways of choosing, in the order of the variants.
+const WAYS: [Way; 4] = [
     ("random", Selection::Random),
     ("nearest", Selection::Nearest),
     ("matches", Selection::Matched),

@@ -17,7 +17,7 @@ use super::layout::{Description, IndexWriter, IndexedFeature, RecordCounts};
 use super::tf_idf::InvertedIndexBuilder;
 use super::vocabulary::{Clustering, Vocabulary};
 use crate::features::{Descriptor, Features};
-use crate::files::write_whole_with;
+use crate::files::{folder_of, write_whole_with};
 
 /// Frames that are worked on at a time; all their features are in memory.
 const BATCH: usize = 16;
@@ -103,11 +103,7 @@ pub fn build<E: std::error::Error + Send + 'static>(
     mut progress: impl FnMut(BuildProgress),
 ) -> Result<BuildSummary, BuildError<E>> {
     let io = |source| BuildError::Io { path: path.to_owned(), source };
-    let folder = match path.parent() {
-        Some(folder) if folder.as_os_str().is_empty() => Path::new("."),
-        Some(folder) => folder,
-        None => Path::new("."),
-    };
+    let folder = folder_of(path);
     fs::create_dir_all(folder).map_err(io)?;
     let mut waiting = Spool::new(folder).map_err(io)?;
     let total = request.frames.len();

@@ -27,74 +27,47 @@
 #[macro_export]
 macro_rules! inner_scene {
     (@ $scene:tt name) => {
-        fn name(&self) -> &str {
-            self.$scene.name()
-        }
+        $crate::inner_scene!(@ $scene name() -> &str);
     };
     (@ $scene:tt frames) => {
-        fn frames(&self) -> &[String] {
-            self.$scene.frames()
-        }
+        $crate::inner_scene!(@ $scene frames() -> &[String]);
     };
     (@ $scene:tt intrinsics) => {
-        fn intrinsics(&self, frame: usize) -> $crate::camera::Intrinsics {
-            self.$scene.intrinsics(frame)
-        }
+        $crate::inner_scene!(@ $scene intrinsics(frame: usize) -> $crate::camera::Intrinsics);
     };
     (@ $scene:tt pose) => {
-        fn pose(&self, frame: usize) -> Option<$crate::geometry::Pose> {
-            self.$scene.pose(frame)
-        }
+        $crate::inner_scene!(@ $scene pose(frame: usize) -> Option<$crate::geometry::Pose>);
     };
     (@ $scene:tt position) => {
-        fn position(&self, frame: usize) -> Option<$crate::nalgebra::Point3<f64>> {
-            self.$scene.position(frame)
-        }
+        $crate::inner_scene!(@ $scene position(frame: usize) -> Option<$crate::nalgebra::Point3<f64>>);
     };
     (@ $scene:tt time_s) => {
-        fn time_s(&self, frame: usize) -> Option<f64> {
-            self.$scene.time_s(frame)
-        }
+        $crate::inner_scene!(@ $scene time_s(frame: usize) -> Option<f64>);
     };
     (@ $scene:tt has_cloud) => {
-        fn has_cloud(&self, frame: usize) -> bool {
-            self.$scene.has_cloud(frame)
-        }
+        $crate::inner_scene!(@ $scene has_cloud(frame: usize) -> bool);
     };
     (@ $scene:tt photo) => {
-        fn photo(&self, frame: usize) -> Result<$crate::image::Photo, $crate::scene::SceneError> {
-            self.$scene.photo(frame)
-        }
+        $crate::inner_scene!(@ $scene photo(frame: usize) -> Result<$crate::image::Photo, $crate::scene::SceneError>);
     };
     (@ $scene:tt cloud) => {
-        fn cloud(&self, frame: usize) -> Result<$crate::cloud::Cloud, $crate::scene::SceneError> {
-            self.$scene.cloud(frame)
-        }
+        $crate::inner_scene!(@ $scene cloud(frame: usize) -> Result<$crate::cloud::Cloud, $crate::scene::SceneError>);
     };
     (@ $scene:tt query) => {
-        fn query(
-            &self,
-            frame: usize,
-        ) -> Result<std::sync::Arc<$crate::problem::Query>, $crate::scene::SceneError> {
-            self.$scene.query(frame)
-        }
+        $crate::inner_scene!(@ $scene query(frame: usize) -> Result<std::sync::Arc<$crate::problem::Query>, $crate::scene::SceneError>);
     };
     (@ $scene:tt reference) => {
-        fn reference(
-            &self,
-            frame: usize,
-        ) -> Result<std::sync::Arc<$crate::problem::ReferenceTuple>, $crate::scene::SceneError> {
-            self.$scene.reference(frame)
-        }
+        $crate::inner_scene!(@ $scene reference(frame: usize) -> Result<std::sync::Arc<$crate::problem::ReferenceTuple>, $crate::scene::SceneError>);
     };
     (@ $scene:tt as_degraded) => {
-        fn as_degraded(&self) -> Option<&$crate::scene::DegradedScene> {
-            self.$scene.as_degraded()
-        }
+        $crate::inner_scene!(@ $scene as_degraded() -> Option<&$crate::scene::DegradedScene>);
     };
     (@ $scene:tt fingerprint) => {
-        fn fingerprint(&self) -> u64 {
-            self.$scene.fingerprint()
+        $crate::inner_scene!(@ $scene fingerprint() -> u64);
+    };
+    (@ $scene:tt $method:ident($($frame:ident: usize)?) -> $out:ty) => {
+        fn $method(&self $(, $frame: usize)?) -> $out {
+            self.$scene.$method($($frame)?)
         }
     };
     ($scene:tt: $($method:ident),+ $(,)?) => {

@@ -182,7 +182,7 @@ evidence!(OtherCamera {
 } =>
     "The query camera is suspect: its stated focal length is {:.0} px. With {} it explains \
      {explained_otherwise} matches at the truth, not {explained}.",
-    stated.fx, otherwise_stated(&camera, &stated)
+    stated.fx, otherwise_stated(camera, stated)
 );
 
 /// In what a camera differs from the stated one, to the pixel.
