@@ -161,7 +161,7 @@ fn plan(args: &EvalArgs, swept: Option<(&Sweep, &str)>) -> Result<PlannedRun, Cl
     if protocol.is_by_hand() {
         return Err(CliError::Usage(
             "eval chooses references for each query: --reference takes random:K, nearest:K, matches:K or \
-             retrieve:K"
+             retrieve:K; `posescope run` takes frames"
                 .to_owned(),
         ));
     }

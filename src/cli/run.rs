@@ -79,6 +79,9 @@ pub fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), CliError> {
         let reach_m = task.reach_m();
         terminal.say(|| format!("References are drawn at random within {reach_m} m of the query; --reference names others"));
     }
+    if task.photos.is_some() {
+        plan.warn_of_copies(&tasks)?;
+    }
     let mut json = args.json.as_deref().map(JsonLines::create).transpose()?;
     let mut results = Vec::new();
     let methods = &task.protocol.methods;
@@ -166,6 +169,25 @@ pub fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), CliError> {
 }
 
 impl Plan<'_> {
+    /// A photo that is one of the scene's own would be localised against itself.
+    fn warn_of_copies(&self, tasks: &[PlannedQuery]) -> Result<(), CliError> {
+        let (from, of) = (self.localizer.references(), self.localizer.queries());
+        for task in tasks {
+            let query = of.query(task.query)?;
+            for &reference in &task.references.frames {
+                let reference = from.query(reference)?;
+                if reference.photo.gray == query.photo.gray {
+                    log::warn!(
+                        "{} is the same photo as the reference {}: the result says nothing; name another --reference",
+                        query.name,
+                        reference.name
+                    );
+                }
+            }
+        }
+        Ok(())
+    }
+
     /// Only FB has matches to write.
     fn check_features(&self) -> Result<(), CliError> {
         let mut methods = self.task.protocol.methods.iter().copied();

@@ -1,5 +1,4 @@
-//! The text below the table of results: poses without a known truth, why poses are wrong or missing, and what would have
-//! helped.
+//! The text below the table of results: poses, why they are wrong or missing, and what would have helped.
 
 use std::time::Duration;
 
@@ -38,10 +37,10 @@ pub fn story(results: &[(QueryResult, Duration)], width: Option<usize>) -> Strin
     text
 }
 
-/// The pose of a query without a known truth: there it is the result, and no error stands for it.
+/// The pose, unless it is wrong or another system's.
 fn pose(result: &QueryResult) -> Option<String> {
     let is_ours = estimator::find(result.method).is_some();
-    let pose = result.pose.as_ref().filter(|_| is_ours && result.grade == Grade::Unmeasured)?;
+    let pose = result.pose.as_ref().filter(|_| is_ours && result.grade != Grade::Wrong)?;
     let [x, y, z] = pose.position_m;
     let [qx, qy, qz, qw] = pose.quaternion_xyzw;
     Some(format!(

@@ -118,6 +118,12 @@ fn fill(
     let least_covered = least_covered(grid.coverage_floor, at_reference.covered);
     let mut surface =
         DenseSurface::new(radius_m, grid, least_covered).map_err(|error| too_large(&error))?;
+    terminal.say(|| {
+        format!(
+            "{} hypotheses to score; larger surface.step and surface.yaw_step need fewer",
+            surface.hypotheses()
+        )
+    });
     let bar = terminal.bar(surface.hypotheses() as u64);
     while !surface.is_complete() {
         surface.score_next(scorer);

@@ -49,14 +49,14 @@ pub enum ExportError {
     Nothing,
     /// The format cannot hold a missing pose.
     #[error(
-        "kitti has one line per frame and cannot leave out a pose: {missing}; use --as tum, vloc or colmap"
+        "kitti has one line per frame and cannot leave out a pose: {missing}; use --as vloc or colmap"
     )]
     Gap {
         /// What is missing.
         missing: String,
     },
     /// The format needs times, and the scene has none.
-    #[error("tum needs times, and the frames of {scene} have none; use --as kitti, vloc or colmap")]
+    #[error("tum needs times, and the frames of {scene} have none; use --as vloc or colmap")]
     NoTime {
         /// The scene of the queries.
         scene: String,

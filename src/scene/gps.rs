@@ -12,7 +12,7 @@ use std::sync::Arc;
 use nalgebra::{Matrix3, Point3, Similarity3, Translation3, UnitQuaternion, Vector3};
 
 use super::frame_names::FrameNames;
-use super::lines::{Line, TextFile};
+use super::lines::{Line, NAMES, TextFile};
 use super::{Scene, SceneError};
 
 /// The radius of the earth at the equator \[m\], as in KITTI's devkit.
@@ -85,12 +85,9 @@ fn read_rows(file: &TextFile) -> Result<(Kind, Vec<Row<'_>>), SceneError> {
     let Some(first) = lines.next() else {
         return Err(file.error("positions expected, none found"));
     };
-    let words: Vec<String> = first.words().map(str::to_lowercase).collect();
-    let find = |called: &[&str]| {
-        let is_one = |word: &String| called.contains(&word.as_str());
-        words.iter().position(is_one)
-    };
-    let name = find(&["name", "frame", "image", "file", "filename"]);
+    let words = first.header().unwrap_or_default();
+    let find = |called: &[&str]| words.iter().position(|word| called.contains(&word.as_str()));
+    let name = find(NAMES);
     let world = [find(&["x"]), find(&["y"]), find(&["z"])];
     let latitude = find(&["latitude", "lat"]);
     let longitude = find(&["longitude", "lon", "lng"]);

@@ -79,6 +79,13 @@ impl<'a> Line<'a> {
         words(self.text)
     }
 
+    /// The names of the columns, in lower case, if the line is a header: several words and no number.
+    pub fn header(&self) -> Option<Vec<String>> {
+        let columns: Vec<String> = self.words().map(str::to_lowercase).collect();
+        let has_numbers = columns.iter().any(|word| word.parse::<f64>().is_ok());
+        (columns.len() > 1 && !has_numbers).then_some(columns)
+    }
+
     /// As many finite numbers as are asked for, and nothing else.
     pub fn numbers<const N: usize>(&self) -> Result<[f64; N], SceneError> {
         self.numbers_of(self.text)
@@ -121,6 +128,9 @@ pub(super) fn pose(position: [f64; 3], quaternion: [f64; 4]) -> Result<Pose, Str
     }
     Ok(Pose::from_parts(Translation3::from(position), UnitQuaternion::from_quaternion(quaternion)))
 }
+
+/// What a header calls the column of the frames' names.
+pub(super) const NAMES: &[&str] = &["name", "frame", "image", "file", "filename"];
 
 fn words(text: &str) -> impl Iterator<Item = &str> {
     text.split(|c: char| c.is_whitespace() || c == ',').filter(|word| !word.is_empty())

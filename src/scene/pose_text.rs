@@ -3,14 +3,15 @@
 //! - TUM: `time x y z qx qy qz qw`, camera to world, in any order;
 //! - KITTI: twelve numbers of `[R|t]`, camera to world, a line per frame;
 //! - visuallocalization.net: `name qw qx qy qz x y z`, world to camera;
-//! - `images.txt` of a COLMAP model: world to camera.
+//! - `images.txt` of a COLMAP model: world to camera;
+//! - a header with the columns `name` or `time`, and `x y z qx qy qz qw`, in any order: camera to world.
 
 use posescope_core::scene::trailing_number;
 
 use super::SceneError;
 use super::colmap::image_lines;
 use super::frame_names::FrameNames;
-use super::lines::{Line, TextFile};
+use super::lines::{Line, NAMES, TextFile};
 use crate::geometry::Pose;
 
 /// The poses of a file, `world_from_camera`.
@@ -33,6 +34,9 @@ impl<'a> PoseText<'a> {
         let Some(first) = file.lines().next() else {
             return Err(file.error("poses expected, none found"));
         };
+        if let Some(columns) = first.header() {
+            return with_header(file, first, &columns);
+        }
         let words = first.words().count();
         match (words, names) {
             (12, _) => Ok(Self::Lines(by_line(file)?)),
@@ -57,17 +61,51 @@ impl<'a> PoseText<'a> {
                     Some(_) => ", `name qw qx qy qz x y z` or COLMAP's images.txt",
                     None => "",
                 };
-                let comma = match first.text.contains(',') {
-                    true => "; separate them by spaces, without a header",
-                    false => "",
-                };
                 Err(first.error(format!(
                     "TUM (8 numbers: time x y z qx qy qz qw), KITTI (12 numbers: a 3x4 matrix){named} \
-                     expected; words found: {words}{comma}"
+                     expected; words found: {words}"
                 )))
             }
         }
     }
+}
+
+/// The lines below a header that names the columns.
+fn with_header<'a>(
+    file: &'a TextFile,
+    first: Line<'a>,
+    columns: &[String],
+) -> Result<PoseText<'a>, SceneError> {
+    let find =
+        |called: &[&str]| columns.iter().position(|column| called.contains(&column.as_str()));
+    let numbers = [&["x", "tx"], &["y", "ty"], &["z", "tz"]].map(|called| find(called));
+    let quaternion = ["qx", "qy", "qz", "qw"].map(|called| find(&[called]));
+    let (name, time) = (find(NAMES), find(&["time", "timestamp"]));
+    let ([Some(x), Some(y), Some(z)], [Some(qx), Some(qy), Some(qz), Some(qw)], Some(key)) =
+        (numbers, quaternion, name.or(time))
+    else {
+        return Err(first.error(
+            "a header with the columns `name` or `time`, and `x y z qx qy qz qw`, expected",
+        ));
+    };
+    let poses = file.lines().skip(1).map(|line| {
+        let words: Vec<&str> = line.words().collect();
+        if words.len() != columns.len() {
+            let (count, found) = (columns.len(), words.len());
+            return Err(line.error(format!("{count} columns expected, {found} found")));
+        }
+        let number = |column: usize| line.number(words[column]);
+        let position = [number(x)?, number(y)?, number(z)?];
+        let pose = line.pose(position, [number(qx)?, number(qy)?, number(qz)?, number(qw)?])?;
+        Ok(NamedPose { line, name: words[key].to_owned(), world_from_camera: pose })
+    });
+    let poses: Vec<NamedPose<'_>> = poses.collect::<Result<_, SceneError>>()?;
+    if name.is_some() {
+        return Ok(PoseText::Named(poses));
+    }
+    let timed =
+        poses.iter().map(|pose| Ok((pose.line.number(&pose.name)?, pose.world_from_camera)));
+    Ok(PoseText::Timed(timed.collect::<Result<_, SceneError>>()?))
 }
 
 /// Whether a line of eight words begins with a name instead of a time. If its first word is a number, the quaternion
@@ -131,6 +169,32 @@ impl PoseLines {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_header_names_the_columns() {
+        let text = "image,qw,qx,qy,qz,x,y,z\nDSC_1.JPG,1,0,0,0,4,5,6\nDSC_2.JPG,0,0,1,0,7,8,9\n";
+        let file = TextFile::from_text("poses.csv", text);
+        let Ok(PoseText::Named(poses)) = PoseText::read(&file, None) else {
+            panic!("no named poses");
+        };
+        assert_eq!(poses[1].name, "DSC_2.JPG");
+        assert_eq!(poses[1].world_from_camera.translation.vector.as_slice(), [7.0, 8.0, 9.0]);
+        assert_eq!(poses[1].world_from_camera.rotation.coords.as_slice(), [0.0, 1.0, 0.0, 0.0]);
+        let timed = "x y z qx qy qz qw timestamp\n4 5 6 0 0 0 1 12.5\n";
+        let file = TextFile::from_text("poses.txt", timed);
+        let Ok(PoseText::Timed(samples)) = PoseText::read(&file, None) else {
+            panic!("no timed poses");
+        };
+        assert_eq!(samples[0].0, 12.5);
+        for (wrong, words) in [
+            ("name,x,y,z\na,1,2,3\n", "`x y z qx qy qz qw`, expected"),
+            ("name,x,y,z,qx,qy,qz,qw\na,1,2,3\n", "poses.txt:2: 8 columns expected, 4 found"),
+        ] {
+            let file = TextFile::from_text("poses.txt", wrong);
+            let error = PoseText::read(&file, None).err().expect("wrong").to_string();
+            assert!(error.contains(words), "{error}");
+        }
+    }
 
     #[test]
     fn lines_are_in_the_order_of_the_frames_or_by_the_number_of_a_name() {

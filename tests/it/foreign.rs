@@ -176,7 +176,7 @@ fn poses_that_cannot_be_read_are_named_with_their_line() {
         ("a.png 2 0 0 0 0 0 0\n", "poses.txt:1: a quaternion of length 1 expected"),
         ("77.4 0 0 0 0 0 0 1\n", "the frames' times are 0.4 … 0.7, the poses' times 77.4"),
         ("1 0 0 0 0 1 0 0 0 0 1 0\n", "1 lines found. Poses of some frames need names"),
-        ("x,y\n", "separate them by spaces, without a header"),
+        ("x,y\n", "poses.txt:1: a header with the columns `name` or `time`"),
         ("1 0 0 0 0 1 0 0 0 0 1 x\n", "poses.txt:1: a number expected, `x` found"),
         ("1 1 0 0 0 0 0 0 1 5.png\n\n2 1 0 0 0 0 0 0 1\n", "poses.txt:3: a line `id qw"),
     ] {

@@ -47,6 +47,10 @@ fn a_photo_of_its_own_has_the_pose_of_the_frame_that_it_is_and_no_error() {
         assert_eq!(loose["counts"], frame["counts"]);
         assert!(loose["error"].is_null() && !frame["error"].is_null());
     }
+    // Against itself, any photo is localised.
+    let line = format!("run street --query 000070.png --camera {fx},{fy},{cx},{cy} --method fb");
+    let warned = run_in(folder.path(), &line).ok().err;
+    has(&warned, "000070 is the same photo as the reference 000070");
 }
 
 #[test]
@@ -60,7 +64,6 @@ fn without_a_position_the_reference_that_looks_most_alike_is_taken() {
     let position = results[0]["pose"]["position_m"].as_array().expect("a pose");
     let position: Vec<String> =
         position.iter().map(|axis| format!("{:.3}", axis.as_f64().expect("a number"))).collect();
-    // Without a truth, the pose is the result.
     let line_of_words = line.replace(" --json - -q", "");
     let shown = sequence.run(&format!("{line_of_words} --camera {CAMERA}")).ok().out;
     has(

@@ -122,6 +122,19 @@ fn poses_may_be_by_time_and_the_other_way_round() {
 }
 
 #[test]
+fn poses_may_be_by_the_names_of_photos_below_a_header() {
+    let folder = TempDir::new().expect("a folder");
+    write(folder.path());
+    let poses = "image,x,y,z,qx,qy,qz,qw\nimg2.png,1,2,3,0,0,0,1\nimg0.png,4,5,6,0,0,0,1\n";
+    fs::write(folder.path().join("poses.txt"), poses).expect("writable");
+    let scene = open(folder.path());
+    let poses = [0, 1, 2].map(|frame| scene.pose(frame));
+    let expected =
+        [Some(Pose::translation(4.0, 5.0, 6.0)), None, Some(Pose::translation(1.0, 2.0, 3.0))];
+    assert_eq!(poses, expected);
+}
+
+#[test]
 fn poses_by_number_are_found_where_photos_are_missing() {
     let folder = TempDir::new().expect("a folder");
     write(folder.path());
@@ -328,6 +341,7 @@ fn what_is_wrong_with_a_description_is_named_with_its_line() {
         poses.txt | text 1 2 3\n | poses.txt:1 ~ 8 numbers ~ words found: 3
         poses.txt | text 1 0 0 0 0 1 0 0 0 0 1 0\n | poses.txt ~ one line per image expected (3) ~ `img1`
         poses.txt | text 5.0 0 0 0 0 0 0 1\n | poses.txt ~ img0 ~ between 5 and 5
+        poses.txt | text name x y z qx qy qz qw\na 0 0 0 0 0 0 1\n | names like `img0` expected ~ names like `a`
         map.xyz | text 1 2 3\n1 2 x\n | map.xyz:2 ~ `x`
         map.xyz | text heading\n | map.xyz ~ none found
         map.xyz | text \x00\x00\x00 | map.xyz ~ PLY, PCD

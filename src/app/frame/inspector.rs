@@ -245,7 +245,7 @@ fn helped(
     }
     let Some(explanation) = &result.explanation else {
         heading(ui, "What may help");
-        ui.label(primary.code.advice(result.method));
+        ui.label(result.advice(primary.code));
         if result.error.or(result.initial_error).is_some() && state.setup.task.protocol.explain == 0
         {
             let button = ui

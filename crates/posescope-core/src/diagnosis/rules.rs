@@ -109,6 +109,8 @@ pub struct Rule {
     pub title: &'static str,
     /// What to do about it, in one phrase.
     pub advice: &'static str,
+    /// The advice for methods of a family, if it is another.
+    pub advice_of: fn(Family) -> Option<&'static str>,
     /// What it applies to.
     pub applies_to: &'static [Family],
     /// Whether it needs the ground truth.
@@ -132,6 +134,7 @@ impl Rule {
             code,
             title: "",
             advice: "",
+            advice_of: |_| None,
             applies_to: &[],
             needs_truth: true,
             is_conclusive: false,
@@ -195,7 +198,7 @@ impl Code {
             Some(Family::Given) if is_of_a_cost && rule.applies_to.contains(&Family::Given) => {
                 "compare it with --method robust, or use another reference"
             }
-            _ => rule.advice,
+            family => family.and_then(rule.advice_of).unwrap_or(rule.advice),
         }
     }
 

@@ -1,7 +1,7 @@
 //! A result in words. Terminal, recording and report only lay these out.
 
 use super::result::{QueryResult, Status};
-use crate::diagnosis::{Grade, confidence};
+use crate::diagnosis::{Code, Grade, confidence};
 
 impl QueryResult {
     /// The method, with the fusion where references were fused.
@@ -31,6 +31,14 @@ impl QueryResult {
         Some(format!("{} {}", primary.code, primary.text))
     }
 
+    /// What to try against a verdict of this result.
+    pub fn advice(&self, code: Code) -> &'static str {
+        if code == Code::L1 && self.status == Status::Failed {
+            return "lower --min-confidence or fb2.least_probability to see the refused pose";
+        }
+        code.advice(self.method)
+    }
+
     /// What follows the primary verdict, a paragraph each: other verdicts, what to try, what helped.
     pub fn paragraphs(&self) -> Vec<String> {
         let Some((primary, others)) = self.diagnosis.split_first() else {
@@ -40,7 +48,7 @@ impl QueryResult {
         let mut paragraphs: Vec<String> = also.collect();
         let Some(explanation) = &self.explanation else {
             if self.grade.is_failure() {
-                paragraphs.push(format!("try: {}", primary.code.advice(self.method)));
+                paragraphs.push(format!("try: {}", self.advice(primary.code)));
             }
             return paragraphs;
         };
@@ -53,6 +61,7 @@ impl QueryResult {
                 1 => "the one remedy that was tried did not help".to_owned(),
                 runs => format!("none of the {runs} remedies that were tried helped"),
             });
+            paragraphs.push(format!("try: {}", self.advice(primary.code)));
         }
         if !explanation.complete {
             paragraphs.push("stopped before all remedies were tried".to_owned());
@@ -92,12 +101,15 @@ impl QueryResult {
             return format!("cost {:.4}{truth}{shuffled}", cost.best);
         }
         if !self.costs_at_pose.is_empty() {
-            let costs = self.costs_at_pose.iter().map(|one| {
-                let cost = one.cost.map_or("none".to_owned(), |cost| format!("{cost:.4}"));
+            let costs = self.costs_at_pose.iter().filter_map(|one| {
                 let truth = one.truth.map(|truth| format!(" (truth {truth:.4})"));
-                format!("{} {cost}{}", one.method, truth.unwrap_or_default())
+                Some(format!("{} {:.4}{}", one.method, one.cost?, truth.unwrap_or_default()))
             });
-            return costs.collect::<Vec<_>>().join(", ");
+            let costs: Vec<String> = costs.collect();
+            return match costs.is_empty() {
+                true => "too little of the cloud is in view for a cost".to_owned(),
+                false => costs.join(", "),
+            };
         }
         if let (Some(fusion), Some(alone)) = (&self.fusion, &self.per_reference) {
             let found = alone.iter().filter(|one| one.status == Status::Ok).count();

@@ -87,6 +87,14 @@ impl fmt::Display for Preferred {
             Some(judge) => format!(" of {judge}"),
             None => String::new(),
         };
+        // The heights and tilts that are searched may leave no right pose near the truth.
+        if self.cost_near_truth < self.cost_elsewhere {
+            return write!(
+                f,
+                "The lowest cost{of} near the truth, {near}, is at a pose that is not right. The result costs {elsewhere} \
+                 (lower is better)."
+            );
+        }
         write!(
             f,
             "The cost{of} prefers a wrong place: {elsewhere} at {} from the truth. The lowest near the truth is {near} (lower \

@@ -6,7 +6,7 @@ use crate::fusion::{ShareOutcome, average_pose};
 
 pub(super) const RULE: Rule = Rule {
     title: "one reference dragged the fusion",
-    advice: "try --fusion r-wavg or --fusion joint",
+    advice: "use --fusion r-wavg or --fusion joint",
     test: Test::Fusion(test),
     decided_at: DecidedAt::Stage(Stage::Fuse),
     proof: Proof::PoseMap,

@@ -6,6 +6,10 @@ use crate::method::Method;
 pub(super) const RULE: Rule = Rule {
     title: "the wrong method's pose was kept",
     advice: "run the other method alone, or use robust",
+    advice_of: |family| match family {
+        Family::Starts => Some("run the better method alone, or change robust.credit"),
+        _ => None,
+    },
     applies_to: Family::ALL,
     test: Test::Method(test),
     ..Rule::new(Code::H1)

@@ -8,6 +8,10 @@ const FEW_KEYPOINTS: usize = 20;
 pub(super) const RULE: Rule = Rule {
     title: "too few keypoints",
     advice: "lower surf.threshold (fb2: fb2.contrast)",
+    advice_of: |family| match family {
+        Family::Features => Some("lower surf.threshold"),
+        _ => Some("lower fb2.contrast"),
+    },
     applies_to: Family::MATCHING,
     test: Test::Method(test),
     decided_at: DecidedAt::Stage(Stage::Detect),

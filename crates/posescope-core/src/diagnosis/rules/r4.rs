@@ -6,6 +6,10 @@ use super::*;
 pub(super) const RULE: Rule = Rule {
     title: "depths are missing or wrong",
     advice: "raise fb.depth_radius, try fb.depth=guarded; does the cloud belong to the photo?",
+    advice_of: |family| match family {
+        Family::Guided => Some("raise fb2.depth_radius; does the cloud belong to the photo?"),
+        _ => None,
+    },
     applies_to: Family::MATCHING,
     test: Test::Method(test),
     decided_at: DecidedAt::Stage(Stage::DepthLift),

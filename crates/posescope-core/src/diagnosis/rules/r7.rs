@@ -5,6 +5,10 @@ use super::*;
 pub(super) const RULE: Rule = Rule {
     title: "the right pose was refused",
     advice: "get more matches, or try fb.accept=paper",
+    advice_of: |family| match family {
+        Family::Guided => Some("get more matches, or lower fb2.least_probability"),
+        _ => None,
+    },
     applies_to: Family::MATCHING,
     test: Test::Method(test),
     proof: Proof::RivalInliers,

@@ -40,7 +40,7 @@ impl fmt::Display for Accepted {
         let off = metres(self.error.translation_m);
         write!(f, "A wrong pose was accepted: {inliers} matches agree on it, {off} off, {true_inliers} of them true. ")?;
         // True matches point at the cloud, false ones at the photos.
-        if wrong_depth > supports_truth {
+        if 2 * wrong_depth > *supports_truth {
             write!(f, "Of the true matches, {wrong_depth} have a wrong depth, {supports_truth} the right one.")
         } else {
             write!(f, "Something moved or looks alike; the truth explains {supports_truth}.")
