@@ -34,7 +34,7 @@ impl FeatureBased {
         let guide = &params.fb2;
         Self {
             method: METHOD,
-            detector: Detector::Sift(guide.sift.clone()),
+            detector: Detector::Sift(guide.sift),
             params: FeatureParams {
                 ratio: guide.ratio,
                 unique: true,

@@ -37,10 +37,6 @@ use crate::trace::{Cancelled, Trace};
 /// The fewest correspondences that fix a pose: three for P3P, one to choose among its solutions.
 pub(super) const MINIMUM: usize = 4;
 
-/// Trials that are remembered at most, 5 MB: all that the parameters ask for by default. Where there
-/// were more, they are drawn again when somebody wants to hear them.
-const REMEMBERED_TRIALS: usize = 20_000;
-
 /// The feature-based estimator.
 pub struct FeatureBased {
     pub(super) method: Method,
@@ -92,23 +88,6 @@ struct Progress {
     counts: FeatureCounts,
     agreed: Option<Pose>,
     states: FeatureStates,
-}
-
-/// What MLESAC found.
-struct Solved {
-    outcome: Result<Consensus, Failure>,
-    /// All it tried on the way, if a sink wants it and it is not too much.
-    trials: Option<Vec<Trial>>,
-}
-
-impl Solved {
-    fn heap_bytes(&self) -> usize {
-        let found = self.outcome.as_ref().map_or(0, |consensus| {
-            size_of_val(consensus.inliers.as_slice())
-                + size_of_val(consensus.residuals_px.as_slice())
-        });
-        self.trials.as_deref().map_or(0, size_of_val) + found
-    }
 }
 
 impl FeatureBased {
@@ -254,57 +233,26 @@ impl FeatureBased {
         correspondences: &[Correspondence],
         trace: &mut Trace<'_>,
     ) -> Result<Consensus, Halt> {
-        let intrinsics = &problem.query.intrinsics;
-        let params = &self.params.mlesac;
+        let (camera, params) = (&problem.query.intrinsics, &self.params.mlesac);
         let seed = problem.random_seed(self.purpose);
-        // Whoever does not listen has no use for the trials.
-        let is_heard = trace.wants::<HypothesisTried>();
-        let inputs = (intrinsics, params, seed, correspondences, is_heard);
-        let solved = problem.query.memo.try_recall(inputs, Solved::heap_bytes, || {
-            let trials = is_heard.then(Vec::new);
-            self.solve(problem, correspondences, trials, trace)
-        })?;
-        let outcome = match &solved.value.trials {
-            None if solved.reused && is_heard => {
-                let again = self.solve(problem, correspondences, None, trace)?;
-                return Ok(again.outcome?);
-            }
-            Some(trials) if solved.reused => {
-                for &trial in trials {
-                    trace.emit(|| HypothesisTried { trial })?;
-                }
-                &solved.value.outcome
-            }
-            _ => &solved.value.outcome,
+        let solve = |trace: &mut Trace<'_>| {
+            let tell = |trial: &Trial| trace.emit(|| HypothesisTried { trial: *trial });
+            let found = mlesac(correspondences, camera, params, seed, tell);
+            separate_failure(found.map_err(|error| Self::halt(error, correspondences.len())))
         };
-        trace.note_reuse(solved.reused);
-        Ok(outcome.clone()?)
-    }
-
-    /// Runs MLESAC and tells its trials as it goes; `trials` takes them, unless there are too many.
-    fn solve(
-        &self,
-        problem: &Problem,
-        correspondences: &[Correspondence],
-        mut trials: Option<Vec<Trial>>,
-        trace: &mut Trace<'_>,
-    ) -> Result<Solved, Cancelled> {
-        let intrinsics = &problem.query.intrinsics;
-        let params = &self.params.mlesac;
-        let seed = problem.random_seed(self.purpose);
-        let found = mlesac(correspondences, intrinsics, params, seed, |trial| {
-            trials.take_if(|trials| trials.len() == REMEMBERED_TRIALS);
-            if let Some(trials) = &mut trials {
-                trials.push(*trial);
-            }
-            trace.emit(|| HypothesisTried { trial: *trial })
-        });
-        let outcome = match found.map_err(|error| Self::halt(error, correspondences.len())) {
-            Ok(consensus) => Ok(consensus),
-            Err(Halt::Failed(failure)) => Err(failure),
-            Err(Halt::Cancelled) => return Err(Cancelled),
+        let bytes = |found: &Result<Consensus, Failure>| {
+            found.as_ref().map_or(0, |found| {
+                size_of_val(found.inliers.as_slice()) + size_of_val(found.residuals_px.as_slice())
+            })
         };
-        Ok(Solved { outcome, trials })
+        let inputs = (camera, params, seed, correspondences);
+        let found = problem.query.memo.try_recall(inputs, bytes, || solve(trace))?;
+        // Trials are not kept: a sink that wants them has them drawn again.
+        if found.reused && trace.wants::<HypothesisTried>() {
+            solve(trace)?.ok();
+        }
+        trace.note_reuse(found.reused);
+        Ok((*found.value).clone()?)
     }
 }
 

@@ -41,12 +41,11 @@ impl FeatureBased {
             let trace = &mut Trace::off();
             let detected = self.detect(problem, trace)?;
             let query = &detected.query.features;
-            let matches = match detected.is_too_few() {
-                true => Vec::new(),
-                false => {
-                    let decisions = self.best_matches(problem, &detected, trace)?;
-                    FeatureStates::new(query.keypoints.len()).after_matching(&decisions.value)
-                }
+            let matches = if detected.is_too_few() {
+                Vec::new()
+            } else {
+                let decisions = self.best_matches(problem, &detected, trace)?;
+                FeatureStates::new(query.keypoints.len()).after_matching(&decisions.value)
             };
             let reference = &detected.reference.features;
             let lifted = self.lift(&matches, reference, &problem.reference, trace)?;
