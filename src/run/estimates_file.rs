@@ -19,15 +19,11 @@ impl FromStr for EstimatesFile {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let (name, path) =
-            text.split_once('=').filter(|(_, path)| !path.is_empty()).ok_or_else(|| match text
-                .contains('=')
-            {
-                true => "NAME=FILE expected, such as superglue=poses.txt".to_owned(),
-                false => {
-                    format!("NAME=FILE expected; give the poses a name, such as superglue={text}")
-                }
-            })?;
+        let split = text.split_once('=').filter(|(_, path)| !path.is_empty());
+        let (name, path) = split.ok_or_else(|| {
+            let file = if text.contains('=') { "poses.txt" } else { text };
+            format!("NAME=FILE expected; give the poses a name, such as superglue={file}")
+        })?;
         let ours = crate::estimator::methods().find(|method| method.name() == name);
         if let Some(method) = ours {
             return Err(format!(

@@ -42,14 +42,14 @@ impl OnCard {
         if count >= MOST_POINTS || 16 * count as u64 > most_bytes {
             return Err(too_small(format!("{count} points do not fit")));
         }
-        let (kernel, value): (_, &dyn Fn(f32) -> u32) = match workload.statistic {
-            &Statistic::Histogram { bins, .. } if bins > MOST_BINS => {
+        let (kernel, value): (_, &dyn Fn(f32) -> u32) = match *workload.statistic {
+            Statistic::Histogram { bins, .. } if bins > MOST_BINS => {
                 return Err(too_small(format!(
                     "a joint histogram of {bins} × {bins} bins does not fit, at most \
                      {MOST_BINS} × {MOST_BINS} do"
                 )));
             }
-            &Statistic::Histogram { bins, .. } => {
+            Statistic::Histogram { bins, .. } => {
                 (Kernel::Counts { bins: bins as u32 }, &move |value| bin(value, bins) as u32)
             }
             // The core asks for nothing that is not counted.

@@ -106,9 +106,10 @@ impl QueryResult {
                 Some(format!("{} {:.4}{}", one.method, one.cost?, truth.unwrap_or_default()))
             });
             let costs: Vec<String> = costs.collect();
-            return match costs.is_empty() {
-                true => "too little of the cloud is in view for a cost".to_owned(),
-                false => costs.join(", "),
+            return if costs.is_empty() {
+                "too little of the cloud is in view for a cost".to_owned()
+            } else {
+                costs.join(", ")
             };
         }
         if let (Some(fusion), Some(alone)) = (&self.fusion, &self.per_reference) {
