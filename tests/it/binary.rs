@@ -151,3 +151,17 @@ pub fn lines(path: impl AsRef<Path>) -> usize {
 pub fn arg(path: &Path) -> &str {
     path.to_str().expect("a plain path")
 }
+
+/// A command line of the binary that can write no file of more than this size \[kB\], if there is a shell that limits
+/// it.
+pub fn with_files_up_to(size_kb: u32, line: &str) -> Option<Command> {
+    let is_there = Process::new("bash").arg("--version").output().is_ok();
+    if !is_there {
+        println!("skipped: no bash");
+        return None;
+    }
+    let binary = assert_cmd::cargo::cargo_bin!("posescope").display();
+    let mut command = Command::new("bash");
+    command.args(["-c", &format!("trap '' XFSZ; ulimit -f {size_kb}; exec '{binary}' {line}")]);
+    Some(command)
+}

@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 use rerun::external::re_log_encoding::DecoderApp;
 use tempfile::TempDir;
 
-use crate::binary::{Said, background_in, has, lines, refused, run_in, write};
+use crate::binary::{Said, background_in, has, lines, refused, run_in, with_files_up_to, write};
 use crate::small_sequence::SmallSequence;
 
 const RUN: &str = "run sequences/42 --all --reference 4 --method mi";
@@ -60,11 +60,11 @@ fn a_full_disk_ends_a_run_with_what_was_computed() {
 #[test]
 fn a_recording_that_breaks_off_costs_no_result() {
     let sequence = SmallSequence::write();
-    let binary = assert_cmd::cargo::cargo_bin!("posescope").display();
     let line = "run sequences/42 --query 5 --reference 4 --save cut.rrd";
-    let script = format!("trap '' XFSZ; ulimit -f 40; exec '{binary}' {line}");
-    let mut command = assert_cmd::Command::new("bash");
-    command.current_dir(sequence.path()).args(["-c", &script]);
+    let Some(mut command) = with_files_up_to(40, line) else {
+        return;
+    };
+    command.current_dir(sequence.path());
     let said = Said::by(&mut command);
     let said = said.fails_in_one_line(3, "cut.rrd ~ incomplete ~ File too large");
     has(&said.out, "fb ~ pm ~ mi ~ hy");

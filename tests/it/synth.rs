@@ -15,7 +15,7 @@ use posescope::scene::street::{Size, Street};
 use posescope::trace::Trace;
 use tempfile::TempDir;
 
-use crate::binary::{Said, command_in, has, run_in, text, write};
+use crate::binary::{Said, command_in, has, run_in, text, with_files_up_to, write};
 use crate::damage::open;
 use crate::round_trips;
 
@@ -131,10 +131,10 @@ fn a_folder_that_is_not_empty_is_refused_unless_forced() {
 #[test]
 fn a_full_disk_leaves_no_half_file() {
     let folder = TempDir::new().expect("a temporary folder");
-    let binary = assert_cmd::cargo::cargo_bin!("posescope").display();
-    let script = format!("trap '' XFSZ; ulimit -f 500; exec '{binary}' {FEW}");
-    let mut command = assert_cmd::Command::new("bash");
-    command.current_dir(folder.path()).args(["-c", &script]);
+    let Some(mut command) = with_files_up_to(500, FEW) else {
+        return;
+    };
+    command.current_dir(folder.path());
     let said = Said::by(command.env("POSESCOPE_CACHE", ""));
     said.fails_in_one_line(3, ".bin: File too large");
     let left = contents(folder.path()).into_iter().map(|file| file.0);

@@ -39,8 +39,8 @@ impl fmt::Display for Accepted {
         let Self { inliers, true_inliers, supports_truth, wrong_depth, .. } = self;
         let off = metres(self.error.translation_m);
         write!(f, "A wrong pose was accepted: {inliers} matches agree on it, {off} off, {true_inliers} of them true. ")?;
-        // True matches point at the cloud, false ones at the photos.
-        if 2 * wrong_depth > *supports_truth {
+        // A pose on true matches points at the cloud, one on false matches at the photos.
+        if 2 * true_inliers >= *inliers && 2 * wrong_depth > *supports_truth {
             write!(f, "Of the true matches, {wrong_depth} have a wrong depth, {supports_truth} the right one.")
         } else {
             write!(f, "Something moved or looks alike; the truth explains {supports_truth}.")
