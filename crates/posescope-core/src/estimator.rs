@@ -83,7 +83,7 @@ pub struct CostSummary {
 }
 
 impl CostSummary {
-    /// What is told of a minimum that was found.
+    /// The event of the minimum at this offset.
     fn assessed(&self, offset: Offset) -> MinimumAssessed {
         let &Self { initial, best, shuffled, runner_up, .. } = self;
         MinimumAssessed { offset, initial, best, shuffled, runner_up }

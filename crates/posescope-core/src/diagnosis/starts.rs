@@ -38,7 +38,7 @@ impl Starts {
         let (summary, pose) = (subject.outcome.cost?, subject.outcome.pose.as_ref().ok()?);
         subject.evidence.settled.as_ref()?;
         let six = SixFreedoms::new(subject.params);
-        let penalty = |pose: &Pose| six.dearer(&subject.evidence.surfaces, pose);
+        let penalty = |pose: &Pose| six.penalty(&subject.evidence.surfaces, pose);
         let near = six.basin_of(subject.problem, &truth).map(|refined| {
             let error = PoseError::between(&truth, &refined.pose);
             Near {

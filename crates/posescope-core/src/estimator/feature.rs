@@ -117,7 +117,7 @@ impl FeatureBased {
                 Ok::<_, Halt>(detected)
             })?;
             let pose = self.match_and_solve(problem, &detected, &mut progress, trace);
-            // The states are told for a failed query too: they show where its features went.
+            // A failed query emits its states too: they show where its features went.
             if !matches!(pose, Err(Halt::Cancelled)) {
                 trace.emit(|| FeaturesClassified { states: progress.states.shared() })?;
             }

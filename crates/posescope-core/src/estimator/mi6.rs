@@ -89,15 +89,15 @@ impl SixFreedoms {
         self.starts.search(problem, level, Some(&smaller), &compare, trace)
     }
 
-    /// Where a pose leads that nobody searched from, as [`ManyStarts::refined`] says.
+    /// The minimum below a pose from which no search started, as [`ManyStarts::refined`] says.
     pub fn basin_of(&self, problem: &Problem, reference_from_camera: &Pose) -> Option<Refined> {
         let (level, never) = (self.level(problem, 1), || Ok::<_, Infallible>(()));
         let Ok(refined) = self.starts.refined(problem, &level, *reference_from_camera, never);
         refined
     }
 
-    /// How much a pose costs more for being unlikely, where these are the coarse costs.
-    pub fn dearer(&self, coarse: &[Arc<ScoredLattice>], pose: &Pose) -> f64 {
+    /// The penalty of a pose under the prior, given the coarse costs.
+    pub fn penalty(&self, coarse: &[Arc<ScoredLattice>], pose: &Pose) -> f64 {
         self.starts.price(&Spread::of(coarse), pose, 0.0)
     }
 }

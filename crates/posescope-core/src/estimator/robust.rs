@@ -4,7 +4,7 @@
 //! on a wrong pose, and drops a right one that too few matches support. Here the poses of both families
 //! are refined in six freedoms under one cost, that of the [judge](crate::judge), and the cheapest is
 //! the answer. That features agree beyond chance earns their pose a small credit; that they do not costs
-//! it nothing. An unlikely pose is dearer, as `mi6` has it.
+//! it nothing. An unlikely pose gets the penalty of `mi6`.
 
 mod params;
 

@@ -20,7 +20,7 @@ type Decided = Arc<[Option<Match>]>;
 /// What finds and describes features.
 #[derive(Debug)]
 pub(in crate::estimator) enum Detector {
-    /// SURF, or what somebody brought instead.
+    /// SURF, or the matches that the problem contains.
     Surf(SurfParams),
     Sift(SiftParams),
 }
@@ -125,7 +125,7 @@ impl FeatureBased {
     }
 }
 
-/// The matches that somebody brought, if any: what finds and matches features else.
+/// The matches that the problem contains; `None` if features are to be detected and matched.
 fn found_elsewhere(problem: &Problem) -> Result<Option<&FoundMatches>, Failure> {
     match problem.matches.as_deref() {
         None => Ok(None),

@@ -29,14 +29,14 @@ parameters! {
         pub coarse_shrink: usize = 3 => count("coarse_shrink", "", 1..=16),
         /// Lattices of the coarse level, each at a yaw of its own.
         pub coarse_yaws: usize = 11 => count("coarse_yaws", "", 1..=61),
-        /// Turn against the reference's heading that makes a pose dearer by a standard deviation of the coarse
-        /// costs; four times as dear at twice the turn.
+        /// Turn against the reference's heading at which a pose's penalty is one standard deviation of the coarse
+        /// costs; twice the turn has four times the penalty.
         pub usual_yaw_deg: f64 = 8.0 => number("usual_yaw", "°", 0.1..=1000.0),
-        /// Height above or below the reference that does so.
+        /// Height above or below the reference with the same penalty.
         pub usual_height_m: f64 = 0.5 => number("usual_height", "m", 0.01..=1000.0),
-        /// Tilt against the reference, of pitch and roll together, that does so.
+        /// Tilt against the reference, of pitch and roll together, with the same penalty.
         pub usual_tilt_deg: f64 = 1.5 => number("usual_tilt", "°", 0.1..=1000.0),
-        /// How many standard deviations dearer an unlikely pose is at most; 0 takes all for equally likely.
+        /// The greatest penalty of an unlikely pose, in standard deviations; at 0 all poses are equally likely.
         pub unlikely: f64 = 4.0 => number("unlikely", "", 0.0..=100.0),
     }
 }
