@@ -315,6 +315,15 @@ fn the_true_matches_only_become_fewer_on_their_way() {
 }
 
 #[test]
+fn a_limit_of_keypoints_that_is_reached_is_named() {
+    let problem = solvable();
+    let params = with(&["surf.max_keypoints=5"]);
+    let found = verdicts(&problem, Method::FB, &params, Some(&truth(&problem)));
+    assert_eq!(primary(&found), Some(Code::R2), "{found:?}");
+    assert!(found[0].text.ends_with("The limit is surf.max_keypoints=5."), "{found:?}");
+}
+
+#[test]
 fn what_is_said_to_help_helps() {
     let scene = Walls::new();
     let params = with(&["grid.coarse_step=3", "grid.fine_range=0.2"]);

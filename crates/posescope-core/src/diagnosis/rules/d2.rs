@@ -160,3 +160,26 @@ pub(super) fn remedies(ask: &Ask<'_>) -> Vec<Remedy> {
     tried.extend(ask.more_search().map(|more| vec![more]));
     tried
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_lower_cost_near_the_truth_is_not_called_preferred_elsewhere() {
+        let said = |cost_near_truth| {
+            let preferred = Preferred {
+                judge: None,
+                cost_near_truth,
+                cost_at_result: 0.8,
+                cost_elsewhere: 0.8,
+                distance_m: 1.5,
+                near_truth: None,
+                elsewhere: None,
+            };
+            preferred.to_string()
+        };
+        assert!(said(0.9).starts_with("The cost prefers a wrong place: 0.8"), "{}", said(0.9));
+        assert!(said(0.7).contains("is at a pose that is not right"), "{}", said(0.7));
+    }
+}

@@ -9,7 +9,9 @@ pub(super) const RULE: Rule = Rule {
     title: "the search missed a lower cost near the truth",
     advice: "raise grid.rounds or mi6.starts, or lower grid.coarse_step; instead of search=descent, use search=grid",
     advice_of: |family| match family {
-        Family::Grid => Some("raise grid.rounds or lower grid.coarse_step; search=descent stops near its start"),
+        Family::Grid => {
+            Some("raise grid.rounds or lower grid.coarse_step; search=descent stops near its start")
+        }
         Family::Starts => Some("raise mi6.starts or mi6.coarse_yaws, or lower grid.coarse_step"),
         _ => None,
     },

@@ -60,7 +60,10 @@ impl fmt::Display for Matches {
             self.true_matches.unique, self.unique
         )?;
         if let Some(limit) = &self.limit {
-            return write!(f, "visible reference keypoints were not detected in the query: {limit}.");
+            return write!(
+                f,
+                "visible reference keypoints were not detected in the query: {limit}."
+            );
         }
         f.write_str(match self.lost_at {
             Step::View => "reference keypoints with a depth are out of the query's view.",
@@ -90,4 +93,31 @@ pub(super) fn remedies(ask: &Ask<'_>) -> Vec<Remedy> {
         .map(|change| vec![change]),
     );
     tried
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_limit_of_keypoints_is_named_where_detection_lost_them() {
+        let said = |limit: Option<&str>| {
+            let matches = Matches {
+                unique: 6,
+                lost_at: Step::Detect,
+                before: 40,
+                after: 2,
+                limit: limit.map(str::to_owned),
+                true_matches: Funnel::default(),
+            };
+            matches.to_string()
+        };
+        assert!(
+            said(None)
+                .ends_with("38 of 40 visible reference keypoints were not detected in the query.")
+        );
+        assert!(
+            said(Some("surf.max_keypoints=40")).ends_with("in the query: surf.max_keypoints=40.")
+        );
+    }
 }

@@ -38,10 +38,16 @@ impl fmt::Display for Accepted {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { inliers, true_inliers, supports_truth, wrong_depth, .. } = self;
         let off = metres(self.error.translation_m);
-        write!(f, "A wrong pose was accepted: {inliers} matches agree on it, {off} off, {true_inliers} of them true. ")?;
+        write!(
+            f,
+            "A wrong pose was accepted: {inliers} matches agree on it, {off} off, {true_inliers} of them true. "
+        )?;
         // A pose on true matches points at the cloud, one on false matches at the photos.
         if 2 * true_inliers >= *inliers && 2 * wrong_depth > *supports_truth {
-            write!(f, "Of the true matches, {wrong_depth} have a wrong depth, {supports_truth} the right one.")
+            write!(
+                f,
+                "Of the true matches, {wrong_depth} have a wrong depth, {supports_truth} the right one."
+            )
         } else {
             write!(f, "Something moved or looks alike; the truth explains {supports_truth}.")
         }
@@ -54,4 +60,28 @@ fn remedies(ask: &Ask<'_>) -> Vec<Remedy> {
         tried.insert(1, vec![ask.word("fb.depth", "guarded")]);
     }
     tried
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn false_matches_point_at_the_photos_and_true_ones_without_depths_at_the_cloud() {
+        let said = |true_inliers, wrong_depth| {
+            let accepted = Accepted {
+                error: PoseError { translation_m: 3.0, rotation_deg: 0.0, max_euler_deg: 0.0 },
+                inliers: 20,
+                true_inliers,
+                supports_truth: 21,
+                wrong_depth,
+                true_matches: Funnel::default(),
+            };
+            accepted.to_string()
+        };
+        let alike = "Something moved or looks alike; the truth explains 21.";
+        assert!(said(14, 18).ends_with("18 have a wrong depth, 21 the right one."));
+        assert!(said(14, 10).ends_with(alike));
+        assert!(said(3, 27).ends_with(alike));
+    }
 }
