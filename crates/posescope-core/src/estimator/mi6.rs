@@ -89,7 +89,7 @@ impl SixFreedoms {
         self.starts.search(problem, level, Some(&smaller), &compare, trace)
     }
 
-    /// The minimum below a pose from which no search started, as [`ManyStarts::refined`] says.
+    /// The minimum below a pose from which no search started, or `None` where none is
     pub fn basin_of(&self, problem: &Problem, reference_from_camera: &Pose) -> Option<Refined> {
         let (level, never) = (self.level(problem, 1), || Ok::<_, Infallible>(()));
         let Ok(refined) = self.starts.refined(problem, &level, *reference_from_camera, never);
