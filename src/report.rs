@@ -248,11 +248,10 @@ fn draw_failures(
         let references = scenes.references[pair.scene_index].as_ref();
         let queries = scenes.of_queries(pair);
         let localizer = Localizer::new(references, queries, params, run.protocol.seed);
-        let Ok(foreign) = run.protocol.foreign(queries) else {
+        let Ok(localizer) = run.protocol.configured(localizer) else {
             continue;
         };
-        let localizer = run.protocol.configured(localizer);
-        let localizer = localizer.with_foreign(foreign).explaining(0);
+        let localizer = localizer.explaining(0);
         for &at in failures {
             let result = &results[at].result;
             let is_of_pair = run.pair_of(result).is_some_and(|found| std::ptr::eq(found, pair));

@@ -86,7 +86,8 @@ fn save(lesson: &Lesson, path: &Path, terminal: &Terminal) -> Result<(), CliErro
     }
     let recorder = recorder(lesson, &settings, path)?;
     let bar = terminal.bar(settings.iter().map(estimates).sum());
-    let mut observer = CliObserver::new(bar.clone(), Some(recorder), interrupt.clone());
+    let mut observer = CliObserver::new(bar.clone(), interrupt.clone());
+    observer.recorder = Some(recorder);
     let mut outcome = Ok(());
     for (number, ((_, pages), setting)) in groups.iter().zip(settings).enumerate() {
         observer.pages = Some(PageTurner::new(lesson, pages.clone()));

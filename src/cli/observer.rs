@@ -19,6 +19,9 @@ use super::event_export::EventExport;
 use super::interrupt::Interrupt;
 use super::match_export::MatchExport;
 
+/// From this number of candidates, an index is worth building.
+const MANY: usize = 100;
+
 /// Advances a progress bar with every finished method, and feeds recorder and exports.
 pub struct CliObserver {
     pub recorder: Option<Recorder>,
@@ -30,8 +33,10 @@ pub struct CliObserver {
     pub events: Option<EventExport>,
     /// Ends the run at a breakpoint, if one is set.
     pub stop: Option<StopAtBreakpoint>,
+    /// The scene whose photos are compared one by one, if an index should be recommended for it.
+    pub index_for: Option<String>,
+    pub bar: indicatif::ProgressBar,
     interrupt: Interrupt,
-    bar: indicatif::ProgressBar,
     progress: Option<Progress>,
     /// Query and reference of each problem.
     tasks: Vec<String>,
@@ -45,17 +50,14 @@ pub struct CliObserver {
 }
 
 impl CliObserver {
-    pub fn new(
-        bar: indicatif::ProgressBar,
-        recorder: Option<Recorder>,
-        interrupt: Interrupt,
-    ) -> Self {
+    pub fn new(bar: indicatif::ProgressBar, interrupt: Interrupt) -> Self {
         Self {
-            recorder,
+            recorder: None,
             export: None,
             pages: None,
             events: None,
             stop: None,
+            index_for: None,
             interrupt,
             bar,
             progress: None,
@@ -64,6 +66,12 @@ impl CliObserver {
             problems: Vec::new(),
             problem: 0,
             method: None,
+        }
+    }
+
+    fn record(&mut self, record: impl FnOnce(&mut Recorder)) {
+        if let Some(recorder) = &mut self.recorder {
+            record(recorder);
         }
     }
 
@@ -135,9 +143,21 @@ impl LocalizeObserver for CliObserver {
             self.problems = problems.to_vec();
         }
         self.progress = None;
-        if let Some(recorder) = &mut self.recorder {
-            recorder.begin_query(index, problems, truth);
+        self.record(|recorder| recorder.begin_query(index, problems, truth));
+    }
+
+    fn choosing(&mut self, looked_at: usize, candidates: usize) {
+        if candidates >= MANY
+            && let Some(scene) = self.index_for.take()
+        {
+            eprintln!(
+                "Comparing the query with {candidates} photos. An index is faster: run `posescope index {scene}`, then use \
+                 --reference retrieve:1"
+            );
         }
+        self.bar.set_message("choosing references");
+        self.bar.set_length(candidates as u64);
+        self.bar.set_position(looked_at as u64);
     }
 
     fn begin_method(&mut self, problem: usize, method: Method) {
@@ -145,16 +165,12 @@ impl LocalizeObserver for CliObserver {
         self.progress = Some(Progress::new(self.bar.clone(), task));
         self.problem = problem;
         self.method = Some(method);
-        if let Some(recorder) = &mut self.recorder {
-            recorder.begin_method(problem, method);
-        }
+        self.record(|recorder| recorder.begin_method(problem, method));
     }
 
     fn end_method(&mut self, result: &QueryResult, times: &StageTimes) {
         self.bar.inc(1);
-        if let Some(recorder) = &mut self.recorder {
-            recorder.end_method(result, times);
-        }
+        self.record(|recorder| recorder.end_method(result, times));
     }
 
     fn explaining(&mut self, result: &QueryResult, tried: usize, remedies: usize) {
@@ -167,17 +183,13 @@ impl LocalizeObserver for CliObserver {
     }
 
     fn explained(&mut self, result: &QueryResult) {
-        if let Some(recorder) = &mut self.recorder {
-            recorder.explained(result);
-        }
+        self.record(|recorder| recorder.explained(result));
     }
 
     fn begin_fusion(&mut self, method: Method) {
         self.problem = 0;
         self.method = Some(method);
-        if let Some(recorder) = &mut self.recorder {
-            recorder.begin_fusion(method);
-        }
+        self.record(|recorder| recorder.begin_fusion(method));
     }
 
     fn attention(&self) -> Option<Arc<AtomicBool>> {
@@ -185,8 +197,6 @@ impl LocalizeObserver for CliObserver {
     }
 
     fn end_fusion(&mut self, result: &QueryResult) {
-        if let Some(recorder) = &mut self.recorder {
-            recorder.end_fusion(result);
-        }
+        self.record(|recorder| recorder.end_fusion(result));
     }
 }

@@ -11,8 +11,8 @@ use super::scene_pair::ScenePair;
 use crate::estimator::Failure;
 use crate::fusion::Fusion;
 use crate::localize::{
-    ChoiceError, Chooser, LocalizeObserver, Localizer, NoObserver, QueryResult, Ranking,
-    References, Request, StageTimes,
+    ChoiceError, LocalizeObserver, Localizer, NoObserver, QueryResult, Ranking, References,
+    Request, StageTimes,
 };
 use crate::method::Method;
 use crate::params::Params;
@@ -166,8 +166,7 @@ impl Execution<'_> {
             let queries = self.scenes.of_queries(first.pair);
             let protocol = &self.run.protocol;
             let localizer = Localizer::new(references, queries, self.params, protocol.seed);
-            let localizer = protocol.configured(localizer);
-            let localizer = localizer.with_foreign(protocol.foreign(queries)?);
+            let localizer = protocol.configured(localizer)?;
             let left_out = self.left_out(first.pair, references)?;
             for item in now {
                 observer.begin(item);
@@ -239,14 +238,7 @@ impl Execution<'_> {
             .and_then(|at| self.indices.get(at))
             .map(|index| index.as_ref());
         let choose = |radius_m: f64| {
-            let chooser = Chooser {
-                localizer,
-                params: self.params,
-                selection: protocol.selection(),
-                radius_m,
-                seed: protocol.seed,
-                index,
-            };
+            let chooser = protocol.chooser(localizer, radius_m, index);
             chooser.choose(frame, &|frame| left_out.contains(&frame), &mut NoObserver)
         };
         let mut requests = Vec::new();

@@ -10,8 +10,8 @@ use super::pausing::PausingObserver;
 use super::run::RunState;
 use super::task::Task;
 use crate::localize::{
-    ChoiceError, Chooser, LocalizeError, LocalizeObserver, Localizer, QueryResult, Ranking,
-    References, Request, Selection, words_of,
+    ChoiceError, LocalizeError, LocalizeObserver, Localizer, QueryResult, Ranking, References,
+    Request, Selection, words_of,
 };
 use crate::scene::{FrameStore, NoIndex, Scene, SceneError};
 
@@ -125,9 +125,8 @@ impl Job {
     ) -> Result<Vec<QueryResult>, JobError> {
         let (task, protocol) = (&self.task, &self.task.protocol);
         let scenes = (self.frames.of(&self.references), self.frames.of(&self.queries));
-        let localizer =
-            protocol.configured(Localizer::with_cached_scenes(scenes, &task.params, protocol.seed));
-        let localizer = localizer.with_foreign(protocol.foreign(self.queries.as_ref())?);
+        let localizer = Localizer::with_cached_scenes(scenes, &task.params, protocol.seed);
+        let localizer = protocol.configured(localizer)?;
         let chosen = self.choose(&localizer, observer)?;
         on_choice(&chosen);
         let request = Request {
@@ -164,14 +163,8 @@ impl Job {
             }
             _ => None,
         };
-        let chooser = Chooser {
-            localizer,
-            params: &task.params,
-            selection: protocol.selection(),
-            radius_m: task.reach_m(),
-            seed: protocol.seed,
-            index: index.as_deref().map(|index| index as &dyn Ranking),
-        };
+        let index = index.as_deref().map(|index| index as &dyn Ranking);
+        let chooser = protocol.chooser(localizer, task.reach_m(), index);
         let chosen = chooser.choose(self.query, &|_| false, observer)?;
         if chosen.frames.is_empty() {
             return Err(JobError::NoneNear { query: query(), radius_m: task.reach_m() });

@@ -3,12 +3,10 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
-use std::time::{Duration, Instant};
 
 use super::breakpoint::Breakpoints;
-use super::loaded::Loaded;
 use super::message::Outbox;
-use super::run::{Part, Run, RunState};
+use super::run::{Loaded, Part, Run, RunState};
 use crate::event::Event;
 use crate::geometry::Pose;
 use crate::localize::{LocalizeObserver, QueryResult, StageTimes};
@@ -68,9 +66,6 @@ pub(super) struct PausingObserver {
     pause_at: PauseAt,
     /// Where steps from the last event end; `None` before the first event.
     steps: Option<Steps>,
-    begun: Instant,
-    /// The total time spent waiting for commands.
-    waited: Duration,
 }
 
 /// Where to pause next, apart from breakpoints.
@@ -138,8 +133,6 @@ impl PausingObserver {
             is_cancelled: false,
             pause_at: PauseAt::new(mode, None),
             steps: None,
-            begun: Instant::now(),
-            waited: Duration::ZERO,
         };
         (control, observer)
     }
@@ -171,7 +164,6 @@ impl PausingObserver {
     /// Waits for a command to continue.
     fn wait(&mut self, breakpoint: Option<String>) -> Result<(), Cancelled> {
         self.outbox.state(RunState::Paused { breakpoint })?;
-        let since = Instant::now();
         let mut goes = false;
         while !goes {
             let command = self.commands.recv().map_err(|_| Cancelled)?;
@@ -181,7 +173,6 @@ impl PausingObserver {
                 return Err(Cancelled);
             }
         }
-        self.waited += since.elapsed();
         self.outbox.state(RunState::Running)
     }
 }
@@ -238,11 +229,9 @@ impl LocalizeObserver for PausingObserver {
 
 impl Sink for PausingObserver {
     fn accept(&mut self, record: &Record) -> Result<(), Cancelled> {
-        // Waiting does not count as work.
-        let worked = self.begun.elapsed().saturating_sub(self.waited);
         let record_copy = record.clone();
         self.outbox.change(move |run| {
-            run.push(record_copy, worked);
+            run.push(record_copy);
             // Either it was resumed, or it reports the pause next.
             run.state = RunState::Running;
         })?;
