@@ -18,7 +18,7 @@ use include_dir::{Dir, include_dir};
 pub use file::LessonError;
 pub use moment::{Moment, MomentError, Watch};
 pub use page::{Answer, Page, Question};
-pub use setting::{OpenSetting, Setting, SettingError, named_scenes};
+pub use setting::{Setting, SettingError, named_scenes};
 pub use turner::PageTurner;
 
 use crate::measure::Condition;

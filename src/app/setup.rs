@@ -8,7 +8,6 @@ use std::sync::Arc;
 use crate::estimator;
 use crate::event::Side;
 use crate::image::Degradation;
-use crate::lesson::OpenSetting;
 use crate::localize::{References, Selection, frames_within, is_one_drive};
 use crate::method::Method;
 use crate::scene::{FrameStore, Scene};
@@ -71,15 +70,15 @@ pub struct Setup {
 
 impl Setup {
     /// What a lesson localises.
-    pub fn of_lesson(open: OpenSetting, folder: PathBuf) -> Self {
-        let OpenSetting { task, scenes, query, references } = open;
+    pub fn of_lesson(job: Job, folder: PathBuf) -> Self {
+        let Job { references, queries, query, chosen, task, index, .. } = job;
         Self {
             offered: vec![query],
-            references: scenes.references,
-            queries: scenes.queries,
+            references,
+            queries,
             query,
-            chosen: references.into(),
-            index: Arc::new(IndexFile::of(&task)),
+            chosen,
+            index,
             task,
             mode: RunMode::Running,
             folder,

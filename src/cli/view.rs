@@ -160,29 +160,29 @@ fn of_a_run(args: &ViewArgs, folder: &Path) -> Result<(Setup, KnownResults), Cli
     refuse_other_queries(args)?;
     let mut protocol = args.task.protocol.over(file.protocol.clone())?;
     let format = protocol.format.as_deref();
-    let references: Arc<dyn Scene> = scene::open(&scene_argument, format)?.into();
-    let other = protocol
-        .query_scene
-        .iter()
-        .find(|argument| {
-            let scene = scene::open(argument, format);
-            scene.is_ok_and(|scene| scene.name() == pair.query_scene)
-        })
-        .filter(|_| pair.query_scene != pair.scene)
-        .cloned();
-    let queries: Arc<dyn Scene> = match &other {
-        Some(argument) => scene::open(argument, format)?.into(),
-        None => Arc::clone(&references),
+    let is_its = |argument: &&String| {
+        let scene = scene::open(argument, format);
+        scene.is_ok_and(|scene| scene.name() == pair.query_scene)
     };
-    let queries = protocol.prepared_queries(queries, references.as_ref())?;
+    let other = protocol.query_scene.iter().find(is_its);
+    let other = other.filter(|_| pair.query_scene != pair.scene).cloned();
+    protocol.query_scene = other.into_iter().collect();
+    protocol.limit = None;
+    protocol.preset = None;
+    protocol.failure_radius_m = None;
+    protocol.radii_m.truncate(1);
+    let mut task =
+        Task { protocol, breakpoints: args.task.breakpoints.clone(), ..Task::of(scene_argument) };
+    let scenes = task.open(&|_| None)?;
+    let (references, queries) = (scenes.references.as_ref(), scenes.queries.as_ref());
     let params = file
         .params()
         .map_err(|source| CliError::Config { path: folder.join("run.toml"), source })?;
-    let params = args.task.config.over(params)?;
+    task.params = args.task.config.over(params)?;
     let results_of = |folder: &Path| -> Result<Results, CliError> {
-        let mut results = results_of(folder, pair, queries.as_ref())?;
+        let mut results = results_of(folder, pair, queries)?;
         for result in results.values_mut().flatten() {
-            *result = result.clone().graded(protocol.right);
+            *result = result.clone().graded(task.protocol.right);
         }
         Ok(results)
     };
@@ -202,24 +202,12 @@ fn of_a_run(args: &ViewArgs, folder: &Path) -> Result<(Setup, KnownResults), Cli
         (None, None) => 0,
     };
     let of_run = results.get(&query).and_then(|results| results.first());
-    let named: Vec<&str> = protocol.named_references().collect();
+    let named: Vec<&str> = task.protocol.named_references().collect();
     let of_run = of_run.iter().flat_map(|result| &result.references);
     let of_run = of_run.map(String::as_str).filter(|_| named.is_empty());
     let chosen = named.iter().copied().chain(of_run);
     let chosen = chosen.map(|name| references.find(name));
     let chosen = chosen.collect::<Result<Vec<_>, _>>()?;
-    protocol.query_scene = other.into_iter().collect();
-    protocol.limit = None;
-    protocol.preset = None;
-    protocol.failure_radius_m = None;
-    protocol.radii_m.truncate(1);
-    let task = Task {
-        protocol,
-        params,
-        breakpoints: args.task.breakpoints.clone(),
-        ..Task::of(scene_argument)
-    };
-    let scenes = TaskScenes { references, queries };
     let setup =
         Setup { query, ..setup_of(task, scenes, results.keys().copied().collect(), chosen) };
     let known = KnownResults { now: results, before };

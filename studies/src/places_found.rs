@@ -60,7 +60,8 @@ pub fn run(options: &Options) -> Result<(), Failure> {
     let temporary = tempfile::tempdir()?;
     let path = options.index.clone().unwrap_or_else(|| temporary.path().join("places"));
     if Index::open(&path, params.retrieval.checks).is_err() {
-        let mut request = Retriever::request(references.as_ref(), &index_options, &params);
+        let mut request =
+            Retriever::request(references.as_ref(), &index_options, &Default::default(), &params);
         request.frames.retain(|frame| !held_out.contains(frame));
         let started = Instant::now();
         Retriever::build(references.as_ref(), &path, &request, &params, |p| {

@@ -225,7 +225,7 @@ fn claims_hold(is_meant: impl Fn(&Lesson) -> bool) {
         // What no page shows is run for its claims alone.
         for (variant, setting) in &lesson.variants {
             if !results.iter().any(|(shown, _)| shown == variant) {
-                let job = setting.open(&|_| None).expect("a setting").job(&Arc::default());
+                let job = setting.open(&|_| None).expect("a setting");
                 let told = job.work(0, &mut NoObserver, |_| {}).expect("results");
                 results.push((variant.clone(), told));
             }

@@ -38,7 +38,7 @@ fn index(file: &Path, params: &Params) {
     let scene = Walls::new();
     let options = IndexOptions { words: 400, every: 1, seed: 0 };
     // The photos behind the first three cannot all be read.
-    let mut request = Retriever::request(&scene, &options, params);
+    let mut request = Retriever::request(&scene, &options, &Default::default(), params);
     request.frames.truncate(3);
     Retriever::build(&scene, file, &request, params, |_| {}).expect("an index");
 }

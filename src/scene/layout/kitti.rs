@@ -4,48 +4,44 @@
 //! therefore also that of camera 0, which poses and `Tr` refer to. Scans are in the frame of the scanner, as in KITTI:
 //! x forward, y left, z up. Reading a scan back rounds its points by a few micrometres.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use nalgebra::{Matrix3x4, Point3, Vector3};
 
 use super::{
-    CAMERA_FROM_VELODYNE, Drive, DriveWriter, Layout, Shot, make_folder, make_frame_folder,
-    row_by_row, write, write_image,
+    CAMERA_FROM_VELODYNE, Drive, DriveWriter, Layout, make_folder, make_frame_folder, row_by_row,
+    write, write_image,
 };
 use crate::camera::Intrinsics;
 use crate::geometry::matrix_from_pose;
 use crate::scene::SceneError;
 
-pub(super) const LAYOUT: Layout = Layout {
-    name: "kitti",
-    place: |name| format!("sequences/{name}"),
-    create: |root, name, drive| Ok(Box::new(Writer::create(root, name, drive)?)),
-};
+pub(super) const LAYOUT: Layout =
+    Layout { name: "kitti", place: |name| format!("sequences/{name}"), create };
 
 const IMAGES: &str = "image_2";
 const SCANS: &str = "velodyne";
 
-struct Writer {
-    folder: PathBuf,
-    drive: Drive,
-}
-
-impl Writer {
-    fn create(root: &Path, name: &str, drive: Drive) -> Result<Self, SceneError> {
-        let folder = root.join("sequences").join(name);
-        let poses = root.join("poses");
-        make_folder(&poses)?;
-        for (kind, extension) in [(IMAGES, "png"), (SCANS, "bin")] {
-            make_frame_folder(&folder.join(kind), extension)?;
-        }
-        write(&folder.join("calib.txt"), calibration(&drive))?;
-        let lines = drive.poses.iter().map(matrix_from_pose);
-        let lines: String = lines.map(|pose| row_by_row(&pose) + "\n").collect();
-        write(&poses.join(format!("{name}.txt")), lines)?;
-        let times = drive.times_s.iter().map(|time| format!("{time:e}\n"));
-        write(&folder.join("times.txt"), times.collect::<String>().as_bytes())?;
-        Ok(Self { folder, drive })
+fn create(root: &Path, name: &str, drive: Drive) -> Result<DriveWriter, SceneError> {
+    let folder = root.join("sequences").join(name);
+    let poses = root.join("poses");
+    make_folder(&poses)?;
+    for (kind, extension) in [(IMAGES, "png"), (SCANS, "bin")] {
+        make_frame_folder(&folder.join(kind), extension)?;
     }
+    write(&folder.join("calib.txt"), calibration(&drive))?;
+    let lines = drive.poses.iter().map(matrix_from_pose);
+    let lines: String = lines.map(|pose| row_by_row(&pose) + "\n").collect();
+    write(&poses.join(format!("{name}.txt")), lines)?;
+    let times = drive.times_s.iter().map(|time| format!("{time:e}\n"));
+    write(&folder.join("times.txt"), times.collect::<String>().as_bytes())?;
+    Ok(DriveWriter::new(move |shot| {
+        let name = &drive.names[shot.index];
+        let scan = velodyne_bytes(shot.scan, &drive.scanner);
+        // The scan first: a frame with a photo is complete.
+        write(&folder.join(SCANS).join(format!("{name}.bin")), &scan)?;
+        write_image(&folder.join(IMAGES).join(format!("{name}.png")), shot.photo)
+    }))
 }
 
 fn calibration(drive: &Drive) -> String {
@@ -62,16 +58,6 @@ fn calibration(drive: &Drive) -> String {
         (0..4).map(|camera| format!("P{camera}: {}\n", row_by_row(&projection))).collect();
     text += &format!("Tr: {}\n", row_by_row(&camera_from_velodyne));
     text
-}
-
-impl DriveWriter for Writer {
-    fn frame(&self, shot: &Shot<'_>) -> Result<(), SceneError> {
-        let name = &self.drive.names[shot.index];
-        let scan = velodyne_bytes(shot.scan, &self.drive.scanner);
-        // The scan first: a frame with a photo is complete.
-        write(&self.folder.join(SCANS).join(format!("{name}.bin")), &scan)?;
-        write_image(&self.folder.join(IMAGES).join(format!("{name}.png")), shot.photo)
-    }
 }
 
 /// A scan in the frame of its scanner, given the scanner's position in the camera's frame \[m\].
