@@ -5,6 +5,7 @@ mod diff;
 #[cfg(feature = "cli")]
 mod export;
 mod gate;
+mod groups;
 #[cfg(feature = "cli")]
 mod junit;
 mod known;

@@ -11,7 +11,6 @@ use posescope::localize::{LocalizeObserver, QueryResult, StageTimes};
 use posescope::method::Method;
 use posescope::problem::Problem;
 use posescope::session::{Explaining, StopAtBreakpoint};
-use posescope::sink::Progress;
 use posescope::sink::rerun::Recorder;
 use posescope::trace::{Cancelled, Record, Sink};
 
@@ -37,9 +36,8 @@ pub struct CliObserver {
     pub index_for: Option<String>,
     pub bar: indicatif::ProgressBar,
     interrupt: Interrupt,
-    progress: Option<Progress>,
-    /// Query and reference of each problem.
-    tasks: Vec<String>,
+    /// The open stages of the current method.
+    stages: Vec<&'static str>,
     /// The start of the current explanation.
     explaining_since: Instant,
     problems: Vec<Problem>,
@@ -60,8 +58,7 @@ impl CliObserver {
             index_for: None,
             interrupt,
             bar,
-            progress: None,
-            tasks: Vec::new(),
+            stages: Vec::new(),
             explaining_since: Instant::now(),
             problems: Vec::new(),
             problem: 0,
@@ -99,9 +96,18 @@ impl Sink for CliObserver {
     }
 
     fn accept(&mut self, record: &Record) -> Result<(), Cancelled> {
+        let problem = self.problems.get(self.problem);
         let is_stage = matches!(record.event, Event::StageStarted(_) | Event::StageEnded(_));
-        if is_stage && let Some(progress) = &mut self.progress {
-            progress.accept(record)?;
+        match &record.event {
+            Event::StageStarted(started) => {
+                self.stages.push(started.stage.name());
+                let names = problem.map(|problem| (&problem.query.name, &problem.reference.name));
+                let task = names.map(|(query, reference)| format!("{query} ← {reference}"));
+                let path = self.stages.join(" › ");
+                self.bar.set_message(format!("{} {path}", task.unwrap_or_default()));
+            }
+            Event::StageEnded(_) => drop(self.stages.pop()),
+            _ => {}
         }
         match &mut self.recorder {
             Some(recorder) if is_stage || recorder.wanted().contains(record.event.kind()) => {
@@ -114,10 +120,9 @@ impl Sink for CliObserver {
                 recorder.show_page(&page);
             }
         }
-        if let (Some(export), Some(problem)) = (&mut self.export, self.problems.get(self.problem)) {
+        if let (Some(export), Some(problem)) = (&mut self.export, problem) {
             export.accept(record, problem);
         }
-        let problem = self.problems.get(self.problem);
         if let (Some(events), Some(problem), Some(method)) =
             (&mut self.events, problem, self.method)
         {
@@ -136,13 +141,8 @@ impl Sink for CliObserver {
 
 impl LocalizeObserver for CliObserver {
     fn begin_query(&mut self, index: usize, problems: &[Problem], truth: Option<&Pose>) {
-        let name =
-            |problem: &Problem| format!("{} ← {}", problem.query.name, problem.reference.name);
-        self.tasks = problems.iter().map(name).collect();
-        if self.export.is_some() || self.events.is_some() {
-            self.problems = problems.to_vec();
-        }
-        self.progress = None;
+        self.problems = problems.to_vec();
+        self.stages.clear();
         self.record(|recorder| recorder.begin_query(index, problems, truth));
     }
 
@@ -161,8 +161,7 @@ impl LocalizeObserver for CliObserver {
     }
 
     fn begin_method(&mut self, problem: usize, method: Method) {
-        let task = self.tasks.get(problem).cloned().unwrap_or_default();
-        self.progress = Some(Progress::new(self.bar.clone(), task));
+        self.stages.clear();
         self.problem = problem;
         self.method = Some(method);
         self.record(|recorder| recorder.begin_method(problem, method));

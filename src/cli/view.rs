@@ -188,14 +188,10 @@ fn of_a_run(args: &ViewArgs, folder: &Path) -> Result<(Setup, KnownResults), Cli
     };
     let results = results_of(folder)?;
     let before = args.before.as_deref().map(results_of).transpose()?;
-    let is_failure = |results: &[QueryResult]| {
-        let mut results = results.iter();
-        results.any(|result| result.grade.is_failure())
+    let has_failed = |(_, results): &(&usize, &Vec<QueryResult>)| {
+        results.iter().any(|result| result.grade.is_failure())
     };
-    let first = results
-        .iter()
-        .find(|(_, results)| is_failure(results.as_slice()))
-        .or_else(|| results.iter().next());
+    let first = results.iter().find(has_failed).or_else(|| results.iter().next());
     let query = match (&args.query, first) {
         (Some(name), _) => queries.find(name)?,
         (None, Some((query, _))) => *query,

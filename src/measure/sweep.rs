@@ -2,12 +2,12 @@
 
 use std::path::Path;
 
+use super::groups::grouped;
 use super::metrics::{Group, Measures};
 use super::plots;
 use super::report::write;
 use super::tables::NOTHING;
 use crate::chart;
-use crate::method::Method;
 use crate::run::{FolderError, Sweep};
 use crate::table::Table;
 
@@ -32,9 +32,13 @@ pub fn write_sweep(folder: &Path, sweep: &Sweep, runs: &[SweptRun]) -> Result<Ta
         unit => format!("{} ({unit})", sweep.key()),
     };
     for (what, label, figure) in CURVES {
-        let charts = groups(runs).into_iter().filter_map(|group| {
+        let charts = groups(runs).into_iter().filter_map(|(group, measures)| {
             let title = format!("{label} over {axis}: {group}");
-            plots::curves(title, &axis, label, curves(runs, group, &figure))
+            // Missing figures have no point.
+            let points = measures
+                .into_iter()
+                .filter_map(|(value, one)| Some((one.method, (value.parse().ok()?, figure(one)?))));
+            plots::curves(title, &axis, label, grouped(points))
         });
         let charts: Vec<_> = charts.collect();
         let path = folder.join(format!("{what}.svg"));
@@ -51,37 +55,12 @@ const CURVES: [Curve; 2] = [
     ("median", "median error of successes (m)", |one| one.of_successes.median_m),
 ];
 
-/// The groups of all runs, in the order of their first figures.
-fn groups(runs: &[SweptRun]) -> Vec<&Group> {
-    let mut groups: Vec<&Group> = Vec::new();
-    for one in runs.iter().flat_map(|run| &run.measures) {
-        if !groups.contains(&&one.group) {
-            groups.push(&one.group);
-        }
-    }
-    groups
-}
-
-/// One line per method. Missing figures have no point.
-fn curves(
-    runs: &[SweptRun],
-    group: &Group,
-    figure: &dyn Fn(&Measures) -> Option<f64>,
-) -> Vec<(Method, Vec<(f64, f64)>)> {
-    let mut lines: Vec<(Method, Vec<(f64, f64)>)> = Vec::new();
-    for run in runs {
-        let Ok(x) = run.value.parse::<f64>() else {
-            continue;
-        };
-        for one in run.measures.iter().filter(|one| one.group == *group) {
-            let Some(y) = figure(one) else { continue };
-            match lines.iter_mut().find(|line| line.0 == one.method) {
-                Some(line) => line.1.push((x, y)),
-                None => lines.push((one.method, vec![(x, y)])),
-            }
-        }
-    }
-    lines
+/// The groups of all runs, each with its figures and their values.
+fn groups(runs: &[SweptRun]) -> Vec<(&Group, Vec<(&str, &Measures)>)> {
+    grouped(runs.iter().flat_map(|run| {
+        let measures = run.measures.iter();
+        measures.map(|one| (&one.group, (run.value.as_str(), one)))
+    }))
 }
 
 fn table(sweep: &Sweep, runs: &[SweptRun]) -> Table {

@@ -10,9 +10,12 @@ use super::stream::Stream;
 use crate::cost::ExplanationKind;
 use crate::estimator::{self, Entry};
 use crate::features::FeatureState;
+use crate::geometry::Pose;
+use crate::localize::QueryResult;
 use crate::method::Method;
 use crate::palette;
 use crate::problem::Problem;
+use crate::proof::responsible;
 
 /// Ranked frames per row; car photos are wide.
 const RANKS_PER_ROW: usize = 3;
@@ -42,6 +45,33 @@ pub(super) struct Focus {
     pub(super) proven: Vec<Method>,
     /// Places that the view of the world must include, in the frame of the first reference camera \[m\].
     pub(super) places: Vec<[f64; 3]>,
+}
+
+impl Focus {
+    /// From all results of a query.
+    pub(super) fn of(
+        first: &Problem,
+        truth: Option<&Pose>,
+        results: &[QueryResult],
+        proven: &[Method],
+    ) -> Self {
+        let wrong = results.iter().filter(|result| is_wrong(result));
+        let estimates = results.iter().filter_map(|result| result.pose.as_ref()?.to_pose());
+        let in_reference = |pose: &Pose| -> [f64; 3] {
+            first.reference_from_query(pose).translation.vector.into()
+        };
+        Self {
+            wrong: wrong.filter_map(responsible).collect(),
+            proven: proven.to_vec(),
+            places: estimates.chain(truth.copied()).map(|pose| in_reference(&pose)).collect(),
+        }
+    }
+}
+
+/// Whether a result is wrong or missing, or has a failure verdict.
+pub(super) fn is_wrong(result: &QueryResult) -> bool {
+    let mut verdicts = result.diagnosis.iter();
+    result.grade.is_failure() || verdicts.any(|one| one.code.is_failure())
 }
 
 /// Sends the layout for a run.

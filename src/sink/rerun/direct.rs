@@ -6,8 +6,8 @@ use rerun::Scalars;
 
 use super::encode::{Encoded, indexed, png};
 use super::entities;
-use super::event_context::EventContext;
 use super::indexed;
+use super::scene::EventContext;
 use super::stream::Stream;
 use super::surface::{self, CostRange};
 use crate::cost::{Entropies, Explanation};

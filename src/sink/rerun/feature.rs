@@ -7,8 +7,7 @@ use rerun::{BarChart, Clear, LineStrips2D, Points2D, Radius, Scalars, TextDocume
 
 use super::encode::jpeg;
 use super::entities::{self, UNDECIDED};
-use super::event_context::EventContext;
-use super::scene::log_rays;
+use super::scene::{EventContext, log_rays};
 use super::stream::Stream;
 use crate::depth::LiftedMatch;
 use crate::event::{DepthsLifted, Event, FeaturesDetected, HypothesisTried, MatchesGuided, Side};

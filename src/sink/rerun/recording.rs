@@ -6,14 +6,12 @@ use std::sync::Arc;
 use image::DynamicImage;
 use rerun::{StateChange, TextDocument, TextLog, TextLogLevel, ViewCoordinates};
 
-use super::blueprint::Focus;
+use super::blueprint::{Focus, is_wrong};
 use super::direct::DirectContext;
 use super::encode::jpeg;
-use super::event_context::EventContext;
 use super::feature::FeatureContext;
 use super::fusion::FusionTables;
-use super::scene::{self, Origin, PlacedCamera};
-use super::story;
+use super::scene::{self, EventContext, Origin, PlacedCamera};
 use super::stream::Stream;
 use super::{Identity, RecordError, Targets, blueprint, entities, report, retrieval};
 use crate::event::{Event, ReferencesFused, ReferencesRanked, Stage};
@@ -157,7 +155,7 @@ impl Recording {
             return;
         }
         if let Some(first) = problems.first() {
-            self.send_layout(story::focus(first, truth.as_ref(), results, proven));
+            self.send_layout(Focus::of(first, truth.as_ref(), results, proven));
         }
     }
 
@@ -182,7 +180,7 @@ impl Recording {
         let (Some(problem), Some(estimator)) = (query.problem(), proof::responsible(result)) else {
             return;
         };
-        if !story::is_wrong(result) || query.proven.contains(&result.method) {
+        if !is_wrong(result) || query.proven.contains(&result.method) {
             return;
         }
         let records = query.records.get(&(query.reference, estimator));

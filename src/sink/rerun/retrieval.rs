@@ -11,6 +11,7 @@ use super::stream::Stream;
 use crate::event::ReferencesRanked;
 use crate::geometry::Pose;
 use crate::image::Photo;
+use crate::narration::{score, verified};
 use crate::palette;
 use crate::picture;
 use crate::problem::Query;
@@ -139,19 +140,7 @@ fn places(ranking: &ReferenceRanking, origin: Origin) -> Points3D {
 fn label(ranking: &ReferenceRanking, rank: usize, reference: &RankedReference) -> String {
     let score = score(ranking.criterion, reference.ranked.score);
     let place = rank + 1;
-    let geometry = match &reference.ranked.geometry {
-        Geometry::Verified(found) => format!(", {} inliers", found.inliers),
-        Geometry::Refused => ", not verified".to_owned(),
-        Geometry::Unchecked => String::new(),
-    };
-    format!("{place}. {}: {score}{geometry}", reference.name)
-}
-
-fn score(criterion: Criterion, score: f32) -> String {
-    match criterion {
-        Criterion::Words => format!("{score:.3}"),
-        Criterion::Matches => format!("{score:.0} matches"),
-    }
+    format!("{place}. {}: {score}{}", reference.name, verified(&reference.ranked.geometry))
 }
 
 fn table(ranking: &ReferenceRanking, truth: Option<&Pose>) -> String {

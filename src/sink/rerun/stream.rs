@@ -11,7 +11,6 @@ use super::entities::{
 };
 use super::file::RecordingFile;
 use super::layout::{self, BlueprintNode};
-use super::targets::OpenTargets;
 use super::{Identity, RecordError, Targets};
 
 /// Nothing is flushed by time or size. The run determines the chunks, so two recordings of one run are equal chunk by
@@ -48,7 +47,7 @@ struct Now {
 
 impl Stream {
     pub(super) fn open(targets: &Targets, identity: &Identity) -> Result<Self, RecordError> {
-        let OpenTargets { sinks, file } = targets.open()?;
+        let (sinks, file) = targets.open()?;
         let id = identity.recording_id();
         let recording = RecordingStreamBuilder::new(APPLICATION_ID)
             .recording_id(id.as_str())

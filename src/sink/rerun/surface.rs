@@ -9,7 +9,7 @@ use rerun::{
 };
 
 use super::entities;
-use super::event_context::EventContext;
+use super::scene::EventContext;
 use super::stream::Stream;
 use crate::grid::{Lattice, Offset, Phase, ScoredLattice};
 use crate::palette::{self, Rgb};

@@ -106,13 +106,8 @@ impl Identity {
     }
 }
 
-/// Open targets.
-pub(super) struct OpenTargets {
-    /// The sinks for every message.
-    pub(super) sinks: Vec<Box<dyn LogSink>>,
-    /// The file among them, which also reports its errors.
-    pub(super) file: Option<RecordingFile>,
-}
+/// The sinks of all targets, and the file among them, which also reports its errors.
+pub(super) type OpenTargets = (Vec<Box<dyn LogSink>>, Option<RecordingFile>);
 
 impl Targets {
     /// Whether there is no target at all.
@@ -123,10 +118,7 @@ impl Targets {
     /// Opens all targets.
     pub(super) fn open(&self) -> Result<OpenTargets, RecordError> {
         let mut sinks: Vec<Box<dyn LogSink>> = Vec::new();
-        let file = match &self.save {
-            Some(path) => Some(RecordingFile::create(path)?),
-            None => None,
-        };
+        let file = self.save.as_deref().map(RecordingFile::create).transpose()?;
         if let Some(file) = &file {
             sinks.push(Box::new(file.clone()));
         }
@@ -136,7 +128,7 @@ impl Targets {
         if self.spawn {
             sinks.push(Box::new(spawn()?));
         }
-        Ok(OpenTargets { sinks, file })
+        Ok((sinks, file))
     }
 }
 
