@@ -15,8 +15,6 @@ mod task;
 use std::sync::Arc;
 use std::sync::mpsc::{self, Receiver};
 
-use crate::localize::References;
-
 pub use breakpoint::{Breakpoint, BreakpointError, Breakpoints, StopAtBreakpoint};
 pub use index_file::IndexFile;
 pub use job::{Job, JobError};
@@ -67,11 +65,6 @@ impl Session {
     /// The run so far.
     pub fn run(&self) -> &Run {
         &self.run
-    }
-
-    /// The references, once they are chosen.
-    pub fn chosen(&self) -> Option<&References> {
-        self.run.chosen.as_ref()
     }
 
     /// What the session is doing, as of the last [`Self::drain`].

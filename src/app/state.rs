@@ -213,7 +213,7 @@ impl AppState {
         self.forget_notes();
         let was_alive = self.session.is_alive();
         if self.session.drain() {
-            if let Some(chosen) = self.session.chosen()
+            if let Some(chosen) = self.session.run().chosen.as_ref()
                 && *chosen != self.setup.chosen
             {
                 self.setup.chosen = chosen.clone();

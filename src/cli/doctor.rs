@@ -27,10 +27,7 @@ pub fn doctor(args: &DoctorArgs, terminal: &Terminal) -> Result<(), CliError> {
         let verdict = examine_scene(args, argument, terminal)?;
         broken = broken.or(verdict);
     }
-    match broken {
-        Some(verdict) => Err(CliError::Unhealthy(verdict)),
-        None => Ok(()),
-    }
+    broken.map_or(Ok(()), |verdict| Err(CliError::Unusable(verdict)))
 }
 
 /// Prints the findings on a scene, and returns why it is unusable.

@@ -32,10 +32,14 @@ use super::output;
 use super::table;
 use super::terminal::Terminal;
 
+/// Recorded failures by default.
+const KEPT_FAILURES: usize = 20;
+
 pub fn eval(args: &EvalArgs, terminal: &Terminal) -> Result<(), CliError> {
     if let Some(EvalCommand::Merge(args)) = &args.command {
         let run = merge(&args.parts, &args.out)?;
-        failures::merge(&args.parts, &args.out, args.judging.kept_failures(), &run)?;
+        let kept = args.judging.keep_failures.unwrap_or(KEPT_FAILURES);
+        failures::merge(&args.parts, &args.out, kept, &run)?;
         return finish(&args.judging, None, &args.out, &run, terminal);
     }
     let protocol = args.protocol.over(Protocol::default())?;
@@ -117,10 +121,8 @@ fn execute(
     let bar = terminal.bar(run.items().count() as u64);
     bar.set_position(run_folder.done() as u64);
     let interrupt = Interrupt::listen();
-    let kept = match &args.sweep {
-        Some(_) => args.judging.keep_failures.unwrap_or(0),
-        None => args.judging.kept_failures(),
-    };
+    let kept = if args.sweep.is_some() { 0 } else { KEPT_FAILURES };
+    let kept = args.judging.keep_failures.unwrap_or(kept);
     let mut observer = FailureRecordings::new(
         kept,
         &run_folder,

@@ -133,9 +133,9 @@ fn poses(
         error => CliError::Usage(error.to_string()),
     })?;
     match (files.as_slice(), &args.out) {
-        ([only], out) => write(&only.text, out.as_deref())?,
+        ([(_, only)], out) => write(only, out.as_deref())?,
         (_, None) => {
-            let names: Vec<&str> = files.iter().map(|file| file.name).collect();
+            let names: Vec<&str> = files.iter().map(|(name, _)| *name).collect();
             return Err(CliError::Usage(format!(
                 "this format has several files ({}); name a folder with --out",
                 names.join(", ")
@@ -143,8 +143,8 @@ fn poses(
         }
         (files, Some(folder)) => {
             std::fs::create_dir_all(folder).map_err(FolderError::io(folder))?;
-            for file in files {
-                write(&file.text, Some(&folder.join(file.name)))?;
+            for (name, text) in files {
+                write(text, Some(&folder.join(name)))?;
             }
         }
     }

@@ -256,7 +256,7 @@ impl Plan<'_> {
         let chosen = chooser.choose(query, &|_| false, observer)?;
         if chosen.frames.is_empty() {
             let name = &self.localizer.queries().frames()[query];
-            return Err(CliError::NoReference(format!(
+            return Err(CliError::Unusable(format!(
                 "{}: no frame with a pose and a cloud within {} m of query {name}; \
                  raise --radius or --prior, or name a frame with --reference",
                 self.localizer.references().name(),

@@ -126,7 +126,7 @@ fn begin_at(args: &ViewArgs, named: Option<usize>, setup: &mut Setup) -> Result<
     if has_reference(setup, setup.query) {
         return Ok(());
     }
-    Err(CliError::NoReference(format!(
+    Err(CliError::Unusable(format!(
         "{}: no frame with a pose and a cloud within {} m of query {}; raise --radius or --prior, or \
          name a frame with --reference",
         args.scene,
@@ -154,7 +154,7 @@ fn refuse_other_queries(args: &ViewArgs) -> Result<(), CliError> {
 fn of_a_run(args: &ViewArgs, folder: &Path) -> Result<(Setup, KnownResults), CliError> {
     let file = read_run(folder)?;
     let Some(pair) = file.pairs.first() else {
-        return Err(CliError::NoReference(format!("{}: the run has no scenes", folder.display())));
+        return Err(CliError::Unusable(format!("{}: the run has no scenes", folder.display())));
     };
     let scene_argument = file.scenes[pair.scene_index].clone();
     refuse_other_queries(args)?;

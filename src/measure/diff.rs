@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::metrics::Group;
 use super::migration::{Migration, migrations};
-use crate::diagnosis::{Code, Grade, Tolerance};
+use crate::diagnosis::{Code, Tolerance};
 use crate::localize::QueryResult;
 use crate::table::Table;
 
@@ -42,8 +42,6 @@ pub struct Difference {
     pub before: QueryResult,
     /// The result in the second run.
     pub after: QueryResult,
-    /// The grades in the first and in the second run.
-    pub grades: [Grade; 2],
 }
 
 /// All differences of two runs.
@@ -79,15 +77,9 @@ impl RunComparison {
             };
             comparison.common += 1;
             pairs.push((row.method, [row, other].map(primary)));
-            let grades = [row.grade, other.grade];
-            let [was, is] = grades.map(|grade| !grade.is_failure());
-            if let Some(change) = change(was, is, row, other, tolerance) {
-                comparison.differences.push(Difference {
-                    change,
-                    before: row.clone(),
-                    after: other.clone(),
-                    grades,
-                });
+            if let Some(change) = change(row, other, tolerance) {
+                let (before, after) = (row.clone(), other.clone());
+                comparison.differences.push(Difference { change, before, after });
             }
         }
         comparison.only_after = others.len();
@@ -135,8 +127,8 @@ impl RunComparison {
                 one.change.name().to_owned(),
                 one.before.query.clone(),
                 one.before.method.to_string(),
-                one.grades[0].words(one.before.error.as_ref()),
-                one.grades[1].words(one.after.error.as_ref()),
+                one.before.grade.words(one.before.error.as_ref()),
+                one.after.grade.words(one.after.error.as_ref()),
                 Group::of(&one.before).to_string(),
             ]);
         }
@@ -154,18 +146,12 @@ fn primary(row: &QueryResult) -> Option<Code> {
     Some(row.diagnosis.first()?.code)
 }
 
-fn change(
-    was: bool,
-    is: bool,
-    before: &QueryResult,
-    after: &QueryResult,
-    tolerance: &Tolerance,
-) -> Option<Change> {
-    match (was, is) {
-        (true, false) => return Some(Change::Broken),
-        (false, true) => return Some(Change::Fixed),
-        (false, false) => return None,
-        (true, true) => {}
+fn change(before: &QueryResult, after: &QueryResult, tolerance: &Tolerance) -> Option<Change> {
+    match (before.grade.is_failure(), after.grade.is_failure()) {
+        (false, true) => return Some(Change::Broken),
+        (true, false) => return Some(Change::Fixed),
+        (true, true) => return None,
+        (false, false) => {}
     }
     let (before, after) = (before.error?, after.error?);
     let metres = after.translation_m - before.translation_m;

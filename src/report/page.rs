@@ -170,7 +170,7 @@ fn plots(report: &RunReport) -> Markup {
             @if report.charts.is_empty() { p { "There are no plots, because the ground truth is unknown." } }
             div.plots {
                 @for chart in &report.charts {
-                    figure.plot { (chart.markup()) figcaption { (chart.title) } }
+                    figure.plot { (chart.svg(None)) figcaption { (chart.title) } }
                 }
             }
         }

@@ -218,7 +218,25 @@ impl Execution<'_> {
         match localized {
             Ok(requests) => {
                 let requests = requests?;
-                self.report_failures(item, localizer, frame, &requests, &results, observer)?;
+                // One call per method that failed in any of the requests.
+                for &method in &self.run.protocol.methods {
+                    let mut results = results.iter().map(|(result, _)| result);
+                    let request = results
+                        .find(|result| result.method == method && result.grade.is_failure())
+                        .and_then(|failed| {
+                            requests.iter().find(|one| one.setting == failed.setting)
+                        });
+                    if let Some(request) = request {
+                        let item = *item;
+                        observer.failed(&FailedQuery {
+                            localizer,
+                            item,
+                            frame,
+                            method,
+                            request,
+                        })?;
+                    }
+                }
             }
             Err(panic) => results = self.broken(item, &crate::localize::words_of(panic.as_ref())),
         }
@@ -253,29 +271,6 @@ impl Execution<'_> {
             last = Some((radius, chosen));
         }
         Ok(requests)
-    }
-
-    /// One call per method that failed in any of the requests.
-    fn report_failures(
-        &self,
-        item: &RunItem<'_>,
-        localizer: &Localizer<'_>,
-        frame: usize,
-        requests: &[Request],
-        results: &[(QueryResult, StageTimes)],
-        observer: &mut dyn RunObserver,
-    ) -> Result<(), RunError> {
-        for &method in &self.run.protocol.methods {
-            let mut results = results.iter().map(|(result, _)| result);
-            let failed = results
-                .find(|result| result.method == method && result.grade.is_failure())
-                .and_then(|failed| requests.iter().find(|one| one.setting == failed.setting));
-            let Some(request) = failed else {
-                continue;
-            };
-            observer.failed(&FailedQuery { localizer, item: *item, frame, method, request })?;
-        }
-        Ok(())
     }
 
     /// The results of a query whose localisation panicked.

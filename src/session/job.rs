@@ -51,12 +51,9 @@ pub enum JobError {
     Index(#[from] NoIndex),
     /// References must be named, and none is.
     #[error(
-        "no reference is chosen for query {query}; choose one, or random:K, nearest:K, matches:K or retrieve:K"
+        "no reference is chosen for query {0}; choose one, or random:K, nearest:K, matches:K or retrieve:K"
     )]
-    NoneNamed {
-        /// The query frame's name.
-        query: String,
-    },
+    NoneNamed(String),
     /// No frame is near enough to be a reference.
     #[error(
         "no frame with a pose and a cloud within {radius_m} m of query {query}; raise the radius \
@@ -155,7 +152,7 @@ impl Job {
         let query = || self.queries.frames()[self.query].clone();
         let (task, protocol) = (&self.task, &self.task.protocol);
         if protocol.is_by_hand() {
-            return Err(JobError::NoneNamed { query: query() });
+            return Err(JobError::NoneNamed(query()));
         }
         let index = match protocol.selection() {
             Selection::Retrieved(_) => {

@@ -64,8 +64,8 @@ pub(super) struct PausingObserver {
     is_cancelled: bool,
     /// Where the run pauses next in the current mode.
     pause_at: PauseAt,
-    /// Where steps from the last event end; `None` before the first event.
-    steps: Option<Steps>,
+    /// The last event, from which a step begins.
+    last: Option<Record>,
 }
 
 /// Where to pause next, apart from breakpoints.
@@ -77,32 +77,19 @@ enum PauseAt {
     Never,
 }
 
-/// Where steps from an event end.
-#[derive(Clone, Copy)]
-struct Steps {
-    over: PauseAt,
-    out: PauseAt,
-}
-
-impl Steps {
-    fn from(record: &Record) -> Self {
-        let depth = record.depth;
-        let (over, out) = match record.event {
-            Event::StageStarted(_) => (PauseAt::EndOfStage(depth), depth),
-            // At the end of a stage, "out" leaves the surrounding stage.
-            Event::StageEnded(_) => (PauseAt::NextEvent, depth.saturating_sub(1)),
-            _ => (PauseAt::NextEvent, depth),
-        };
-        Self { over, out: PauseAt::EndOfStage(out) }
-    }
-}
-
 impl PauseAt {
-    fn new(mode: RunMode, steps: Option<Steps>) -> Self {
-        match (mode, steps) {
+    /// In a mode that was set after the last event.
+    fn new(mode: RunMode, last: Option<&Record>) -> Self {
+        match (mode, last) {
             (RunMode::Running, _) => Self::Never,
-            (RunMode::StepOver, Some(steps)) => steps.over,
-            (RunMode::StepOut, Some(steps)) => steps.out,
+            (RunMode::StepOver, Some(Record { event: Event::StageStarted(_), depth, .. })) => {
+                Self::EndOfStage(*depth)
+            }
+            // At the end of a stage, "out" leaves the surrounding stage.
+            (RunMode::StepOut, Some(Record { event: Event::StageEnded(_), depth, .. })) => {
+                Self::EndOfStage(depth.saturating_sub(1))
+            }
+            (RunMode::StepOut, Some(record)) => Self::EndOfStage(record.depth),
             _ => Self::NextEvent,
         }
     }
@@ -132,7 +119,7 @@ impl PausingObserver {
             breakpoints,
             is_cancelled: false,
             pause_at: PauseAt::new(mode, None),
-            steps: None,
+            last: None,
         };
         (control, observer)
     }
@@ -146,7 +133,7 @@ impl PausingObserver {
         match command {
             Command::Go(mode) => {
                 self.mode = mode;
-                self.pause_at = PauseAt::new(mode, self.steps);
+                self.pause_at = PauseAt::new(mode, self.last.as_ref());
             }
             Command::Breakpoints(breakpoints) => self.breakpoints.replace(breakpoints),
             Command::Cancel => self.is_cancelled = true,
@@ -237,7 +224,7 @@ impl Sink for PausingObserver {
         })?;
         // A mode set before this event refers to the previous event.
         self.obey_all()?;
-        self.steps = Some(Steps::from(record));
+        self.last = Some(record.clone());
         let breakpoint = self.breakpoints.reached(record);
         if breakpoint.is_some() || self.pause_at.is_reached(record) {
             self.wait(breakpoint)?;
@@ -248,7 +235,7 @@ impl Sink for PausingObserver {
     /// Pauses without waiting for the next event, except before the first one: there would be nothing to show.
     fn attend(&mut self) -> Result<(), Cancelled> {
         self.obey_all()?;
-        if self.mode == RunMode::Paused && self.steps.is_some() {
+        if self.mode == RunMode::Paused && self.last.is_some() {
             self.wait(None)?;
         }
         Ok(())

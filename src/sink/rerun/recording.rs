@@ -10,10 +10,9 @@ use super::blueprint::{Focus, is_wrong};
 use super::direct::DirectContext;
 use super::encode::jpeg;
 use super::feature::FeatureContext;
-use super::fusion::FusionTables;
 use super::scene::{self, EventContext, Origin, PlacedCamera};
 use super::stream::Stream;
-use super::{Identity, RecordError, Targets, blueprint, entities, report, retrieval};
+use super::{Identity, RecordError, Targets, blueprint, entities, fusion, report, retrieval};
 use crate::event::{Event, ReferencesFused, ReferencesRanked, Stage};
 use crate::geometry::Pose;
 use crate::localize::{PoseReport, QueryResult};
@@ -60,7 +59,8 @@ struct CurrentQuery {
     stages: Vec<Stage>,
     /// The estimators whose stages are open, outermost first.
     estimators: Vec<ActiveEstimator>,
-    fusion: FusionTables,
+    /// The tables of the fusions so far, as Markdown.
+    fusions: String,
     /// The records for proofs, by reference and estimator.
     records: BTreeMap<(usize, Method), Vec<Record>>,
     /// Methods with a proof.
@@ -309,21 +309,17 @@ impl Recording {
         self.stream.advance();
         let words = narration::sentence(&Event::from(event.clone())).unwrap_or_default();
         self.say(&format!("{}: {words}", method.name()), TextLogLevel::INFO);
-        let tables = &mut self.query.fusion;
-        tables.tell(event, method, origin, &mut self.stream);
+        let tables = &mut self.query.fusions;
+        fusion::tell(event, method, origin, tables, &mut self.stream);
     }
 
     fn ranked(&mut self, event: &ReferencesRanked) {
         let (Some(problem), Some(origin)) = (self.query.problems.first(), self.origin) else {
             return;
         };
-        let context = retrieval::RankingContext {
-            query: &problem.query,
-            truth: self.query.truth.as_ref(),
-            origin,
-        };
         self.stream.advance();
-        retrieval::tell(event, &context, &mut self.stream);
+        let truth = self.query.truth.as_ref();
+        retrieval::tell(event, &problem.query, truth, origin, &mut self.stream);
         let words = narration::sentence(&Event::from(event.clone())).unwrap_or_default();
         let path = narration::stages(&self.query.stages);
         self.say(&format!("{path}: {words}"), TextLogLevel::INFO);

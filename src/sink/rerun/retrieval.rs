@@ -1,7 +1,6 @@
 //! Records retrieval: the ranked frames with the query, scores and verified matches.
 
 use image::imageops::thumbnail;
-use nalgebra::Point2;
 use rerun::{LineStrips2D, Points2D, Points3D, Radius, TextDocument};
 
 use super::encode::jpeg;
@@ -20,25 +19,23 @@ use crate::retrieval::{Criterion, Geometry, RankedReference, ReferenceRanking, V
 /// The greatest width of a canvas \[px\]: ten of them are as large as one photo of full size.
 const CANVAS_WIDTH: u32 = 480;
 
-/// The context of a ranking.
-pub(super) struct RankingContext<'a> {
-    pub(super) query: &'a Query,
-    /// The true pose of the query, if known.
-    pub(super) truth: Option<&'a Pose>,
-    pub(super) origin: Origin,
-}
-
-/// Records a ranking.
-pub(super) fn tell(event: &ReferencesRanked, context: &RankingContext<'_>, stream: &mut Stream) {
+/// Records a ranking; `truth` is the true pose of the query, if known.
+pub(super) fn tell(
+    event: &ReferencesRanked,
+    query: &Query,
+    truth: Option<&Pose>,
+    origin: Origin,
+    stream: &mut Stream,
+) {
     let ranking = &event.ranking;
-    let document = TextDocument::from_markdown(table(ranking, context.truth));
+    let document = TextDocument::from_markdown(table(ranking, truth));
     stream.log(entities::RETRIEVAL_TABLE, &document);
-    stream.log(entities::RETRIEVAL_PLACES, &places(ranking, context.origin));
+    stream.log(entities::RETRIEVAL_PLACES, &places(ranking, origin));
     let pictured = ranking.pictured().iter().zip(event.photos.iter());
     for (rank, (reference, photo)) in pictured.enumerate() {
         // The frame is still in the table.
         let Some(photo) = photo else { continue };
-        let photo_pair = PhotoPair::of(&context.query.photo, photo);
+        let photo_pair = PhotoPair::of(&query.photo, photo);
         let path = entities::rank(rank);
         stream.log_image(&path, jpeg(&photo_pair.picture.clone().into()));
         let is_chosen = rank < ranking.chosen;
@@ -84,18 +81,10 @@ impl PhotoPair {
         [((x + 0.5) * across) as f32, ((y + 0.5) * down) as f32]
     }
 
-    fn of_query(&self, pixel: &Point2<f64>) -> [f32; 2] {
-        self.shown(pixel.x, pixel.y)
-    }
-
-    fn of_reference(&self, pixel: &Point2<f64>) -> [f32; 2] {
-        self.shown(pixel.x, pixel.y + self.top)
-    }
-
     fn matches(&self, matches: &[VerifiedMatch]) -> LineStrips2D {
         let ends = |found: &VerifiedMatch| {
-            let below = self.of_reference(&found.reference_pixel);
-            [self.of_query(&found.query_pixel), below]
+            let (above, below) = (&found.query_pixel, &found.reference_pixel);
+            [self.shown(above.x, above.y), self.shown(below.x, below.y + self.top)]
         };
         LineStrips2D::new(matches.iter().map(ends))
             .with_colors([super::color(palette::TRUTH)])
