@@ -21,7 +21,7 @@ pub fn doctor(args: &DoctorArgs, terminal: &Terminal) -> Result<(), CliError> {
     }
     let mut broken = None;
     for (index, argument) in args.scenes.iter().enumerate() {
-        if index > 0 && !terminal.is_quiet() {
+        if index > 0 && !terminal.is_quiet {
             output::print(&"")?;
         }
         let verdict = examine_scene(args, argument, terminal)?;
@@ -47,7 +47,7 @@ fn examine_scene(
         let frames = frames.collect::<Result<Vec<_>, _>>()?;
         record_checkup(&Targets::file(path), scene.name(), &frames)?;
     }
-    if !terminal.is_quiet() {
+    if !terminal.is_quiet {
         let text = report(scene.as_ref(), &found, terminal.width());
         output::print(&text.trim_end())?;
     }

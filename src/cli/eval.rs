@@ -174,7 +174,8 @@ fn plan(args: &EvalArgs, swept: Option<(&Sweep, &str)>) -> Result<PlannedRun, Cl
         protocol.fusions = Fusion::all().filter(|f| f.name == "r-wavg").collect();
     }
     if let Some((sweep, value)) = swept {
-        sweep.apply(value, &mut protocol.degrade, &mut params);
+        let applied = sweep.apply(value, &mut protocol.degrade, &mut params);
+        applied.map_err(|error| CliError::Usage(error.to_string()))?;
     }
     let draw = Draw { limit: protocol.limit, only: &args.query, seed: protocol.seed };
     let pairs = pairs(&draw, &scenes)?;
@@ -291,14 +292,14 @@ fn finish(
     terminal: &Terminal,
 ) -> Result<(), CliError> {
     let Judged { report, known, mut failures } = Judged::of(args, again, folder, run)?;
-    if !terminal.is_quiet() {
+    if !terminal.is_quiet {
         show(&report, run, terminal.width())?;
         eprintln!("Run: {}", folder.display());
     }
     let mut compared = None;
     if let Some(before) = args.baseline.as_deref().or(again) {
         let comparison = against(before, folder, again.is_some())?;
-        if !terminal.is_quiet() {
+        if !terminal.is_quiet {
             output::print(&compare::shown(&comparison, terminal.width()).trim_end())?;
         }
         let changes = comparison.differences.iter();

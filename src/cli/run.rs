@@ -53,7 +53,7 @@ pub fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), CliError> {
     let interrupt = Interrupt::listen();
     let has_index = matches!(task.protocol.selection(), Selection::Retrieved(_));
     let mut observer = CliObserver::new(terminal.bar(0), interrupt.clone());
-    observer.index_for = Some(args.scene.clone()).filter(|_| !has_index && !terminal.is_quiet());
+    observer.index_for = Some(args.scene.clone()).filter(|_| !has_index && !terminal.is_quiet);
     let tasks = plan.queries(wanted, &mut observer);
     observer.bar.finish_and_clear();
     let tasks = match tasks {
@@ -199,7 +199,7 @@ impl Plan<'_> {
         results: &[(QueryResult, Duration)],
         terminal: &Terminal,
     ) -> Result<(), CliError> {
-        if terminal.is_quiet() || results.is_empty() {
+        if terminal.is_quiet || results.is_empty() {
             return Ok(());
         }
         let width = terminal.width();

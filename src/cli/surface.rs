@@ -63,7 +63,7 @@ pub fn surface(args: &RunArgs, out: &Path, terminal: &Terminal) -> Result<(), Cl
     } else {
         write_png(&surface, out)?
     }
-    if !terminal.is_quiet() {
+    if !terminal.is_quiet {
         let truth = queried.pose(query);
         output::print(&described(&surface, &problem, truth.as_ref()))?;
     }

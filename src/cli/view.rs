@@ -3,14 +3,13 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use clap::Parser as _;
 use posescope::app::{self, KnownResults, Results, Setup, WindowError};
 use posescope::localize::QueryResult;
 use posescope::run::{ScenePair, read_run};
 use posescope::scene::{self, Scene};
 use posescope::session::{IndexFile, RunMode, Task, TaskScenes};
 
-use super::args::{Arguments, Command, ViewArgs};
+use super::args::{RunArgs, ViewArgs};
 use super::defaults;
 use super::failure::CliError;
 use super::opened::{self, OpenedTask};
@@ -38,12 +37,8 @@ fn record_instead(setup: &Setup, why: &WindowError, terminal: &Terminal) -> Resu
     let mut arguments = vec!["posescope".to_owned()];
     arguments.extend(setup.arguments());
     arguments.extend(["--save".to_owned(), recording.display().to_string()]);
-    let parsed = Arguments::try_parse_from(arguments);
-    match parsed.map(|parsed| parsed.command) {
-        Ok(Some(Command::Run(args))) => run::run(&args, terminal),
-        Ok(_) => unreachable!("a task's arguments begin with `run`"),
-        Err(error) => Err(CliError::Usage(error.to_string())),
-    }
+    let args = RunArgs::parse(arguments)?;
+    run::run(&args, terminal)
 }
 
 /// The setup of the window, and the results that are known already.
@@ -212,6 +207,9 @@ fn of_a_run(args: &ViewArgs, folder: &Path) -> Result<(Setup, KnownResults), Cli
 
 #[cfg(test)]
 mod tests {
+    use clap::Parser as _;
+
+    use super::super::args::{Arguments, Command};
     use super::*;
 
     /// The window opens at the cause, so the run goes on by itself.

@@ -37,7 +37,7 @@ pub(super) fn page(report: &RunReport) -> String {
             body {
                 header {
                     h1 { (title) }
-                    (glance::headline(&overview))
+                    p.headline { (with_code(&overview.headline)) }
                     nav aria-label="Parts of the report" {
                         @if !report.gates.is_empty() { a href="#gates" { "Gates" } " " }
                         @if report.baseline.is_some() { a href="#changes" { "Changes" } " " }

@@ -110,9 +110,7 @@ pub struct FailedQuery<'a> {
 /// An observer of a run over many queries.
 pub trait RunObserver {
     /// A query is about to be localised.
-    fn begin(&mut self, item: &RunItem<'_>) {
-        let _ = item;
-    }
+    fn begin(&mut self, _item: &RunItem<'_>) {}
 
     /// The observer of the next query.
     fn query_observer(&mut self) -> &mut dyn LocalizeObserver;
@@ -121,15 +119,12 @@ pub trait RunObserver {
     ///
     /// # Errors
     /// What stops the run.
-    fn failed(&mut self, query: &FailedQuery<'_>) -> Result<(), RunError> {
-        let _ = query;
+    fn failed(&mut self, _query: &FailedQuery<'_>) -> Result<(), RunError> {
         Ok(())
     }
 
     /// A query is done.
-    fn done(&mut self, item: &RunItem<'_>) {
-        let _ = item;
-    }
+    fn done(&mut self, _item: &RunItem<'_>) {}
 }
 
 /// A run with its opened scenes and indexes.

@@ -17,9 +17,8 @@ use nalgebra::Point3;
 use self::calibration::Calibration;
 use self::oxts::Packet;
 use self::sweep::Sweep;
-use super::argument::split_word;
 use super::file_scene::{FileScene, Frame};
-use super::folder::{folder_name, numbered, warn_without_poses};
+use super::folder::{folder_name, numbered, split_word, warn_without_poses};
 use super::kitti_format::{Camera, Scans};
 use super::{Entry, Scene, SceneError, photo_file};
 

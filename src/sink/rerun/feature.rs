@@ -58,10 +58,8 @@ impl FeatureContext {
 
     /// Records the trials, which are collected until a stage is over.
     pub(super) fn tell_trials(&mut self, stream: &mut Stream) {
-        stream.log_scalars(entities::RANSAC_LIKELIHOOD, &self.likelihoods);
-        stream.log_scalars(entities::RANSAC_INLIERS, &self.inliers);
-        self.likelihoods.clear();
-        self.inliers.clear();
+        stream.log_scalars(entities::RANSAC_LIKELIHOOD, &mut self.likelihoods);
+        stream.log_scalars(entities::RANSAC_INLIERS, &mut self.inliers);
     }
 
     fn detected(

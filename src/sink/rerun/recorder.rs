@@ -76,7 +76,7 @@ impl Recorder {
 
     /// Reserves room for the pages of a lesson in the layout.
     pub fn with_pages(self) -> Self {
-        self.tell(Recording::leave_room_for_pages);
+        self.tell(|recording| recording.has_pages = true);
         self
     }
 

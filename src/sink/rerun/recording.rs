@@ -41,7 +41,7 @@ pub(super) struct Recording {
     origin: Option<Origin>,
     is_laid_out: bool,
     /// Whether there are pages of a lesson.
-    has_pages: bool,
+    pub(super) has_pages: bool,
     query: CurrentQuery,
     /// The number of each estimator's hypotheses in earlier runs.
     evals: BTreeMap<Method, i64>,
@@ -101,11 +101,6 @@ impl Recording {
             query: CurrentQuery::default(),
             evals: BTreeMap::new(),
         })
-    }
-
-    /// Reserves room in the layout for the pages of a lesson.
-    pub(super) fn leave_room_for_pages(&mut self) {
-        self.has_pages = true;
     }
 
     /// Whether the recording has failed.
@@ -207,15 +202,13 @@ impl Recording {
     }
 
     fn estimate(&mut self, result: &QueryResult) {
-        let Some(method) = self.query.method else {
+        let (Some(method), Some(problem), Some(origin)) =
+            (self.query.method, self.query.problem(), self.origin)
+        else {
             return;
         };
-        let (Some(problem), Some(origin)) = (self.query.problem(), self.origin) else {
-            return;
-        };
-        let pose = result.pose.as_ref().and_then(PoseReport::to_pose);
         let owner = entities::estimate(method);
-        match pose {
+        match result.pose.as_ref().and_then(PoseReport::to_pose) {
             Some(pose) => {
                 let camera = PlacedCamera {
                     owner: &owner,

@@ -141,8 +141,10 @@ impl Stream {
         self.keep(logged.map_err(|error| unrecordable(path, &error)));
     }
 
-    /// Records one number per hypothesis in one batch. They have no step: thousands would share the same one.
-    pub(super) fn log_scalars(&mut self, path: &str, rows: &[(i64, f64)]) {
+    /// Records one number per hypothesis in one batch, which is empty then. They have no step: thousands would share
+    /// the same one.
+    pub(super) fn log_scalars(&mut self, path: &str, rows: &mut Vec<(i64, f64)>) {
+        let rows = std::mem::take(rows);
         if rows.is_empty() || self.is_broken() {
             return;
         }
