@@ -104,10 +104,8 @@ impl RunReport {
             notes.push(format!("Parameters of another version: {error}"));
         }
         let mut results = reported(folder, &run, &measured.results);
-        let baseline = match baseline {
-            Some(before) => Some(compared_with(before, &measured.results, &mut results)?),
-            None => None,
-        };
+        let compared = |before| compared_with(before, &measured.results, &mut results);
+        let baseline = baseline.map(compared).transpose()?;
         let worst = worst_first(&results);
         let mut thumbnails = BTreeMap::new();
         let protocol = &run.protocol;
@@ -282,11 +280,8 @@ fn drawn_failure(
         setting: None,
     };
     let mut witness = Witness::default();
-    localizer
-        .localize(0, query, &[request], &[result.method], &mut witness, |_, _| {
-            Ok::<(), LocalizeError>(())
-        })
-        .ok()?;
+    let keep = |_, _| Ok::<(), LocalizeError>(());
+    localizer.localize(0, query, &[request], &[result.method], &mut witness, keep).ok()?;
     let truth = localizer.queries().pose(query);
     witness.proof(truth.as_ref(), result, params)
 }

@@ -247,10 +247,8 @@ fn pairs(draw: &Draw<'_>, scenes: &Scenes) -> Result<Vec<ScenePair>, CliError> {
 }
 
 fn known_failures(args: &JudgingArgs) -> Result<KnownFailures, CliError> {
-    match &args.known_failures {
-        Some(path) => Ok(KnownFailures::read(path)?),
-        None => Ok(KnownFailures::default()),
-    }
+    let read = args.known_failures.as_deref().map(KnownFailures::read);
+    Ok(read.transpose()?.unwrap_or_default())
 }
 
 /// The report of a run, and why it fails.

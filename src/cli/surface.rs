@@ -58,11 +58,8 @@ pub fn surface(args: &RunArgs, out: &Path, terminal: &Terminal) -> Result<(), Cl
     let scorer = estimator.scorer(&problem).ok_or_else(|| no_cost(method))?;
     let surface = fill(&scorer, task.radius_m(), &grid, terminal)?;
     let seconds = start.elapsed().as_secs_f64();
-    if is_table {
-        write_csv(&surface, out)?
-    } else {
-        write_png(&surface, out)?
-    }
+    let write = if is_table { write_csv } else { write_png };
+    write(&surface, out)?;
     if !terminal.is_quiet {
         let truth = queried.pose(query);
         output::print(&described(&surface, &problem, truth.as_ref()))?;

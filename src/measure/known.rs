@@ -80,10 +80,10 @@ impl KnownFailures {
                 number: index + 1,
                 query: query.to_owned(),
                 method: Method::called(method).map_err(|why| error(why.to_string()))?,
-                code: match code {
-                    Some(code) => Some(code.parse().map_err(|why| error(format!("{why}")))?),
-                    None => None,
-                },
+                code: code
+                    .map(str::parse::<Code>)
+                    .transpose()
+                    .map_err(|why| error(why.to_string()))?,
             });
         }
         Ok(Self { path: path.to_owned(), lines })

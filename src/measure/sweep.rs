@@ -8,6 +8,7 @@ use super::plots;
 use super::report::write;
 use super::tables::NOTHING;
 use crate::chart;
+use crate::method::Method;
 use crate::run::{FolderError, Sweep};
 use crate::table::Table;
 
@@ -34,11 +35,7 @@ pub fn write_sweep(folder: &Path, sweep: &Sweep, runs: &[SweptRun]) -> Result<Ta
     for (what, label, figure) in CURVES {
         let charts = groups(runs).into_iter().filter_map(|(group, measures)| {
             let title = format!("{label} over {axis}: {group}");
-            // Missing figures have no point.
-            let points = measures
-                .into_iter()
-                .filter_map(|(value, one)| Some((one.method, (value.parse().ok()?, figure(one)?))));
-            plots::curves(title, &axis, label, grouped(points))
+            plots::curves(title, &axis, label, curves(measures, figure))
         });
         let charts: Vec<_> = charts.collect();
         let path = folder.join(format!("{what}.svg"));
@@ -61,6 +58,18 @@ fn groups(runs: &[SweptRun]) -> Vec<(&Group, Vec<(&str, &Measures)>)> {
         let measures = run.measures.iter();
         measures.map(|one| (&one.group, (run.value.as_str(), one)))
     }))
+}
+
+/// One line per method. Missing figures have no point.
+fn curves(
+    measures: Vec<(&str, &Measures)>,
+    figure: fn(&Measures) -> Option<f64>,
+) -> Vec<(Method, Vec<(f64, f64)>)> {
+    grouped(
+        measures
+            .into_iter()
+            .filter_map(|(value, one)| Some((one.method, (value.parse().ok()?, figure(one)?)))),
+    )
 }
 
 fn table(sweep: &Sweep, runs: &[SweptRun]) -> Table {
@@ -117,11 +126,11 @@ mod tests {
     #[test]
     fn a_line_has_a_point_for_each_value_with_a_figure() {
         let runs = runs();
-        let group = groups(&runs)[0];
-        let medians = curves(&runs, group, &|one| one.of_successes.median_m);
+        let measures = || groups(&runs).remove(0).1;
+        let medians = curves(measures(), |one| one.of_successes.median_m);
         assert_eq!(medians[0].1, [(0.5, 0.25)]);
         assert_eq!(medians[1].1, [(0.5, 0.5), (1.0, 0.5)]);
-        let successes = curves(&runs, group, &|one| Some(one.success_rate));
+        let successes = curves(measures(), |one| Some(one.success_rate));
         assert_eq!(successes[0].1, [(0.5, 1.0), (1.0, 0.0)]);
     }
 

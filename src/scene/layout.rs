@@ -47,12 +47,15 @@ pub struct Shot<'a> {
     pub depth: &'a (dyn Fn(Point2<f64>) -> Option<f64> + Sync),
 }
 
+/// Writes a frame.
+pub type WriteFrame = dyn Fn(&Shot<'_>) -> Result<(), SceneError> + Send + Sync;
+
 /// Writes the frames of one drive. Files are written atomically and replace existing ones. The errors are
 /// [`SceneError::Io`] when the disk is full or a folder not writable, [`SceneError::Image`] when an image cannot be
 /// encoded.
 pub struct DriveWriter {
     /// Writes a frame. Called in any order and concurrently.
-    pub frame: Box<dyn Fn(&Shot<'_>) -> Result<(), SceneError> + Send + Sync>,
+    pub frame: Box<WriteFrame>,
     /// Writes the files that need all frames.
     pub finish: Box<dyn FnOnce() -> Result<(), SceneError>>,
 }

@@ -129,15 +129,15 @@ fn row(name: &str, answers: &[Answer]) -> Vec<String> {
         let count = answers.iter().filter(is_so).count();
         format!("{:.1} %", percent(count, answers.len()))
     };
-    let mut row = vec![name.to_owned(), answers.len().to_string()];
-    for (ranking, top) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
-        row.push(share(&|answer| answer.is_found[ranking][top]));
-    }
-    row.push(share(&|answer| answer.inliers.is_some()));
+    let found = [(0, 0), (0, 1), (1, 0), (1, 1)];
+    let found = found.map(|(ranking, top)| share(&|answer| answer.is_found[ranking][top]));
     let inliers = answers.iter().filter_map(|answer| Some(answer.inliers? as f64));
-    row.push(format!("{:.0}", median(inliers)));
-    row.push(format!("{:.1}", median(answers.iter().map(|answer| answer.ms))));
-    row
+    let last = [
+        share(&|answer| answer.inliers.is_some()),
+        format!("{:.0}", median(inliers)),
+        format!("{:.1}", median(answers.iter().map(|answer| answer.ms))),
+    ];
+    [&[name.to_owned(), answers.len().to_string()], &found[..], &last].concat()
 }
 
 /// So many of the frames, at equal distances.

@@ -1,7 +1,5 @@
 //! Lessons: their claims, and the way through each of them.
 
-use std::sync::Arc;
-
 use egui::{Key, Modifiers};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;

@@ -75,6 +75,7 @@ fn velodyne_bytes(scan: &[(Point3<f32>, f32)], scanner: &Point3<f64>) -> Vec<u8>
 
 #[cfg(test)]
 mod tests {
+    use super::super::Shot;
     use super::*;
     use crate::geometry::Pose;
     use crate::scene;
@@ -109,13 +110,13 @@ mod tests {
             times_s: vec![0.0, 0.1],
             ..drive(scanner)
         };
-        let writer = Writer::create(root.path(), "dusk", drive).expect("writable");
+        let writer = create(root.path(), "dusk", drive).expect("writable");
         let (width, height) = (intrinsics.width, intrinsics.height);
         let photo = RgbImage::from_fn(width, height, |x, y| image::Rgb([x as u8, y as u8, 9]));
         let points = [Point3::new(7.6, 2.85, 10.0), Point3::new(-3.1, 0.4, -41.7)];
         let scan: Vec<_> = points.into_iter().zip([0.25, 0.5]).collect();
         let shot = Shot { index: 1, photo: &photo, scan: &scan, depth: &|_| None };
-        writer.frame(&shot).expect("writable");
+        (writer.frame)(&shot).expect("writable");
 
         let folder = root.path().join("sequences/dusk");
         let argument = folder.to_str().expect("a plain path");
@@ -148,7 +149,7 @@ mod tests {
         for name in ["000003.png", "notes.png", "000003.txt"] {
             fs::write(images.join(name), b"").expect("writable");
         }
-        Writer::create(root.path(), "dusk", drive(Point3::origin())).expect("writable");
+        create(root.path(), "dusk", drive(Point3::origin())).expect("writable");
         let there = |name| images.join(name).exists();
         assert!(!there("000003.png"));
         assert!(there("notes.png") && there("000003.txt"));

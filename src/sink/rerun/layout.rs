@@ -181,7 +181,7 @@ fn log_view(
 fn path_of(node: &BlueprintNode, place: &str) -> String {
     match node {
         BlueprintNode::View(view) => view_path(place, view.class),
-        _ => format!("container/{}", uuid(place)),
+        BlueprintNode::Container { .. } => format!("container/{}", uuid(place)),
     }
 }
 

@@ -213,15 +213,15 @@ mod tests {
             "error": {"translation_m": 12.5, "rotation_deg": 1.0, "max_euler_deg": 1.0}
         });
         let mut result: QueryResult = serde_json::from_value(result).expect("a result");
-        assert_eq!(failure(&result), "### mi: 12.500 m off\n\n");
+        assert_eq!(story(std::slice::from_ref(&result)), "");
         result.diagnosis = vec![Diagnosis {
             code: Code::D3,
             text: "The search missed it: cost 0.9. The right cell is 5th.".to_owned(),
             evidence: Default::default(),
         }];
         assert_eq!(
-            failure(&result),
-            "### mi: 12.500 m off\n\n**The search missed it: cost 0.9.** The right cell is 5th. D3\n\n"
+            story(&[result]),
+            "### mi: 12.500 m off\n\n**The search missed it: cost 0.9.** The right cell is 5th. D3\n\n\n"
         );
     }
 

@@ -194,10 +194,10 @@ mod tests {
         let photo_pair = PhotoPair::of(&photo, &photo);
         // 960 × (300 + 4 + 300) at half the size.
         assert_eq!(photo_pair.picture.dimensions(), (480, 302));
-        assert_eq!(photo_pair.of_query(&Point2::new(-0.5, -0.5)), [0.0, 0.0]);
-        assert_eq!(photo_pair.of_query(&Point2::new(959.5, 299.5)), [480.0, 150.0]);
-        assert_eq!(photo_pair.of_reference(&Point2::new(-0.5, -0.5)), [0.0, 152.0]);
-        assert_eq!(photo_pair.of_reference(&Point2::new(959.5, 299.5)), [480.0, 302.0]);
+        assert_eq!(photo_pair.shown(-0.5, -0.5), [0.0, 0.0]);
+        assert_eq!(photo_pair.shown(959.5, 299.5), [480.0, 150.0]);
+        assert_eq!(photo_pair.shown(-0.5, photo_pair.top - 0.5), [0.0, 152.0]);
+        assert_eq!(photo_pair.shown(959.5, photo_pair.top + 299.5), [480.0, 302.0]);
         // A small photo is not blown up.
         let small = Photo::from_gray(GrayImage::new(96, 30));
         let photo_pair = PhotoPair::of(&small, &small);
