@@ -219,10 +219,13 @@ mod tests {
             text: "The search missed it: cost 0.9. The right cell is 5th.".to_owned(),
             evidence: Default::default(),
         }];
+        let text = story(&[result]);
+        let (failure, advice) = text.split_once("- try: ").expect("advice");
         assert_eq!(
-            story(&[result]),
-            "### mi: 12.500 m off\n\n**The search missed it: cost 0.9.** The right cell is 5th. D3\n\n\n"
+            failure,
+            "### mi: 12.500 m off\n\n**The search missed it: cost 0.9.** The right cell is 5th. D3\n\n"
         );
+        assert!(advice.ends_with("\n\n"));
     }
 
     #[test]
