@@ -129,7 +129,7 @@ pub const ALL: &[Entry] = &[
     Entry {
         name: "space",
         title: "3-D",
-        about: "cloud, cameras, rays and costs in space",
+        about: "where reference, truth and estimates stand in the coloured cloud",
         new: |state| Box::new(space::SpaceView::new(state)),
     },
     Entry {

@@ -1,4 +1,4 @@
-// Points, lines and faces of the scene. Colours are premultiplied and in the encoding of the screen,
+// Points and lines of the scene. Colours are premultiplied and in the encoding of the screen,
 // as egui has them; depth is 1 at the near plane and 0 at infinity.
 
 struct View {
@@ -76,11 +76,6 @@ fn line(
     let half = 0.5 * width * view.scale + 0.5;
     clip += vec4f(across * at.y * half / to_px * clip.w, 0.0, 0.0);
     return Stroke(clip, color, vec3f(at.y * half, half, 1.0) * clip.w);
-}
-
-@vertex
-fn face(@location(0) position: vec3f, @location(1) color: vec4f) -> Seen {
-    return Seen(view.clip_from_scene * vec4f(position, 1.0), color);
 }
 
 @fragment

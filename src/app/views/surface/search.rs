@@ -12,17 +12,15 @@ use crate::problem::Problem;
 use crate::session::Span;
 
 /// What a direct method has recorded of its search.
-pub(in crate::app::views) struct Search<'a> {
-    pub(in crate::app::views) method: Method,
+pub(super) struct Search<'a> {
+    pub(super) method: Method,
     pub(super) problem: &'a Problem,
     /// The part of the run that it is read from: the method's own, or the hybrid's.
-    pub(in crate::app::views) span: &'a Span,
+    pub(super) span: &'a Span,
     /// Pixels covered at the reference pose, which all coverages are shares of.
     pub(super) covered_at_reference: u32,
     /// Pixels that a hypothesis must cover to be eligible: the coverage floor.
     pub(super) least_covered: u32,
-    /// Where the search stood: at the reference, and at each best so far.
-    pub(in crate::app::views) way: Vec<Offset>,
     /// The lattices, in the order of the search; the last one may be incomplete.
     pub(super) lattices: Vec<Searched>,
     /// The hypothesis of the cursor, while a lattice is being searched.
@@ -33,9 +31,9 @@ pub(in crate::app::views) struct Search<'a> {
 }
 
 /// A lattice with the scores so far.
-pub(in crate::app::views) struct Searched {
+pub(super) struct Searched {
     /// Cells without a score are not tried yet, or no hypotheses.
-    pub(in crate::app::views) surface: Arc<ScoredLattice>,
+    pub(super) surface: Arc<ScoredLattice>,
     pub(super) tried: usize,
     /// Whether its minimum is known.
     pub(super) is_complete: bool,
@@ -43,7 +41,7 @@ pub(in crate::app::views) struct Searched {
 
 impl<'a> Search<'a> {
     /// The search of `method` on the reference at the cursor; `None` before its first view.
-    pub(in crate::app::views) fn at(context: &ViewContext<'a>, method: Method) -> Option<Self> {
+    pub(super) fn at(context: &ViewContext<'a>, method: Method) -> Option<Self> {
         let (span, cursor) = part_with::<PoseScored>(context, method)?;
         let problems = &context.run.loaded.as_deref()?.problems;
         let problem = problems.get(span.part.reference()?)?;
@@ -61,7 +59,6 @@ impl<'a> Search<'a> {
             span,
             covered_at_reference,
             least_covered,
-            way: vec![start.offset],
             lattices: Vec::new(),
             hypothesis: None,
             assessed: None,
@@ -71,7 +68,6 @@ impl<'a> Search<'a> {
         let mut filling: Option<Filling> = None;
         for event in events {
             match event {
-                Event::ViewRendered(view) => search.way.push(view.offset),
                 Event::PoseScored(scored) => {
                     // An unfinished lattice reports single hypotheses; their cells follow from the
                     // parameters.
@@ -112,7 +108,7 @@ impl<'a> Search<'a> {
     }
 
     /// The lattices of positions, in the order in which they are drawn.
-    pub(in crate::app::views) fn positions(&self) -> impl DoubleEndedIterator<Item = &Searched> {
+    pub(super) fn positions(&self) -> impl DoubleEndedIterator<Item = &Searched> {
         self.lattices.iter().filter(|searched| !searched.phase().is_yaw())
     }
 
@@ -147,7 +143,7 @@ impl<'a> Search<'a> {
 }
 
 impl Searched {
-    pub(in crate::app::views) fn phase(&self) -> Phase {
+    pub(super) fn phase(&self) -> Phase {
         self.surface.lattice.phase
     }
 
@@ -211,11 +207,7 @@ impl Filling {
 }
 
 /// The cell that a position lies in.
-pub(in crate::app::views) fn cell_of(
-    lattice: &Lattice,
-    right_m: f64,
-    forward_m: f64,
-) -> Option<usize> {
+pub(super) fn cell_of(lattice: &Lattice, right_m: f64, forward_m: f64) -> Option<usize> {
     let index = |value: f64, count: usize| {
         let index = (value / lattice.step).round() + (count / 2) as f64;
         (0.0 <= index && index < count as f64).then_some(index as usize)

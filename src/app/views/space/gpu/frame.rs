@@ -6,7 +6,7 @@ use egui::Color32;
 
 use crate::app::views::space::view_camera::{NEAR_M, ViewCamera};
 
-/// A corner of a face, or a point of the cloud.
+/// A point of the cloud.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Spot {
     /// Position in the scene \[m\].
@@ -73,8 +73,6 @@ pub(crate) struct Frame {
     /// The cloud. It is uploaded again only when it is another one.
     pub(crate) points: Arc<Points>,
     pub(crate) lines: Vec<Line>,
-    /// The corners of triangles, three after each other.
-    pub(crate) faces: Vec<Spot>,
 }
 
 impl PartialEq for Frame {
@@ -83,7 +81,6 @@ impl PartialEq for Frame {
             && self.view_camera == other.view_camera
             && self.background == other.background
             && self.lines == other.lines
-            && self.faces == other.faces
     }
 }
 

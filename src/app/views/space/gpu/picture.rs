@@ -80,27 +80,22 @@ impl Picture {
         let cloud =
             known.unwrap_or_else(|| (of, buffer(&frame.points.bytes, wgpu::BufferUsages::VERTEX)));
         // The rest is a few kilobytes: made anew it needs no bookkeeping of capacities.
-        let (mut lines, mut faces) = (Vec::new(), Vec::new());
+        let mut lines = Vec::new();
         frame.lines.iter().for_each(|line| line.write(&mut lines));
-        frame.faces.iter().for_each(|corner| corner.write(&mut faces));
-        let [lines, faces] = [lines, faces].map(|bytes| buffer(&bytes, wgpu::BufferUsages::VERTEX));
+        let lines = buffer(&lines, wgpu::BufferUsages::VERTEX);
         let view = buffer(&frame.view(size, scale), wgpu::BufferUsages::UNIFORM);
-        let [points, strokes, corners] =
-            [frame.points.len(), frame.lines.len(), frame.faces.len()].map(|count| count as u32);
-        let Pipelines { points: point, faces: face, lines: line, .. } = pipelines;
+        let [points, strokes] = [frame.points.len(), frame.lines.len()].map(|count| count as u32);
 
         let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         {
             let mut pass = target.begin(&mut encoder, frame);
-            for (pipeline, buffer, vertices, instances) in [
-                (point, &cloud.1, 4, points),
-                (face, &faces, corners, 1),
-                (line, &lines, 4, strokes),
-            ] {
+            for (pipeline, buffer, instances) in
+                [(&pipelines.points, &cloud.1, points), (&pipelines.lines, &lines, strokes)]
+            {
                 pass.set_pipeline(pipeline);
                 pass.set_bind_group(0, &bind(device, pipeline, view.as_entire_binding()), &[]);
                 pass.set_vertex_buffer(0, buffer.slice(..));
-                pass.draw(0..vertices, 0..instances);
+                pass.draw(0..4, 0..instances);
             }
         }
         queue.submit([encoder.finish()]);

@@ -11,7 +11,6 @@ pub(super) const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 pub(super) struct Pipelines {
     pub(super) points: wgpu::RenderPipeline,
     pub(super) lines: wgpu::RenderPipeline,
-    pub(super) faces: wgpu::RenderPipeline,
     pub(super) blit: wgpu::RenderPipeline,
 }
 
@@ -23,23 +22,21 @@ impl Pipelines {
 
     fn on(device: &wgpu::Device, target: wgpu::TextureFormat) -> Self {
         use wgpu::PrimitiveTopology::{TriangleList, TriangleStrip};
-        use wgpu::VertexStepMode::{Instance, Vertex};
         let scene = device.create_shader_module(wgpu::include_wgsl!("../scene.wgsl"));
         let blit = device.create_shader_module(wgpu::include_wgsl!("../blit.wgsl"));
         let spot = wgpu::vertex_attr_array![0 => Float32x3, 1 => Unorm8x4];
         let line = wgpu::vertex_attr_array![
             0 => Float32x3, 1 => Float32x3, 2 => Unorm8x4, 3 => Float32
         ];
-        let part = |entry_points, topology, stride: usize, step_mode, attributes| {
-            let array_stride = stride as u64;
+        let part = |entry_points, stride: usize, attributes| {
+            let (array_stride, step_mode) = (stride as u64, wgpu::VertexStepMode::Instance);
             let buffer = wgpu::VertexBufferLayout { array_stride, step_mode, attributes };
-            pipeline(device, &scene, entry_points, topology, Some(buffer), COLOR)
+            pipeline(device, &scene, entry_points, TriangleStrip, Some(buffer), COLOR)
         };
         let copy = if target.is_srgb() { "linear" } else { "encoded" };
         Self {
-            points: part(["point", "paint"], TriangleStrip, Spot::BYTES, Instance, &spot),
-            lines: part(["line", "stroke"], TriangleStrip, Line::BYTES, Instance, &line),
-            faces: part(["face", "paint"], TriangleList, Spot::BYTES, Vertex, &spot),
+            points: part(["point", "paint"], Spot::BYTES, &spot),
+            lines: part(["line", "stroke"], Line::BYTES, &line),
             blit: pipeline(device, &blit, ["cover", copy], TriangleList, None, target),
         }
     }

@@ -87,7 +87,6 @@ fn frame(points: &[Spot], lines: Vec<Line>) -> Frame {
         background: BLACK,
         points: Arc::new(Points::new(points.iter().copied())),
         lines,
-        faces: Vec::new(),
     }
 }
 
