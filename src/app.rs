@@ -1,12 +1,12 @@
 //! The window: drive an estimator as in a debugger and see why it decides what it decides.
 //!
 //! ```text
-//! keys, buttons, views → Command → App::dispatch → AppState → ViewContext → views
+//! keys, buttons, views → command::Queue → App → AppState → ViewContext → views
 //! ```
 //!
 //! A view keeps no copy of the run. It is handed a [`ViewContext`], the run at the cursor, and
-//! answers with commands; so looking back costs no second run, and whatever a person can do, a test
-//! can do.
+//! sends what is to be done after the frame; so looking back costs no second run, and whatever a person
+//! can do, a test can do.
 
 mod action;
 mod adapter;
@@ -20,14 +20,13 @@ mod frame;
 mod headless;
 mod lecture;
 mod lesson;
+mod memo;
 mod navigation;
 mod pictures;
-mod proofs;
 mod queries;
 mod run_pictures;
 mod run_results;
 mod save;
-mod save_target;
 mod saved;
 mod scoring;
 mod selection;
@@ -47,9 +46,8 @@ mod worker;
 pub use action::{ACTIONS, Action, Group};
 pub use arrangement::Arrangement;
 pub use camera::NamedPose;
-pub use command::Command;
 pub use run_results::results_of_run;
-pub use save_target::SaveTarget;
+pub use save::SaveTarget;
 pub use scoring::{CostAlong, CostLine, DenseAsk, DenseMap, Probe};
 pub use selection::{KnownResults, ResultRow, Results, VerdictChange};
 pub use setup::{ReferencePick, Setup};
@@ -121,7 +119,7 @@ impl App {
     /// With a lesson at its first page, of which the setup is what is localised there.
     pub fn with_lesson(mut self, lesson: Lesson) -> Self {
         self.lesson = Some(OpenLesson::new(lesson, &self.state.setup));
-        self.commands.send(Command::Arrange(Arrangement::Lecture));
+        self.arrange(Arrangement::Lecture);
         self
     }
 
@@ -135,9 +133,9 @@ impl App {
         self.canvas
     }
 
-    /// Does what a key or a button would do.
-    pub fn send(&mut self, command: Command) {
-        self.commands.send(command);
+    /// The same to be changed, as keys, buttons and views do.
+    pub fn app_state_mut(&mut self) -> &mut AppState {
+        &mut self.state
     }
 }
 
@@ -151,9 +149,7 @@ impl App {
                 Err(why) => self.state.note(why, true),
             }
         }
-        for command in self.commands.take() {
-            self.dispatch(command, ctx);
-        }
+        self.obey();
         let title = self.state.setup.title();
         if title != self.title {
             ctx.send_viewport_cmd(egui::ViewportCommand::Title(title.clone()));
@@ -167,8 +163,13 @@ impl App {
         self.frame(ui);
         self.above(ui.ctx());
         self.state.textures.end_frame();
+        self.obey();
+    }
+
+    /// Does what was asked for.
+    fn obey(&mut self) {
         for command in self.commands.take() {
-            self.dispatch(command, ui.ctx());
+            command(self);
         }
     }
 
@@ -191,7 +192,7 @@ impl App {
             input.consume_key(egui::Modifiers::NONE, egui::Key::Enter)
         };
         if in_batch && !ctx.egui_wants_keyboard_input() && ctx.input_mut(enter) {
-            self.commands.send(Command::OpenSelected);
+            self.open_selected();
         }
         action::read_keys(ctx, &self.commands);
     }

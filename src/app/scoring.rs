@@ -4,7 +4,7 @@
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use super::worker::Worker;
+use super::worker::{Answers, Worker};
 use crate::estimator;
 use crate::geometry::Pose;
 use crate::grid::{DenseSurface, GridParams, LatticeTooLarge};
@@ -166,81 +166,25 @@ impl CostLine {
 pub struct CostAlong {
     /// The line.
     pub line: CostLine,
-    /// Shares of the way, rising, with the score of each pose; empty until they are computed.
+    /// Shares of the way, rising, with the score of each pose.
     pub scores: Vec<(f64, Option<Score>)>,
 }
 
-impl CostAlong {
-    /// Whether the costs are computed.
-    pub fn is_complete(&self) -> bool {
-        !self.scores.is_empty()
-    }
-}
+/// The costs along lines: of each method the one that was asked for last.
+pub(super) type Lines = Answers<CostLine, (Problem, Arc<Params>), CostAlong>;
 
-/// Scores the poses of lines: of each method the one that was asked for last.
-pub(super) struct LineTracer {
-    worker: Worker<(Problem, Arc<Params>, CostLine), CostAlong>,
-    along: Vec<CostAlong>,
-}
-
-impl LineTracer {
-    pub(super) fn new(ctx: egui::Context) -> Self {
-        let worker = Worker::new(
-            "cost line",
-            ctx,
-            |(problem, params, line): (Problem, Arc<Params>, CostLine)| {
-                let poses: Vec<Pose> = CostLine::shares()
-                    .map(|share| problem.reference_from_query(&line.pose(share)))
-                    .collect();
-                let estimator = estimator::entry(line.method).make(&params);
-                let scorer = estimator.scorer(&problem);
-                let scores = scorer.map_or_else(Vec::new, |scorer| scorer.score(&poses));
-                CostAlong {
-                    line,
-                    scores: CostLine::shares().zip(scores.into_iter().map(Some)).collect(),
-                }
-            },
-        );
-        Self { worker, along: Vec::new() }
-    }
-
-    /// Asks for the cost along a line, unless it is known or asked for.
-    pub(super) fn ask(&mut self, problem: &Problem, params: &Arc<Params>, line: CostLine) {
-        if self.along.iter().any(|along| along.line == line) {
-            return;
-        }
-        self.along.retain(|along| along.line.method != line.method);
-        self.along.push(CostAlong { line, scores: Vec::new() });
-        self.worker.ask((problem.clone(), Arc::clone(params), line));
-    }
-
-    /// Forgets all lines: the problem or the parameters have changed.
-    pub(super) fn forget(&mut self) {
-        self.worker.forget();
-        self.along.clear();
-    }
-
-    /// Takes in answers. An error is a fault of ours.
-    pub(super) fn poll(&mut self) -> Result<(), String> {
-        for answer in self.worker.poll() {
-            let answer = answer.ok_or("the cost between two poses could not be computed")?;
-            // Another line may be wanted by now.
-            if let Some(along) = self.along.iter_mut().find(|along| along.line == answer.line) {
-                *along = answer;
-            }
-        }
-        Ok(())
-    }
-
-    /// The line of a method that was asked for last.
-    pub(super) fn along(&self, method: Method) -> Option<&CostAlong> {
-        self.along.iter().find(|along| along.line.method == method)
-    }
-
-    /// Whether more is to come.
-    pub(super) fn is_busy(&self) -> bool {
-        self.worker.is_busy()
-    }
+/// Starts the thread that scores the poses of lines.
+pub(super) fn lines(ctx: egui::Context) -> Lines {
+    Answers::new("cost line", ctx, |line: &CostLine, question: (Problem, Arc<Params>)| {
+        let (problem, params) = question;
+        let pose = |share| problem.reference_from_query(&line.pose(share));
+        let poses: Vec<Pose> = CostLine::shares().map(pose).collect();
+        let estimator = estimator::entry(line.method).make(&params);
+        let scorer = estimator.scorer(&problem);
+        let scores = scorer.map_or_else(Vec::new, |scorer| scorer.score(&poses));
+        let scores = CostLine::shares().zip(scores.into_iter().map(Some)).collect();
+        CostAlong { line: *line, scores }
+    })
 }
 
 /// Which dense map is wanted.

@@ -5,11 +5,13 @@ mod shown;
 use std::sync::Arc;
 use std::time::Duration;
 
+use egui::TextureHandle;
+
 use super::navigation::Navigation;
 use super::queries::Queries;
 use super::run_pictures::RunPictures;
 use super::scoring::{
-    CostAlong, CostLine, DenseAsk, DenseFiller, DenseMap, LineTracer, Probe, Prober,
+    self, CostAlong, CostLine, DenseAsk, DenseFiller, DenseMap, Lines, Probe, Prober,
 };
 use super::selection::{Known, KnownResults, Results, Selection};
 use super::setup::Setup;
@@ -17,6 +19,7 @@ use super::shown::ShownReason;
 use super::textures::Textures;
 use super::view_options::{CompareMode, ViewOptions};
 use crate::diagnosis::Grade;
+use crate::event::Side;
 use crate::geometry::Pose;
 use crate::lesson::Moment;
 use crate::method::Method;
@@ -72,7 +75,7 @@ pub struct AppState {
     pub(super) camera_before: Option<Pose>,
     pub(super) prober: Prober,
     /// For the cost along the line from a result to the truth.
-    pub(super) line_tracer: LineTracer,
+    lines: Lines,
     /// For the map of every position with every heading.
     dense_filler: DenseFiller,
     /// The queries, what is known of them.
@@ -100,7 +103,7 @@ impl AppState {
         Self {
             params,
             prober: Prober::new(ctx.clone()),
-            line_tracer: LineTracer::new(ctx.clone()),
+            lines: scoring::lines(ctx.clone()),
             dense_filler: DenseFiller::new(ctx.clone()),
             queries: Queries::new(ctx.clone()),
             frames,
@@ -235,10 +238,6 @@ impl AppState {
                 Err(why) => self.note(why, true),
             }
         }
-        // The query at work comes first.
-        if *self.session.state() != RunState::Loading {
-            self.queries.paint_thumbnails(&self.setup);
-        }
         if let Some((pose, _)) = self.looking_at()
             && let Some(problem) = self.problem().cloned()
         {
@@ -250,12 +249,18 @@ impl AppState {
             let params = Arc::new(kept.run.params.clone());
             kept.pictures.update(&kept.run, &params, self.options.shows_truth);
         }
-        if let Err(why) = self.line_tracer.poll() {
-            self.note(why, true);
+        if !self.lines.poll() {
+            self.note("the cost between two poses could not be computed", true);
         }
         if let Err(why) = self.dense_filler.poll() {
             self.note(why, true);
         }
+    }
+
+    /// The small picture of a frame, once it is made; asking for it has it made. The query at work comes first.
+    pub(super) fn frame_picture(&self, side: Side, frame: usize) -> Option<TextureHandle> {
+        let is_loading = *self.session.state() == RunState::Loading;
+        self.queries.thumbnail(side, frame, (!is_loading).then_some(&self.setup))
     }
 
     /// Whether anything of what the views show is still worked out, beside a run.
@@ -270,19 +275,19 @@ impl AppState {
 
     /// What is known of a method's cost along the line that was asked for last.
     pub fn cost_along(&self, method: Method) -> Option<&CostAlong> {
-        self.line_tracer.along(method)
+        self.lines.find(|line| line.method == method)
     }
 
     /// Whether the cost along a line is still worked out.
     pub fn is_tracing_line(&self) -> bool {
-        self.line_tracer.is_busy()
+        self.lines.is_busy()
     }
 
     /// Has the cost along a line worked out for the problem at the cursor.
     pub(super) fn trace_line(&mut self, line: CostLine) {
-        if let Some(problem) = self.problem().cloned() {
-            self.line_tracer.ask(&problem, &self.params, line);
-        }
+        let question = self.problem().map(|problem| (problem.clone(), Arc::clone(&self.params)));
+        self.lines.forget_where(|other| other.method == line.method && *other != line);
+        self.lines.ask(line, || question);
     }
 
     /// The dense map of a method that was asked for last.
@@ -323,6 +328,11 @@ impl AppState {
             (None, Some(part)) => self.show_part(part, false),
             (None, None) => {}
         }
+    }
+
+    /// Shows what a part of the run came to: why it failed, or its end.
+    pub fn show_outcome(&mut self, part: Part) {
+        self.show_part(part, self.needs_why(part));
     }
 
     /// Moves the cursor to the end of a part of the run, where `why` with the picture that proves its result.
@@ -370,6 +380,13 @@ impl AppState {
         self.notes.drain(..surplus);
     }
 
+    /// Takes a note away.
+    pub(super) fn dismiss(&mut self, index: usize) {
+        if index < self.notes.len() {
+            self.notes.remove(index);
+        }
+    }
+
     /// Another query, or other references: everything begins anew.
     pub(super) fn start_run(&mut self, mode: RunMode) {
         // The run before would go on beside the new one.
@@ -382,7 +399,7 @@ impl AppState {
         self.options.shows_why = false;
         self.opens_at_cause = mode == RunMode::Running;
         self.prober.forget();
-        self.line_tracer.forget();
+        self.lines.forget();
         self.dense_filler.forget();
     }
 

@@ -15,7 +15,6 @@ mod in_sight;
 mod legend;
 mod lockstep;
 mod log;
-mod memo;
 mod mesh_painter;
 mod parameters;
 mod queries;

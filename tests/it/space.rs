@@ -3,7 +3,7 @@
 
 use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
-use posescope::app::{App, Command, Setup};
+use posescope::app::{App, Setup};
 use posescope::method::Method;
 use posescope::session::{Part, RunMode};
 
@@ -13,7 +13,7 @@ use crate::window::{app, finished, run_until_idle, send, setup};
 /// A window after its run, with the view in front.
 fn after(setup: Setup) -> Harness<'static, App> {
     let mut window = finished(setup);
-    send(&mut window, Command::Maximize(Some("space")));
+    send(&mut window, |app| app.app_state_mut().show_alone(Some("space")));
     window
 }
 
@@ -62,12 +62,12 @@ fn every_moment_of_a_run_is_drawn_and_the_cameras_come_one_by_one() {
     let moments =
         (0..run.len()).filter(|at| at % 100 == 0 || ends.iter().any(|end| at.abs_diff(*end) <= 2));
     for cursor in moments {
-        send(&mut window, Command::MoveCursor(cursor));
+        send(&mut window, |app| app.app_state_mut().move_cursor(cursor));
         assert!(headline(&window).contains("points"));
     }
-    send(&mut window, Command::First);
+    send(&mut window, |app| app.act("To the first step"));
     assert!(window.query_by_label_contains("FB: ").is_none(), "FB has no pose yet");
-    send(&mut window, Command::MoveCursor(ends[0]));
+    send(&mut window, |app| app.app_state_mut().move_cursor(ends[0]));
     assert!(window.query_by_label_contains("FB: ").is_some());
 }
 
@@ -80,7 +80,7 @@ fn the_best_pose_so_far_is_that_of_the_method_at_the_cursor() {
     let part = app(&window).run().span_of(Part::Reference(fb2, 0)).expect("it ran");
     let records = part.records.clone();
     let mut has_best = |cursor| {
-        send(&mut window, Command::MoveCursor(cursor));
+        send(&mut window, |app| app.app_state_mut().move_cursor(cursor));
         window.query_by_label_contains("FB2, best so far: ").is_some()
     };
     assert!(!has_best(records.start), "FB2 has tried nothing yet");
@@ -92,7 +92,7 @@ fn the_truth_hides_with_its_errors() {
     let mut window = after(setup());
     assert!(label(&window, "FB: ").contains("from the truth"));
     assert!(window.query_by_label_contains("Truth: ").is_some());
-    send(&mut window, Command::ShowTruth);
+    send(&mut window, |app| app.act("Ground truth"));
     assert!(!label(&window, "FB: ").contains("from the truth"));
     assert!(window.query_by_label_contains("Truth: ").is_none());
 }
@@ -113,7 +113,7 @@ fn choose(window: &mut Harness<'_, App>, name: &str) {
 #[test]
 fn one_looks_through_a_camera_and_leaves_it_by_turning() {
     let mut window = after(setup());
-    assert!(headline(&window).contains("A square is 1 m. Drag: turn"), "{}", headline(&window));
+    assert!(headline(&window).contains("A square is 0.5 m. Drag: turn"), "{}", headline(&window));
     choose(&mut window, "Through FB");
     assert!(headline(&window).contains("Through FB"));
     let pane = window.get_by_label_contains("3-D view of").rect();
@@ -124,7 +124,7 @@ fn one_looks_through_a_camera_and_leaves_it_by_turning() {
     window.get_by_label_contains("Truth: ").click();
     window.run_steps(2);
     assert!(headline(&window).contains("Through Truth"));
-    send(&mut window, Command::ShowTruth);
+    send(&mut window, |app| app.act("Ground truth"));
     assert!(headline(&window).contains("Truth has no pose at this step"));
     choose(&mut window, "Whole scene");
     assert!(headline(&window).contains("Drag: turn"));
@@ -156,7 +156,7 @@ fn drawn() -> Option<PaintedWindow> {
     let setup = Setup { mode: RunMode::Running, ..setup() };
     let mut painted = painted(setup, [1500.0, 950.0])?;
     run_until_idle(&mut painted.window);
-    send(&mut painted.window, Command::Maximize(Some("space")));
+    send(&mut painted.window, |app| app.app_state_mut().show_alone(Some("space")));
     Some(painted)
 }
 
@@ -185,7 +185,7 @@ fn the_truth_is_drawn_and_can_be_taken_away() {
     assert!(window.query_by_label_contains("Nothing is drawn").is_none());
     let with_truth = count(window, TRUTH);
     assert!(with_truth > 50, "{with_truth} pixels of the truth");
-    send(window, Command::ShowTruth);
+    send(window, |app| app.act("Ground truth"));
     let without = count(window, TRUTH);
     assert!(without < with_truth / 2, "{without} of {with_truth}");
 }

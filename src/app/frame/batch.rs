@@ -8,7 +8,8 @@ use egui::{
 use super::inspector::capital;
 use super::verdicts::split;
 use super::{Panes, canvas, proof::elided};
-use crate::app::command::{Command, Queue};
+use crate::app::App;
+use crate::app::command::Queue;
 use crate::app::state::AppState;
 use crate::app::theme;
 use crate::diagnosis::Grade;
@@ -39,7 +40,7 @@ pub(in crate::app) fn left(ui: &mut Ui, state: &AppState, commands: &Queue, pane
             None => ("Run all".to_owned(), "Localise all queries, to know which fail"),
         };
         if ui.button(text).on_hover_text(help).clicked() {
-            commands.send(Command::RunAllQueries);
+            commands.send(|app| app.act("Run all queries, or stop"));
         }
     });
     ui.add_space(4.0);
@@ -162,7 +163,7 @@ pub(in crate::app) fn right(ui: &mut Ui, state: &AppState, commands: &Queue, pan
         ui.horizontal(|ui| {
             let open = ui.button("Open in Inspect");
             if open.on_hover_text("Show this query at its proof picture (Enter)").clicked() {
-                commands.send(Command::OpenSelected);
+                commands.send(App::open_selected);
             }
         });
         match span.map(|span| span.part) {

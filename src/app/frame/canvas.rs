@@ -3,7 +3,7 @@
 use egui::{Rect, RichText, Sense, Ui, UiBuilder, vec2};
 
 use super::{Panes, proof, stage};
-use crate::app::command::{Command, Queue};
+use crate::app::command::Queue;
 use crate::app::state::AppState;
 use crate::app::theme;
 use crate::app::views;
@@ -93,8 +93,8 @@ fn small_title(ui: &mut Ui, state: &AppState, commands: &Queue, name: &'static s
     let galley = ui.painter().layout_no_wrap(title.to_owned(), theme::caption(), color);
     ui.painter().galley(rect.min + vec2(2.0, 2.0), galley, color);
     if response.on_hover_text(spoken).clicked() {
-        let large = state.shown_stage();
-        commands.send(Command::Enlarge(large, name));
+        let large = Some((state.shown_stage(), name));
+        commands.send(move |app| app.state.options.large = large);
     }
 }
 
@@ -124,7 +124,7 @@ pub(in crate::app) fn alone(ui: &mut Ui, state: &AppState, commands: &Queue, pan
     ui.horizontal(|ui| {
         let button = ui.button(RichText::new("All panels").small());
         if button.on_hover_text("Back to the window with all its parts (M)").clicked() {
-            commands.send(Command::Maximize(None));
+            commands.send(|app| app.state.show_alone(None));
         }
     });
     match state.options.alone {

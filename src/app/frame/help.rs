@@ -119,7 +119,7 @@ impl ActionSearch {
             ui.weak("No action has these words. Try one of them alone.");
         }
         if let Some(action) = taken {
-            commands.send(action.command.clone());
+            commands.send(action.run);
         }
         taken.is_some()
     }

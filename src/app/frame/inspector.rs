@@ -10,7 +10,7 @@ use super::Panes;
 use super::stage::three_digits;
 use super::storyboard::part_name;
 use super::verdicts::{short, split};
-use crate::app::command::{Command, Queue};
+use crate::app::command::Queue;
 use crate::app::state::AppState;
 use crate::app::theme;
 use crate::app::view_options::Tab;
@@ -25,7 +25,7 @@ pub(in crate::app) fn ui(ui: &mut Ui, state: &AppState, commands: &Queue, panes:
             let text = RichText::new(title).size(12.5);
             let button = Button::selectable(tab == other, text).frame_when_inactive(false);
             if ui.add(button).clicked() {
-                commands.send(Command::ShowTab(other));
+                commands.send(move |app| app.state.show_tab(other));
             }
         }
     });
@@ -252,7 +252,7 @@ fn helped(
                 .button("Try what would help")
                 .on_hover_text("Run the query again in other ways (E)");
             if button.clicked() {
-                commands.send(Command::Explain);
+                commands.send(|app| app.state.switch_explaining());
             }
         }
         return;
@@ -297,7 +297,8 @@ fn remedy(ui: &mut Ui, commands: &Queue, helped: &Helped) {
     let spoken = format!("Run with {args}");
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, &spoken));
     if response.on_hover_text("Keeps this run as A and runs the query with this").clicked() {
-        commands.send(Command::Try(helped.args.clone()));
+        let args = helped.args.clone();
+        commands.send(move |app| app.state.try_again(&args));
     }
 }
 

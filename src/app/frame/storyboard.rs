@@ -9,7 +9,7 @@ use egui::{
 
 use super::proof::elided;
 use super::stage;
-use crate::app::command::{Command, Queue};
+use crate::app::command::Queue;
 use crate::app::setup::Setup;
 use crate::app::state::AppState;
 use crate::app::theme;
@@ -116,7 +116,7 @@ fn draw(ui: &mut Ui, state: &AppState, commands: &Queue, row: &Row<'_>, size: eg
         };
         let response = cell.ui(ui, size);
         if response.clicked() {
-            commands.send(Command::MoveCursor(end));
+            commands.send(move |app| app.state.move_cursor(end));
         }
         let part = row.part;
         let stage = bar.stage;
@@ -160,7 +160,8 @@ fn why(
         is_pale: false,
     };
     if cell.ui(ui, size).clicked() {
-        commands.send(Command::ShowWhy(row.part));
+        let part = row.part;
+        commands.send(move |app| app.state.show_part(part, true));
     }
 }
 
@@ -183,7 +184,7 @@ fn stop_here(ui: &mut Ui, state: &AppState, commands: &Queue, part: Part, stage:
             }
             None => texts.push(breakpoint),
         }
-        commands.send(Command::SetBreakpoints(texts));
+        commands.send(|app| app.state.set_breakpoints(texts));
         ui.close();
     }
 }
@@ -286,13 +287,13 @@ fn name(ui: &mut Ui, state: &AppState, commands: &Queue, row: &Row<'_>, height: 
 /// A click on a name shows the method; a second one its next reference.
 fn click(state: &AppState, commands: &Queue, row: &Row<'_>, references: usize) {
     let here = state.shown_span().map(|span| span.part);
-    match row.part {
+    let part = match row.part {
         Part::Reference(method, reference) if here == Some(row.part) && references > 1 => {
-            let next = Part::Reference(method, (reference + 1) % references);
-            commands.send(Command::ShowPart(next));
+            Part::Reference(method, (reference + 1) % references)
         }
-        part => commands.send(Command::ShowPart(part)),
-    }
+        part => part,
+    };
+    commands.send(move |app| app.state.show_outcome(part));
 }
 
 /// The line that moves the cursor inside the selected stage, and what the run is doing.
@@ -355,7 +356,7 @@ fn line(
         let share = ((pointer.x - inside.left()) / inside.width().max(1.0)).clamp(0.0, 1.0);
         let wanted = records.start + (share * last as f32).round() as usize;
         if wanted != cursor && !records.is_empty() {
-            commands.send(Command::MoveCursor(wanted));
+            commands.send(move |app| app.state.move_cursor(wanted));
         }
     }
     response.on_hover_text("Drag to move inside the stage (← →)");

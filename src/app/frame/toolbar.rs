@@ -6,7 +6,7 @@ use egui::{Align, Button, Label, Layout, PopupCloseBehavior, RichText, Ui};
 use super::Panes;
 use crate::app::action::{self, ACTIONS, Group, button};
 use crate::app::arrangement::Arrangement;
-use crate::app::command::{Command, Queue};
+use crate::app::command::Queue;
 use crate::app::state::AppState;
 use crate::app::theme;
 use crate::event::Side;
@@ -49,7 +49,7 @@ fn menu(ui: &mut Ui, state: &AppState, commands: &Queue) {
         ui.menu_button("Views", |ui| {
             for entry in crate::app::views::ALL {
                 if ui.button(entry.title).on_hover_text(entry.about).clicked() {
-                    commands.send(Command::ShowView(entry.name));
+                    commands.send(|app| app.state.show_view(entry.name));
                     ui.close();
                 }
             }
@@ -63,9 +63,9 @@ fn query(ui: &mut Ui, state: &AppState, commands: &Queue, panes: &mut Panes) {
     let scene = RichText::new(setup.queries.name()).strong();
     ui.add(Label::new(scene).truncate()).on_hover_text("The scene of the query");
     ui.weak("›");
-    button(ui, state, commands, "◀", Command::NextQuery { back: true });
+    button(ui, state, commands, "◀", "Previous query");
     ui.label(RichText::new(setup.query_name()).strong()).on_hover_text("The query");
-    button(ui, state, commands, "▶", Command::NextQuery { back: false });
+    button(ui, state, commands, "▶", "Next query");
     // The names of the references are worth more than the word before them.
     if ui.available_width() > 170.0 {
         ui.weak("against");
@@ -99,13 +99,12 @@ fn running(ui: &mut Ui, state: &AppState, commands: &Queue, panes: &mut Panes) {
     let is_paused = matches!(state.run_state(), RunState::Paused { .. });
     let text = if is_running { "Pause" } else { "▶ Run" };
     let run = ui.add_sized([64.0, 26.0], Button::new(text));
-    let tooltip = action::of(&Command::RunOrPause).map(|action| action.tooltip(ui.ctx()));
-    if run.on_hover_text(tooltip.unwrap_or_default()).clicked() {
-        commands.send(Command::RunOrPause);
+    if run.on_hover_text(action::tooltip(ui.ctx(), "Run or pause")).clicked() {
+        commands.send(|app| app.state.run_or_pause());
     }
     ui.add_enabled_ui(is_paused || is_running, |ui| {
-        button(ui, state, commands, "Stage", Command::StepOver);
-        button(ui, state, commands, "Step", Command::StepInto);
+        button(ui, state, commands, "Stage", "Step over the stage");
+        button(ui, state, commands, "Step", "Step to the next event");
     });
     let config = MenuConfig::new().close_behavior(PopupCloseBehavior::CloseOnClickOutside);
     let count = state.setup.task.breakpoints.len();
@@ -120,21 +119,18 @@ fn running(ui: &mut Ui, state: &AppState, commands: &Queue, panes: &mut Panes) {
 
 /// What is shown, and the layouts; from the right.
 fn shown(ui: &mut Ui, state: &AppState, commands: &Queue) {
-    button(ui, state, commands, "?", Command::Help);
-    button(ui, state, commands, "Search", Command::Search);
+    button(ui, state, commands, "?", "All keys");
+    button(ui, state, commands, "Search", "Search for an action");
     ui.separator();
-    for (arrangement, title, _) in Arrangement::ALL.into_iter().rev() {
-        let is_on = state.options.layout == arrangement;
-        let tooltip =
-            action::of(&Command::Arrange(arrangement)).map(|action| action.tooltip(ui.ctx()));
-        let response = ui.add(Button::selectable(is_on, title));
-        if response.on_hover_text(tooltip.unwrap_or_default()).clicked() {
-            commands.send(Command::Arrange(arrangement));
+    for (layout, title, text) in Arrangement::ALL.into_iter().rev() {
+        let response = ui.add(Button::selectable(state.options.layout == layout, title));
+        if response.on_hover_text(action::tooltip(ui.ctx(), text)).clicked() {
+            commands.send(move |app| app.arrange(layout));
         }
     }
     ui.separator();
     compare(ui, state, commands);
-    button(ui, state, commands, "Truth", Command::ShowTruth);
+    button(ui, state, commands, "Truth", "Ground truth");
 }
 
 fn compare(ui: &mut Ui, state: &AppState, commands: &Queue) {

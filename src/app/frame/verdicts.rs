@@ -7,7 +7,7 @@ use egui::{
 use super::proof::elided;
 use super::storyboard::part_name;
 use crate::app::action;
-use crate::app::command::{Command, Queue};
+use crate::app::command::Queue;
 use crate::app::lecture;
 use crate::app::state::AppState;
 use crate::app::theme;
@@ -112,7 +112,7 @@ fn cell(ui: &Ui, state: &AppState, commands: &Queue, rect: Rect, part: Part, spa
         None => spoken.clone(),
     };
     if response.on_hover_text(help).clicked() {
-        commands.send(Command::ShowPart(part));
+        commands.send(move |app| app.state.show_outcome(part));
     }
 }
 
@@ -212,49 +212,46 @@ fn remedy(ui: &mut Ui, state: &AppState, commands: &Queue, result: &QueryResult)
     let explaining = state.run().explaining.filter(|explaining| explaining.method == result.method);
     let can_explain = result.error.or(result.initial_error).is_some();
     let mut whole = String::new();
-    let (text, command) = match (&result.explanation, explaining) {
+    let mut args = None;
+    let is_offered = can_explain && state.setup.task.protocol.explain == 0;
+    let (text, help) = match (&result.explanation, explaining) {
         (Some(explanation), _) => match explanation.best() {
             Some(helped) => {
-                let args = short(&helped.args);
-                let error = helped.error.translation();
-                let (words, number) = (args, format!(" → {error}"));
+                let (words, number) =
+                    (short(&helped.args), format!(" → {}", helped.error.translation()));
                 whole = format!("Try {words}{number}");
-                let text = fitted(ui, &words, &number, size.x - 16.0);
-                (text, Some(Command::Try(helped.args.clone())))
+                args = Some(helped.args.clone());
+                let all = helped.args.join(" ");
+                let help = format!("Keeps this run as A and runs the query with {all}");
+                (fitted(ui, &words, &number, size.x - 16.0), help)
             }
-            None => (format!("None of {} remedies helped", explanation.runs), None),
+            None => (format!("None of {} remedies helped", explanation.runs), String::new()),
         },
         (None, Some(explaining)) => {
-            (format!("Trying {} of {} …", explaining.tried, explaining.remedies), None)
+            let (tried, all) = (explaining.tried, explaining.remedies);
+            (format!("Trying {tried} of {all} …"), String::new())
         }
-        (None, None) if can_explain && state.setup.task.protocol.explain == 0 => {
-            ("Try what would help".to_owned(), Some(Command::Explain))
-        }
+        (None, None) if is_offered => (
+            "Try what would help".to_owned(),
+            action::tooltip(ui.ctx(), "Try what would have helped"),
+        ),
         (None, None) => return,
     };
-    let is_on = command.is_some();
     let button =
         Button::new(text.as_str()).truncate().min_size(size).fill(theme::selected(ui.visuals()));
-    let response = ui.add_enabled(is_on, button.wrap_mode(egui::TextWrapMode::Truncate));
+    let button = button.wrap_mode(egui::TextWrapMode::Truncate);
+    let mut response = ui.add_enabled(!help.is_empty(), button);
     if !whole.is_empty() {
         response.widget_info(|| WidgetInfo::labeled(Role::Button, true, &whole));
     }
-    let help = match &command {
-        Some(Command::Explain) => {
-            action::of(&Command::Explain).map(|action| action.tooltip(ui.ctx()))
-        }
-        Some(Command::Try(args)) => {
-            Some(format!("Keeps this run as A and runs the query with {}", args.join(" ")))
-        }
-        Some(_) => None,
-        None => None,
-    };
-    let response = match help {
-        Some(help) => response.on_hover_text(help),
-        None => response,
-    };
-    if let Some(command) = command.filter(|_| response.clicked()) {
-        commands.send(command);
+    if !help.is_empty() {
+        response = response.on_hover_text(help);
+    }
+    if response.clicked() {
+        commands.send(move |app| match args {
+            Some(args) => app.state.try_again(&args),
+            None => app.state.switch_explaining(),
+        });
     }
 }
 

@@ -1,13 +1,16 @@
 //! What is shown of the state: the run, the cursor in it, its results, with nothing in them that is hidden.
 
+use std::rc::Rc;
 use std::sync::Arc;
 
 use super::AppState;
 use crate::app::run_pictures::RunPictures;
+use crate::app::selection::{ResultRow, Wanted};
 use crate::app::view_options::CompareMode;
 use crate::diagnosis::Grade;
 use crate::event::Stage;
 use crate::localize::QueryResult;
+use crate::measure::{ConditionError, Migration};
 use crate::method::Method;
 use crate::proof::ProofPicture;
 use crate::session::{Part, Run, Span, StageBar};
@@ -100,6 +103,22 @@ impl AppState {
         Some(found.shown(self.options.shows_truth))
     }
 
+    /// The results that are looked at, in the order of the queries: those that meet the condition that was typed,
+    /// whose verdict became what was asked for.
+    pub(in crate::app) fn selected_results(&self) -> Result<Rc<[ResultRow]>, ConditionError> {
+        let wanted = Wanted {
+            condition: self.options.results_filter.clone(),
+            change: self.options.verdict_change.clone(),
+            only_changed: self.options.only_differences && self.results_before.is_some(),
+        };
+        self.selection.rows(self.known(), wanted)
+    }
+
+    /// What became of the verdicts since the results A, also of those that stayed what they were.
+    pub(in crate::app) fn migrations(&self) -> Rc<[Migration]> {
+        self.selection.migrations(self.known())
+    }
+
     /// Whether a record is known at the cursor: in a lecture what comes later is not.
     pub(in crate::app) fn has_begun(&self, record: usize) -> bool {
         !self.options.hides_future || record <= self.shown_cursor()
@@ -123,7 +142,7 @@ impl AppState {
         part: &std::ops::Range<usize>,
         stage: &std::ops::Range<usize>,
     ) -> Option<egui::TextureHandle> {
-        self.shown_pictures().thumbnail(self.shown_run(), part, stage)
+        self.shown_pictures().stage(self.shown_run(), part, stage)
     }
 
     /// The picture that proves the result of a part, once it is made.

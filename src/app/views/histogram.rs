@@ -56,7 +56,7 @@ impl HistogramView {
         }
         let shown = self.method.unwrap_or_else(|| context.direct_method());
         ui.horizontal_wrapped(|ui| {
-            for method in context.direct_methods() {
+            for method in context.setup.direct_methods() {
                 let what = match explains(method) {
                     Some(ExplanationKind::Weights) => "residuals",
                     _ => "joint histogram",

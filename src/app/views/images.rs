@@ -18,7 +18,7 @@ use super::View;
 use super::canvas::PanZoom;
 use super::features::{FeatureProgress, INLIER, KINDS};
 use super::mesh_painter::MeshPainter;
-use crate::app::{Command, ViewContext};
+use crate::app::ViewContext;
 use crate::diagnosis::TRUE_MATCH_THRESHOLDS;
 use crate::problem::Problem;
 
@@ -165,7 +165,7 @@ fn point_at(
     let over = over.iter().find(|over| over.hovered())?;
     let hovered = visible.nearest(over.hover_pos()?);
     if over.clicked() && context.options.selected_feature != hovered {
-        context.send(Command::SelectFeature(hovered));
+        context.send(move |app| app.state.options.selected_feature = hovered);
     }
     if let Some(feature) = hovered {
         ui.ctx().set_cursor_icon(egui::CursorIcon::PointingHand);

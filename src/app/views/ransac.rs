@@ -10,9 +10,9 @@ use egui::{Color32, Ui};
 use egui_plot::{GridInput, GridMark, Line, LineStyle, Plot, PlotPoint, PlotUi, Points, VLine};
 
 use super::legend::name_picture;
-use super::memo::{Memo, Same};
 use super::{View, part_with};
-use crate::app::{Command, ViewContext, theme};
+use crate::app::memo::{Memo, Same};
+use crate::app::{ViewContext, theme};
 use crate::event::HypothesisTried;
 use crate::method::Method;
 use crate::session::{Loaded, Span};
@@ -114,7 +114,7 @@ fn plots(ui: &mut Ui, context: &ViewContext<'_>, trials: &Trials) {
                 answer.transform.position_from_point(&point).distance_sq(at)
             };
             if let Some(record) = trials.nearest(series, distance) {
-                context.send(Command::MoveCursor(record));
+                context.send(move |app| app.state.move_cursor(record));
             }
         }
     }

@@ -20,8 +20,8 @@ use nalgebra::Point3;
 
 use super::View;
 use super::legend::name_picture;
-use super::memo::{Memo, Same};
 use crate::app::ViewContext;
+use crate::app::memo::{Memo, Same};
 use crate::problem::ReferenceTuple;
 use crate::render::RenderParams;
 use cameras::{CameraKind, SceneCamera};

@@ -7,12 +7,12 @@ use nalgebra::Point2;
 
 use super::marks::{color, draw_truth, mark, position};
 use super::truth::TrueMatch;
+use crate::app::memo::{Memo, Same};
 use crate::app::views::canvas::Placement;
 use crate::app::views::features::{FeatureProgress, UNDECIDED, error_px, name};
 use crate::app::views::legend::name_picture;
-use crate::app::views::memo::{Memo, Same};
 use crate::app::views::mesh_painter::MeshPainter;
-use crate::app::{Command, ViewContext, theme};
+use crate::app::{ViewContext, theme};
 use crate::features::{FeatureState, Keypoint};
 use crate::palette;
 use crate::problem::{Problem, ReferenceTuple};
@@ -170,14 +170,14 @@ fn numbers(ui: &mut Ui, context: &ViewContext<'_>, subject: &Subject<'_>) {
         ui.strong(format!("Feature {}: {}", subject.feature, name(kind)));
         let close = ui.add(Button::new("×").small()).on_hover_text("Close");
         if close.accessible_name("Close feature").clicked() {
-            context.send(Command::SelectFeature(None));
+            context.send(|app| app.state.options.selected_feature = None);
         }
     });
     if let Some(FeatureState::NotUnique { rival }) = state {
         let help = "The reference feature resembles this query feature more; click to select it";
         let link = ui.link(format!("Nearer to query feature {rival}"));
         if link.on_hover_text(help).clicked() {
-            context.send(Command::SelectFeature(Some(rival)));
+            context.send(move |app| app.state.options.selected_feature = Some(rival));
         }
     }
     let grid = Grid::new("facts").num_columns(2).min_row_height(0.0);

@@ -18,7 +18,10 @@ pub(in crate::app::views) fn photo(
     context: &ViewContext<'_>,
     source: &Arc<Photo>,
 ) -> TextureHandle {
-    context.textures.of(ui.ctx(), "photo", source, |photo| color_image(&picture::photo(photo)))
+    context
+        .state
+        .textures
+        .of(ui.ctx(), "photo", source, |photo| color_image(&picture::photo(photo)))
 }
 
 /// Where the query's and the reference's photo are, and what the pointer does there.

@@ -158,8 +158,8 @@ pub(super) fn cameras(context: &ViewContext<'_>, geometry: &SceneGeometry) -> Ve
         let pose = problem.world_from_query(&reference_from_query);
         camera(CameraKind::BestSoFar(method), pose)
     }));
-    all.extend(context.hovered().map(|pose| camera(CameraKind::Pointer, pose)));
-    all.extend(context.camera().map(|pose| camera(CameraKind::Hand, pose)));
+    all.extend(context.state.hovered.map(|pose| camera(CameraKind::Pointer, pose)));
+    all.extend(context.state.camera.map(|pose| camera(CameraKind::Hand, pose)));
     all
 }
 

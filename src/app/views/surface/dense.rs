@@ -4,7 +4,7 @@ use egui::Ui;
 
 use super::scale::number;
 use super::search::Search;
-use crate::app::{Command, DenseAsk, DenseMap, ViewContext};
+use crate::app::{DenseAsk, DenseMap, ViewContext};
 use crate::geometry::PoseError;
 use crate::grid::{DenseSurface, MOST_CELLS};
 
@@ -30,7 +30,7 @@ pub(super) fn ui(ui: &mut Ui, context: &ViewContext<'_>, search: &Search<'_>) {
         ui.weak("The dense map is filled for the present run, B, only");
         return;
     }
-    let known = context.dense_map(search.method);
+    let known = context.state.dense_map(search.method);
     ui.horizontal_wrapped(|ui| {
         match known.map(progress) {
             Some(Ok(words)) => ui.weak(words),
@@ -86,6 +86,6 @@ pub(super) fn switch(ui: &mut Ui, context: &ViewContext<'_>) {
         "Score every position with every heading, and show the lowest cost at each position (F)";
     let switch = ui.toggle_value(&mut shown, "Dense").on_hover_text(help);
     if switch.clicked() {
-        context.send(Command::ShowDenseMap);
+        context.send(move |app| app.state.options.shows_dense_map = shown);
     }
 }

@@ -7,7 +7,7 @@ use super::marks::{MapMark, MarkKind, fanned, heading, place};
 use super::scale::{BELOW_FLOOR, Scale, number};
 use super::search::{Search, Searched, cell_of};
 use crate::app::views::legend::{cost_bar, name_picture, swatch};
-use crate::app::{Command, ViewContext, theme};
+use crate::app::{ViewContext, theme};
 use crate::geometry::Pose;
 use crate::grid::{DenseSurface, Lattice, Offset, ScoredLattice};
 use crate::proof::Thing;
@@ -107,8 +107,8 @@ impl CostMap {
         overlay(ui, shown, &answer.transform, pointed_at);
         let cell = pointed_at?;
         let pose = shown.search.pose(&cell.offset);
-        if takes_camera && context.camera() != Some(pose) {
-            context.send(Command::TakeCamera(Some(pose)));
+        if takes_camera && context.state.camera != Some(pose) {
+            context.send(move |app| app.state.camera = Some(pose));
         }
         Some((pose, readout(shown, &cell)))
     }

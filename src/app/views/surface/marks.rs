@@ -7,7 +7,7 @@ use egui::{Color32, Painter, Pos2, Rect, Stroke, Ui, Vec2, vec2};
 use super::scale::number;
 use super::search::{Minimum, Search};
 use crate::app::views::legend;
-use crate::app::{Command, ViewContext, theme};
+use crate::app::{ViewContext, theme};
 use crate::geometry::Pose;
 use crate::grid::{DenseSurface, Offset, Phase};
 use crate::method::Method;
@@ -73,7 +73,7 @@ impl MapMark {
             let kind = MarkKind::Thing(legend::result(context, &pose));
             add(kind, pose, "FB's result", near(&pose));
         }
-        if let Some(pose) = context.camera() {
+        if let Some(pose) = context.state.camera {
             let kind = MarkKind::Thing(Thing::Dot(palette::UNDECIDED));
             add(kind, pose, "camera in hand", near(&pose));
         }
@@ -238,7 +238,8 @@ pub(super) fn legend(ui: &mut Ui, context: &ViewContext<'_>, marks: &[MapMark]) 
             pointed_at = Some(mark.pose);
         }
         if response.clicked() {
-            context.send(Command::TakeCamera(Some(mark.pose)));
+            let pose = mark.pose;
+            context.send(move |app| app.state.camera = Some(pose));
         }
     }
     pointed_at

@@ -85,7 +85,7 @@ fn marks(ui: &Ui, context: &ViewContext<'_>, search: &Search<'_>) -> Vec<LineMar
     let strong = ui.visuals().strong_text_color();
     let truth = context.truth().map(|pose| search.offset(pose));
     let hypothesis = search.hypothesis.map(|scored| scored.offset);
-    let camera = context.camera().map(|pose| search.offset(&pose));
+    let camera = context.state.camera.map(|pose| search.offset(&pose));
     let [dashed, dotted] = [LineStyle::dashed_loose(), LineStyle::dotted_loose()];
     let marks = [
         ("╎ truth", theme::TRUTH, dashed, truth),

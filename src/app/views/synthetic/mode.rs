@@ -72,7 +72,7 @@ impl Mode {
         shown: &ShownView,
     ) -> Option<TextureHandle> {
         let of = |what, make: &dyn Fn(&Comparison) -> DynamicImage| {
-            let textures = context.textures;
+            let textures = &context.state.textures;
             let made = |comparison: &Comparison| color_image(&make(comparison));
             textures.of(ui.ctx(), what, &shown.comparison, made)
         };

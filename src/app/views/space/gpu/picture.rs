@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::frame::{Frame, Points};
 use super::guarded;
 use super::pipelines::{COLOR, DEPTH, Pipelines};
-use crate::app::views::memo::Same;
+use crate::app::memo::Same;
 
 /// The picture and what is needed to draw it anew.
 #[derive(Default)]
