@@ -58,7 +58,6 @@ pub use view_context::ViewContext;
 pub use view_options::{CompareMode, Tab, ViewOptions};
 pub use window::{WindowError, has_display, open, open_lesson, window_options};
 
-use eframe::egui_wgpu::RenderState;
 use egui::{Margin, Panel};
 use frame::Panes;
 use frame::help::ActionSearch;
@@ -90,15 +89,14 @@ pub struct App {
 impl App {
     /// The window's content for a setup. It starts to run at once, in the mode of the setup.
     pub fn new(creation: &eframe::CreationContext<'_>, setup: Setup) -> Self {
-        let state = creation.wgpu_render_state.as_ref();
-        Self::of(&creation.egui_ctx, state, setup)
+        Self::of(&creation.egui_ctx, setup)
     }
 
-    fn of(ctx: &egui::Context, render_state: Option<&RenderState>, setup: Setup) -> Self {
+    fn of(ctx: &egui::Context, setup: Setup) -> Self {
         theme::install(ctx);
         Self {
             state: AppState::new(setup, ctx.clone()),
-            panes: Panes::new(render_state),
+            panes: Panes::new(),
             commands: command::Queue::default(),
             help: false,
             search: None,
@@ -203,52 +201,34 @@ impl App {
         let sizes = Sizes::of(ui.ctx().content_rect().size());
         let fill = ui.visuals().panel_fill;
         let plain = |margin: Margin| egui::Frame::NONE.fill(fill).inner_margin(margin);
-        let bar = |name: &'static str, height: f32| {
-            Panel::top(name)
-                .exact_size(height)
-                .resizable(false)
-                .frame(plain(Margin::symmetric(8, 0)))
+        let fixed = |panel: Panel, size: f32, margin: Margin| {
+            panel.exact_size(size).resizable(false).frame(plain(margin))
         };
-        bar("toolbar", sizes.toolbar).show(ui, |ui| frame::toolbar::ui(ui, state, commands, panes));
+        fixed(Panel::top("toolbar"), sizes.toolbar, Margin::symmetric(8, 0))
+            .show(ui, |ui| frame::toolbar::ui(ui, state, commands, panes));
         let mut canvas = egui::Rect::NOTHING;
         let central = egui::CentralPanel::default().frame(plain(Margin::same(6)));
         let options = &state.options;
-        if options.is_alone {
-            central.show(ui, |ui| {
-                canvas = ui.max_rect();
-                frame::canvas::alone(ui, state, commands, panes);
-            });
-            self.canvas = canvas;
-            return;
-        }
-        let below = |name: &'static str, height: f32| {
-            Panel::bottom(name)
-                .exact_size(height)
-                .resizable(false)
-                .frame(plain(Margin::symmetric(8, 4)))
-        };
+        let below = Margin::symmetric(8, 4);
         match options.layout {
+            _ if options.is_alone => {
+                central.show(ui, |ui| {
+                    canvas = ui.max_rect();
+                    frame::canvas::alone(ui, state, commands, panes);
+                });
+            }
             Arrangement::Inspect => {
-                Panel::top("verdicts")
-                    .exact_size(sizes.verdicts)
-                    .resizable(false)
-                    .frame(plain(Margin::ZERO))
+                fixed(Panel::top("verdicts"), sizes.verdicts, Margin::ZERO)
                     .show(ui, |ui| frame::verdicts::ui(ui, state, commands));
-                let height = frame::storyboard::height(&state.setup);
-                below("storyboard", sizes.storyboard.min(height))
+                let height = sizes.storyboard.min(frame::storyboard::height(&state.setup));
+                fixed(Panel::bottom("storyboard"), height, below)
                     .show(ui, |ui| frame::storyboard::ui(ui, state, commands));
                 if options.shows_queries && sizes.has_sides {
-                    Panel::left("queries")
-                        .exact_size(sizes.queries)
-                        .resizable(false)
-                        .frame(plain(Margin::same(6)))
+                    fixed(Panel::left("queries"), sizes.queries, Margin::same(6))
                         .show(ui, |ui| panes.show(ui, views::QUERIES, state, commands));
                 }
                 if options.shows_inspector && sizes.has_sides {
-                    Panel::right("inspector")
-                        .exact_size(sizes.inspector)
-                        .resizable(false)
-                        .frame(plain(Margin::symmetric(10, 6)))
+                    fixed(Panel::right("inspector"), sizes.inspector, Margin::symmetric(10, 6))
                         .show(ui, |ui| frame::inspector::ui(ui, state, commands, panes));
                 }
                 central.show(ui, |ui| {
@@ -257,7 +237,8 @@ impl App {
                 });
             }
             Arrangement::Lecture => {
-                below("lecture", sizes.sentence).show(ui, |ui| lecture::ui(ui, state, commands));
+                fixed(Panel::bottom("lecture"), sizes.sentence, below)
+                    .show(ui, |ui| lecture::ui(ui, state, commands));
                 if let Some(lesson) = lesson {
                     Panel::left("lesson")
                         .exact_size(lesson::WIDTH)
@@ -275,14 +256,10 @@ impl App {
             }
             Arrangement::Batch => {
                 let width = ui.available_width() * 0.44;
-                Panel::right("selected")
-                    .exact_size(width)
-                    .resizable(false)
-                    .frame(plain(Margin::same(10)))
-                    .show(ui, |ui| {
-                        canvas = ui.max_rect();
-                        frame::batch::right(ui, state, commands, panes);
-                    });
+                fixed(Panel::right("selected"), width, Margin::same(10)).show(ui, |ui| {
+                    canvas = ui.max_rect();
+                    frame::batch::right(ui, state, commands, panes);
+                });
                 central.show(ui, |ui| frame::batch::left(ui, state, commands, panes));
             }
         }

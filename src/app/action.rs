@@ -8,7 +8,6 @@ use super::App;
 use super::arrangement::Arrangement;
 use super::camera::{NamedPose, Nudge};
 use super::command::Queue;
-use super::frame::help::ActionSearch;
 use super::save::SaveTarget;
 use super::state::AppState;
 use super::view_options::{CompareMode, Tab};
@@ -190,7 +189,7 @@ pub static ACTIONS: &[Action] = &[
     once(Window, &[], "Save the session …", |app| app.ask_where(SaveTarget::Session)),
     once(Window, &[], "Restore a session …", |app| app.ask_where(SaveTarget::Restored)),
     once(Window, &[key(Key::L)], "Light or dark", |app| app.switch_theme()),
-    once(Window, &[ctrl(Key::K)], "Search for an action", |app| app.search = Some(ActionSearch::default())),
+    once(Window, &[ctrl(Key::K)], "Search for an action", |app| app.open_search()),
     // Named by what it types, wherever it is on the keyboard.
     once(Window, &[key(Key::Questionmark), key(Key::F1)], "All keys", |app| app.help ^= true),
 ];

@@ -300,7 +300,7 @@ impl AppState {
     /// Sets a parameter, named `group.name`, and runs again what depends on it.
     pub fn set_param(&mut self, key: &str, value: &str) {
         match self.setup.task.params.set(key, value) {
-            Ok(()) if self.setup.task.params != *self.params => self.restart_run(),
+            Ok(()) if self.setup.task.params != self.run().params => self.restart_run(),
             Ok(()) => {}
             Err(error) => self.note(error.to_string(), true),
         }

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use super::App;
 use super::action;
 use super::arrangement::Arrangement;
+use super::frame::help::ActionSearch;
 use super::navigation::Navigation;
 use super::save::{Asking, SaveTarget};
 use super::saved::SavedSession;
@@ -48,6 +49,10 @@ impl App {
         let ctx = &self.state.ctx;
         let is_dark = ctx.global_style().visuals.dark_mode;
         ctx.set_theme(if is_dark { egui::Theme::Light } else { egui::Theme::Dark });
+    }
+
+    pub(super) fn open_search(&mut self) {
+        self.search = Some(ActionSearch::default());
     }
 
     /// The next page of the lesson, or the one before.

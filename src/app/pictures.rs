@@ -11,7 +11,7 @@ use crate::render::{SplattedPixel, SyntheticView};
 const CONTRIBUTION_RANGE: f64 = 2.0;
 
 /// The range of differences that 98 % of the pixels are within. A power of two, so similar views have the same range.
-pub(in crate::app) fn residual_range(pairs: &[IntensityPair]) -> f64 {
+pub(crate) fn residual_range(pairs: &[IntensityPair]) -> f64 {
     const BEYOND: f64 = 0.02;
     let differences = pairs.iter().map(|pair| (pair.query - pair.synthetic).abs());
     let mut differences: Vec<f32> = differences.collect();
@@ -27,7 +27,7 @@ pub(in crate::app) fn residual_range(pairs: &[IntensityPair]) -> f64 {
 
 /// Query minus synthetic view, coloured over ±`range` grey values: blue where the query is darker, orange where it is
 /// brighter.
-pub(in crate::app) fn residual_within(
+pub(crate) fn residual_within(
     view: &SyntheticView,
     pairs: &[IntensityPair],
     range: f64,
@@ -38,14 +38,14 @@ pub(in crate::app) fn residual_within(
 }
 
 /// The pixels that the photometric cost counted (white) and ignored (grey).
-pub(in crate::app) fn weights(view: &SyntheticView, weights: &PhotometricWeights) -> GrayImage {
+pub(crate) fn weights(view: &SyntheticView, weights: &PhotometricWeights) -> GrayImage {
     let values = weights.counted.iter().map(|&counted| WEIGHT_GRAYS[usize::from(counted)]);
     in_gray(view, Painter::new(view).paint(0, values))
 }
 
 /// The contribution of each pixel to mutual information, −2 … 2 nat: orange if its pair of grey values is more
 /// frequent than by chance, blue if it is rarer.
-pub(in crate::app) fn contributions(
+pub(crate) fn contributions(
     view: &SyntheticView,
     pairs: &[IntensityPair],
     histogram: &JointHistogram,
@@ -60,7 +60,7 @@ pub(in crate::app) fn contributions(
 
 /// The covered pixels coloured by depth over the darkened query. Their uncovered neighbours get a shade of the
 /// colour, so the few pixels are visible in a small picture.
-pub(in crate::app) fn coverage(query: &GrayImage, view: &SyntheticView) -> RgbImage {
+pub(crate) fn coverage(query: &GrayImage, view: &SyntheticView) -> RgbImage {
     let color = |pixel: &SplattedPixel| palette::depth(f64::from(pixel.depth));
     let place = |pixel: &SplattedPixel| (pixel.index % view.width, pixel.index / view.width);
     let ground = |x: u32, y: u32| query.get_pixel(x, y).0[0] / 3;

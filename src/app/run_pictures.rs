@@ -38,7 +38,7 @@ struct Question {
     records: Vec<Record>,
     result: QueryResult,
     truth: Option<Pose>,
-    params: Arc<Params>,
+    params: Params,
 }
 
 impl RunPictures {
@@ -66,7 +66,7 @@ impl RunPictures {
     }
 
     /// Takes in what is ready, and asks for the proof of each part that has a result.
-    pub(super) fn update(&mut self, run: &Run, params: &Arc<Params>, shows_truth: bool) {
+    pub(super) fn update(&mut self, run: &Run, shows_truth: bool) {
         self.stages.get_mut().pictures.poll();
         if shows_truth != self.shows_truth {
             self.proofs.forget();
@@ -90,7 +90,7 @@ impl RunPictures {
                     records: records.cloned().collect(),
                     result: result.shown(shows_truth),
                     truth: loaded.truth.filter(|_| shows_truth),
-                    params: Arc::clone(params),
+                    params: run.params.clone(),
                 })
             });
         }

@@ -25,7 +25,7 @@ pub struct Probe {
 struct ProbeRequest {
     problem: Problem,
     methods: Vec<Method>,
-    params: Arc<Params>,
+    params: Params,
     pose: Pose,
 }
 
@@ -50,7 +50,7 @@ impl Prober {
         &mut self,
         problem: &Problem,
         methods: &[Method],
-        params: &Arc<Params>,
+        params: &Params,
         pose: Pose,
     ) {
         if self.asked == Some(pose) {
@@ -61,7 +61,7 @@ impl Prober {
         self.worker.ask(ProbeRequest {
             problem: problem.clone(),
             methods: methods.to_vec(),
-            params: Arc::clone(params),
+            params: params.clone(),
             pose,
         });
     }
@@ -171,11 +171,11 @@ pub struct CostAlong {
 }
 
 /// The costs along lines: of each method the one that was asked for last.
-pub(super) type Lines = Answers<CostLine, (Problem, Arc<Params>), CostAlong>;
+pub(super) type Lines = Answers<CostLine, (Problem, Params), CostAlong>;
 
 /// Starts the thread that scores the poses of lines.
 pub(super) fn lines(ctx: egui::Context) -> Lines {
-    Answers::new("cost line", ctx, |line: &CostLine, question: (Problem, Arc<Params>)| {
+    Answers::new("cost line", ctx, |line: &CostLine, question: (Problem, Params)| {
         let (problem, params) = question;
         let pose = |share| problem.reference_from_query(&line.pose(share));
         let poses: Vec<Pose> = CostLine::shares().map(pose).collect();
@@ -243,7 +243,7 @@ impl DenseMap {
 /// A map to go on with from where it is.
 struct DenseRequest {
     problem: Problem,
-    params: Arc<Params>,
+    params: Params,
     ask: DenseAsk,
     surface: DenseSurface,
 }
@@ -278,7 +278,7 @@ impl DenseFiller {
 
     /// Has a map filled for as long as this is called in each frame. Another map of the same method is forgotten; one
     /// that was begun goes on.
-    pub(super) fn ask(&mut self, problem: &Problem, params: &Arc<Params>, ask: DenseAsk) {
+    pub(super) fn ask(&mut self, problem: &Problem, params: &Params, ask: DenseAsk) {
         self.is_shown = true;
         if self.filling == Some(ask) {
             return;
@@ -296,7 +296,7 @@ impl DenseFiller {
         self.filling = Some(ask);
         self.worker.ask(DenseRequest {
             problem: problem.clone(),
-            params: Arc::clone(params),
+            params: params.clone(),
             ask,
             surface: surface.clone(),
         });

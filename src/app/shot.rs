@@ -108,7 +108,7 @@ impl<'a> Window<'a> {
     fn new(setup: Setup, results: KnownResults, shot: &'a Shot, painter: &'a Painter) -> Self {
         let ctx = egui::Context::default();
         ctx.set_theme(shot.theme);
-        let app = App::of(&ctx, Some(painter.render_state()), setup).with_results(results);
+        let app = App::of(&ctx, setup).with_results(results);
         // Nothing moves in a picture.
         ctx.all_styles_mut(|style| style.animation_time = 0.0);
         Self { app, ctx, painter, shot, frames: 0 }

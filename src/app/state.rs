@@ -23,7 +23,6 @@ use crate::event::Side;
 use crate::geometry::Pose;
 use crate::lesson::Moment;
 use crate::method::Method;
-use crate::params::Params;
 use crate::run::Protocol;
 use crate::scene::FrameStore;
 use crate::session::{Breakpoints, Part, Run, RunMode, RunState, Session, Span};
@@ -52,8 +51,6 @@ pub struct KeptRun {
 pub struct AppState {
     /// What is run: scenes, query, references, parameters.
     pub setup: Setup,
-    /// The parameters of the setup, shared with the prober.
-    pub(super) params: Arc<Params>,
     /// Frames of the setup's scenes, with what its runs have worked out about them.
     frames: Arc<FrameStore>,
     pub(super) session: Session,
@@ -97,11 +94,9 @@ pub struct AppState {
 
 impl AppState {
     pub(super) fn new(setup: Setup, ctx: egui::Context) -> Self {
-        let params = Arc::new(setup.task.params.clone());
         let frames = Arc::default();
         let session = start(&setup, setup.mode, &frames, &ctx);
         Self {
-            params,
             prober: Prober::new(ctx.clone()),
             lines: scoring::lines(ctx.clone()),
             dense_filler: DenseFiller::new(ctx.clone()),
@@ -242,12 +237,11 @@ impl AppState {
             && let Some(problem) = self.problem().cloned()
         {
             let methods = self.setup.direct_methods();
-            self.prober.ask(&problem, &methods, &self.params, pose);
+            self.prober.ask(&problem, &methods, &self.session.run().params, pose);
         }
-        self.pictures.update(self.session.run(), &self.params, self.options.shows_truth);
+        self.pictures.update(self.session.run(), self.options.shows_truth);
         if let Some(kept) = &mut self.kept {
-            let params = Arc::new(kept.run.params.clone());
-            kept.pictures.update(&kept.run, &params, self.options.shows_truth);
+            kept.pictures.update(&kept.run, self.options.shows_truth);
         }
         if !self.lines.poll() {
             self.note("the cost between two poses could not be computed", true);
@@ -285,7 +279,7 @@ impl AppState {
 
     /// Has the cost along a line worked out for the problem at the cursor.
     pub(super) fn trace_line(&mut self, line: CostLine) {
-        let question = self.problem().map(|problem| (problem.clone(), Arc::clone(&self.params)));
+        let question = self.problem().map(|problem| (problem.clone(), self.run().params.clone()));
         self.lines.forget_where(|other| other.method == line.method && *other != line);
         self.lines.ask(line, || question);
     }
@@ -302,9 +296,10 @@ impl AppState {
 
     /// Has a dense map filled, as long as somebody looks at it.
     pub(super) fn fill_dense_map(&mut self, ask: DenseAsk) {
-        let loaded = self.session.run().loaded.as_deref();
+        let run = self.session.run();
+        let loaded = run.loaded.as_deref();
         if let Some(problem) = loaded.and_then(|loaded| loaded.problems.get(ask.reference)) {
-            self.dense_filler.ask(problem, &self.params, ask);
+            self.dense_filler.ask(problem, &run.params, ask);
         }
     }
 
@@ -430,17 +425,11 @@ impl AppState {
 
     /// Another setup altogether; the cursor goes to a record as soon as the run has come so far.
     pub(super) fn restore(&mut self, setup: Setup, cursor: usize) {
-        self.results = self.first_results.clone();
-        self.set_results_before(None);
         self.queries = Queries::new(self.ctx.clone());
-        self.setup = setup;
-        self.params = Arc::new(self.setup.task.params.clone());
-        self.kept = None;
-        self.options.compare_mode = CompareMode::default();
         // The scenes are others, even where they have the same names.
         self.frames = Arc::default();
-        self.start_run(RunMode::Running);
-        self.navigation = Navigation::towards_record(cursor);
+        self.change_setup(setup, Navigation::towards_record(cursor));
+        self.results = self.first_results.clone();
     }
 
     /// Another setup whose scenes are partly those of this one; the cursor goes where `navigation` says.
@@ -449,7 +438,6 @@ impl AppState {
         self.results = Results::new();
         self.set_results_before(None);
         self.setup = setup;
-        self.params = Arc::new(self.setup.task.params.clone());
         self.kept = None;
         self.options.compare_mode = CompareMode::default();
         self.camera = None;
@@ -469,7 +457,6 @@ impl AppState {
         self.stop_queries();
         let is_alive = self.session.is_alive();
         let navigation = self.navigation.towards_same(self.run(), is_alive);
-        self.params = Arc::new(self.setup.task.params.clone());
         self.start_run(RunMode::Running);
         self.navigation = navigation;
     }

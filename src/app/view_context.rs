@@ -32,13 +32,10 @@ pub struct ViewContext<'a> {
 }
 
 impl<'a> ViewContext<'a> {
-    fn new(run: &'a Run, cursor: usize, state: &'a AppState, commands: &'a Queue) -> Self {
+    /// The run that is shown, at the cursor in it.
+    pub(super) fn new(state: &'a AppState, commands: &'a Queue) -> Self {
+        let (run, cursor) = (state.shown_run(), state.shown_cursor());
         Self { run, cursor, setup: &state.setup, options: &state.options, state, commands }
-    }
-
-    /// The present run at the cursor.
-    pub(super) fn present(state: &'a AppState, commands: &'a Queue) -> Self {
-        Self::new(state.run(), state.cursor(), state, commands)
     }
 
     /// The same at another position among the records of the run.
@@ -46,15 +43,9 @@ impl<'a> ViewContext<'a> {
         Self { cursor, ..*self }
     }
 
-    /// The kept run at the place that corresponds to the cursor.
-    pub(super) fn kept(state: &'a AppState, commands: &'a Queue) -> Option<Self> {
-        let (kept, cursor) = (state.kept.as_ref()?, state.kept_cursor()?);
-        Some(Self::new(&kept.run, cursor, state, commands))
-    }
-
     /// Whether the run that is shown is the present one, whose parameters can be changed.
     pub fn is_present(&self) -> bool {
-        std::ptr::eq(self.run, self.state.run())
+        !self.state.is_showing_kept()
     }
 
     /// Asks for something to be done after this frame.

@@ -6,7 +6,7 @@
 
 use egui::accesskit::Role;
 use egui_kittest::Harness;
-use egui_kittest::kittest::{NodeT as _, Queryable as _};
+use egui_kittest::kittest::NodeT as _;
 use posescope::app::{App, Arrangement, Setup, views};
 use posescope::method::Method;
 use posescope::session::{RunMode, RunState};
@@ -71,9 +71,6 @@ fn every_picture_looks_as_it_did() {
     at_every_moment(&mut window, |window, moment, of| {
         for view in seen(of, true) {
             show(window, view);
-            if let Some(trouble) = window.query_by_label_contains("Nothing is drawn") {
-                panic!("{:?}", trouble.accesskit_node().value());
-            }
             let compared = judge.compare(window, &format!("{view}-{moment}"));
             unlike.extend(compared.err());
         }

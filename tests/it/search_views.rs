@@ -247,7 +247,7 @@ fn ransac_counts_the_trials_and_a_click_goes_to_one() {
     }
     move_to(&mut window, trials[trials.len() - 1].0);
     window.run_steps(2);
-    window.get_by_label_contains("log likelihood by trial").click();
+    window.get_by_label_contains("inliers by trial").click();
     window.run_steps(3);
     let cursor = app(&window).cursor();
     let place = trials.iter().position(|(at, _)| *at == cursor);
@@ -276,7 +276,7 @@ fn every_moment_of_a_run_can_be_drawn() {
     let views: [(&str, &[&str]); 3] = [
         ("surface", &["Nothing is searched yet", "Cost map"]),
         ("histogram", &["No synthetic view yet", "Joint histogram of", "Residuals of"]),
-        ("ransac", &["No hypothesis yet", "log likelihood by trial"]),
+        ("ransac", &["No hypothesis yet", "inliers by trial"]),
     ];
     for (view, said) in views {
         send(&mut window, |app| app.app_state_mut().show_alone(Some(view)));

@@ -6,7 +6,7 @@ use egui::{
 };
 
 use super::inspector::capital;
-use super::verdicts::split;
+use super::verdicts::{split, told};
 use super::{Panes, canvas, proof::elided};
 use crate::app::App;
 use crate::app::command::Queue;
@@ -22,7 +22,7 @@ const BAR: f32 = 22.0;
 /// Bars and causes that are drawn, at most.
 const MOST: usize = 8;
 
-pub(in crate::app) fn left(ui: &mut Ui, state: &AppState, commands: &Queue, panes: &mut Panes) {
+pub(crate) fn left(ui: &mut Ui, state: &AppState, commands: &Queue, panes: &mut Panes) {
     let results: Vec<QueryResult> = state
         .results
         .values()
@@ -135,25 +135,19 @@ fn draw_causes(ui: &Ui, overview: &Overview, area: Rect) {
 }
 
 /// The selected result: its name, its sentence, its proof, and one plot below.
-pub(in crate::app) fn right(ui: &mut Ui, state: &AppState, commands: &Queue, panes: &mut Panes) {
+pub(crate) fn right(ui: &mut Ui, state: &AppState, commands: &Queue, panes: &mut Panes) {
     let area = ui.available_rect_before_wrap();
     let (upper, lower) = area.split_top_bottom_at_fraction(0.56);
     ui.scope_builder(UiBuilder::new().max_rect(upper), |ui| {
         ui.shrink_clip_rect(upper);
         let span = state.shown_span();
-        let result =
-            span.filter(|span| state.has_come(span)).and_then(|span| state.shown_result(span));
-        match &result {
+        match &span.and_then(|span| state.outcome(span)) {
             Some(result) => {
                 let error = result
                     .error
                     .map_or(String::new(), |error| format!(" · {} off", error.translation()));
                 ui.strong(format!("{} · {}{error}", result.query, result.method.label()));
-                let text = match (result.diagnosis.first(), &result.reason) {
-                    (Some(found), _) => found.text.clone(),
-                    (None, Some(reason)) => reason.text.clone(),
-                    (None, None) => result.evidence(),
-                };
+                let text = told(result);
                 ui.add(egui::Label::new(split(&text).0).truncate()).on_hover_text(&text);
             }
             None => {

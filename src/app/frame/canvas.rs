@@ -15,7 +15,7 @@ const GAP: f32 = 8.0;
 const TITLE: f32 = 18.0;
 
 /// The views on the canvas: the large one first.
-pub(in crate::app) fn scene(state: &AppState) -> Vec<&'static str> {
+pub(crate) fn scene(state: &AppState) -> Vec<&'static str> {
     let here = state.shown_stage();
     let of_stage = stage::scene(here);
     let mut views: Vec<&'static str> = match &state.options.presented {
@@ -32,13 +32,7 @@ pub(in crate::app) fn scene(state: &AppState) -> Vec<&'static str> {
     views
 }
 
-pub(in crate::app) fn ui(
-    ui: &mut Ui,
-    state: &AppState,
-    commands: &Queue,
-    panes: &mut Panes,
-    most: usize,
-) {
+pub(crate) fn ui(ui: &mut Ui, state: &AppState, commands: &Queue, panes: &mut Panes, most: usize) {
     if state.options.shows_why && !state.is_presenting() {
         why(ui, state, panes);
         return;
@@ -120,7 +114,7 @@ pub(super) fn why(ui: &mut Ui, state: &AppState, panes: &mut Panes) {
 }
 
 /// A view alone, with a way back.
-pub(in crate::app) fn alone(ui: &mut Ui, state: &AppState, commands: &Queue, panes: &mut Panes) {
+pub(crate) fn alone(ui: &mut Ui, state: &AppState, commands: &Queue, panes: &mut Panes) {
     ui.horizontal(|ui| {
         let button = ui.button(RichText::new("All panels").small());
         if button.on_hover_text("Back to the window with all its parts (M)").clicked() {

@@ -9,7 +9,7 @@ use serde_json::Value;
 use super::Panes;
 use super::stage::three_digits;
 use super::storyboard::part_name;
-use super::verdicts::{short, split};
+use super::verdicts::{short, split, told};
 use crate::app::command::Queue;
 use crate::app::state::AppState;
 use crate::app::theme;
@@ -17,7 +17,7 @@ use crate::app::view_options::Tab;
 use crate::diagnosis::{Code, Confidence, Diagnosis, Grade, confidence};
 use crate::localize::{Helped, QueryResult};
 
-pub(in crate::app) fn ui(ui: &mut Ui, state: &AppState, commands: &Queue, panes: &mut Panes) {
+pub(crate) fn ui(ui: &mut Ui, state: &AppState, commands: &Queue, panes: &mut Panes) {
     let tab = state.options.tab;
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 2.0;
@@ -49,7 +49,7 @@ fn why(ui: &mut Ui, state: &AppState, commands: &Queue) {
         ui.weak("Nothing has run yet. Space runs the query.");
         return;
     };
-    let Some(result) = state.shown_result(span).filter(|_| state.has_come(span)) else {
+    let Some(result) = state.outcome(span) else {
         ui.weak(format!("{} has no result yet.", part_name(span.part)));
         return;
     };
@@ -79,8 +79,7 @@ fn why(ui: &mut Ui, state: &AppState, commands: &Queue) {
         }
         None => {
             ui.strong(format!("{}: {}", part_name(span.part), result.grade));
-            let reason = result.reason.as_ref().map(|reason| reason.text.clone());
-            ui.label(reason.unwrap_or_else(|| result.evidence()));
+            ui.label(told(&result));
         }
     }
     changed(ui, &state.shown_run().params.changes());
@@ -224,7 +223,7 @@ fn readable(code: Code, key: &str) -> (String, &'static str) {
 }
 
 /// With a capital letter first.
-pub(in crate::app) fn capital(text: &str) -> String {
+pub(crate) fn capital(text: &str) -> String {
     let mut letters = text.chars();
     match letters.next() {
         Some(first) => first.to_uppercase().chain(letters).collect(),

@@ -7,7 +7,7 @@ use crate::app::state::AppState;
 use crate::app::theme;
 
 /// Draws the notes in the lower right corner.
-pub(in crate::app) fn ui(ctx: &egui::Context, state: &AppState, commands: &Queue) {
+pub(crate) fn ui(ctx: &egui::Context, state: &AppState, commands: &Queue) {
     if state.notes.is_empty() {
         return;
     }

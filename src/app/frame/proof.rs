@@ -1,9 +1,13 @@
 //! A proof picture on the canvas.
 
-use egui::{Align2, Color32, Pos2, Rect, Role, Sense, Shape, Stroke, Ui, WidgetInfo, pos2, vec2};
+use egui::{
+    Align2, Color32, Pos2, Rect, Role, Sense, Shape, Stroke, TextureHandle, Ui, WidgetInfo, pos2,
+    vec2,
+};
 
 use crate::app::textures::{Textures, color_image};
 use crate::app::theme;
+use crate::app::views::legend::paint_mark;
 use crate::palette;
 use crate::proof::{
     ColorScale, MARK, Mark, Panel, Place, ProofPicture, Thing, free_corner, label_place, title_end,
@@ -45,6 +49,11 @@ pub(super) fn ui(
     ui.advance_cursor_after_rect(area);
 }
 
+/// The picture of a panel on the graphics card.
+pub(super) fn texture(ui: &Ui, textures: &Textures, panel: &Panel) -> TextureHandle {
+    textures.of(ui.ctx(), "proof", &panel.picture, |picture| color_image(&picture.clone().into()))
+}
+
 fn on_screen(area: Rect, place: &Place) -> Rect {
     let corner = area.min + vec2(place.left, place.top);
     Rect::from_min_size(corner, vec2(place.width, place.height))
@@ -55,9 +64,7 @@ fn draw(ui: &Ui, textures: &Textures, panel: &Panel, rect: Rect, title_end: f32)
     let title = pos2(rect.left(), rect.top() - 3.0);
     let galley = elided(ui, &panel.title, words, title_end - rect.left());
     ui.painter().galley(title - vec2(0.0, galley.size().y), galley, words);
-    let texture = textures.of(ui.ctx(), "proof", &panel.picture, |picture| {
-        color_image(&image::DynamicImage::ImageRgb8(picture.clone()))
-    });
+    let texture = texture(ui, textures, panel);
     let whole = Rect::from_min_max(Pos2::ZERO, pos2(1.0, 1.0));
     let painter = ui.painter_at(rect.expand(1.0).intersect(ui.clip_rect()));
     painter.image(texture.id(), rect, whole, Color32::WHITE);
@@ -68,37 +75,12 @@ fn draw(ui: &Ui, textures: &Textures, panel: &Panel, rect: Rect, title_end: f32)
         painter.add(Shape::line(points, Stroke::new(line.width, theme::rgb(line.color))));
     }
     for mark in &panel.marks {
-        draw_mark(&painter, mark.thing, at(mark.at));
+        paint_mark(&painter, mark.thing, at(mark.at), MARK);
     }
     let marks = || panel.marks.iter().map(|mark| (mark, at(mark.at)));
     let scale = panel.scale.as_ref();
     let taken = scale.map(|scale| color_scale(&painter, scale, rect, marks().map(|(_, at)| at)));
     labels(&painter, marks(), rect, taken);
-}
-
-/// Draws a mark in its shape and colour, with a dark edge.
-pub(in crate::app) fn draw_mark(painter: &egui::Painter, thing: Thing, at: Pos2) {
-    let color = theme::rgb(thing.color());
-    for stroke in [Stroke::new(5.0, Color32::BLACK), Stroke::new(2.5, color)] {
-        match thing {
-            Thing::Reference => {
-                painter.circle_stroke(at, MARK, stroke);
-            }
-            Thing::Truth => {
-                painter.hline(at.x - MARK..=at.x + MARK, at.y, stroke);
-                painter.vline(at.x, at.y - MARK..=at.y + MARK, stroke);
-            }
-            Thing::Result(_) => {
-                let corners =
-                    [vec2(0.0, -MARK), vec2(MARK, 0.0), vec2(0.0, MARK), vec2(-MARK, 0.0)];
-                painter.add(Shape::closed_line(corners.map(|to| at + to).to_vec(), stroke));
-            }
-            Thing::Dot(_) => {
-                painter.circle_stroke(at, 3.0, stroke);
-            }
-            Thing::Words => {}
-        }
-    }
 }
 
 /// Labels beside their marks, inside the panel, none upon another.

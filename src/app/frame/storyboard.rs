@@ -7,7 +7,7 @@ use egui::{
     pos2, vec2,
 };
 
-use super::proof::elided;
+use super::proof::{self, elided};
 use super::stage;
 use crate::app::command::Queue;
 use crate::app::setup::Setup;
@@ -37,7 +37,7 @@ struct Row<'a> {
 }
 
 /// The height that all rows of a setup take, with the line below them \[points\]. It is the same at every step.
-pub(in crate::app) fn height(setup: &Setup) -> f32 {
+pub(crate) fn height(setup: &Setup) -> f32 {
     let protocol = &setup.task.protocol;
     let fused = usize::from(!protocol.fusions.is_empty());
     let rows = protocol.methods.len() * (1 + fused) + usize::from(!protocol.is_by_hand());
@@ -45,7 +45,7 @@ pub(in crate::app) fn height(setup: &Setup) -> f32 {
 }
 
 /// Draws all rows and the line below them.
-pub(in crate::app) fn ui(ui: &mut Ui, state: &AppState, commands: &Queue) {
+pub(crate) fn ui(ui: &mut Ui, state: &AppState, commands: &Queue) {
     let area = ui.available_rect_before_wrap();
     let (above, line) = area.split_top_bottom_at_y(area.bottom() - SCRUB);
     let rows = rows(state);
@@ -134,21 +134,12 @@ fn why(
     size: egui::Vec2,
     is_selected: bool,
 ) {
-    let Some(span) = row.span.filter(|span| state.has_come(span)) else {
-        return;
-    };
-    let Some(result) = state.shown_result(span) else {
-        return;
-    };
-    if result.grade == Grade::Right {
-        return;
-    }
+    let Some(span) = row.span else { return };
+    let result = state.outcome(span).filter(|result| result.grade != Grade::Right);
+    let Some(result) = result else { return };
     let caption = if result.grade.is_failure() { "why" } else { "what decided" };
-    let picture = state.proof(span.part).map(|proof| {
-        let picture = &proof.large.picture;
-        let texture = state.textures.of(ui.ctx(), "proof", picture, |picture| {
-            crate::app::textures::color_image(&image::DynamicImage::ImageRgb8(picture.clone()))
-        });
+    let picture = state.proof(span.part).map(|picture| {
+        let texture = proof::texture(ui, &state.textures, &picture.large);
         (texture.id(), texture.size_vec2())
     });
     let cell = Cell {
@@ -236,7 +227,7 @@ impl Cell {
 }
 
 /// `MI`, `MI fusion`, `references`.
-pub(in crate::app) fn part_name(part: Part) -> String {
+pub(crate) fn part_name(part: Part) -> String {
     match part {
         Part::Retrieval => "references".to_owned(),
         Part::Reference(method, _) => method.label(),
@@ -255,8 +246,7 @@ fn name(ui: &mut Ui, state: &AppState, commands: &Queue, row: &Row<'_>, height: 
     let color = row.part.method().map_or(ui.visuals().text_color(), |method| {
         theme::text(ui.visuals(), theme::method(method))
     });
-    let result =
-        row.span.filter(|span| state.has_come(span)).and_then(|span| state.shown_result(span));
+    let result = row.span.and_then(|span| state.outcome(span));
     let (grade, grade_color) = match &result {
         Some(result) => {
             let error = result.error.map(|error| error.translation());

@@ -1,7 +1,7 @@
 //! The toolbar: one line with the scene, the query, its references, running and what is shown.
 
 use egui::containers::menu::{MenuButton, MenuConfig};
-use egui::{Align, Button, Label, Layout, PopupCloseBehavior, RichText, Ui};
+use egui::{Align, Button, Label, Layout, PopupCloseBehavior, Response, RichText, Ui};
 
 use super::Panes;
 use crate::app::action::{self, ACTIONS, Group, button};
@@ -16,20 +16,19 @@ use crate::session::RunState;
 const RIGHT: f32 = 440.0;
 const MIDDLE: f32 = 232.0;
 
-pub(in crate::app) fn ui(ui: &mut Ui, state: &AppState, commands: &Queue, panes: &mut Panes) {
+pub(crate) fn ui(ui: &mut Ui, state: &AppState, commands: &Queue, panes: &mut Panes) {
     ui.horizontal_centered(|ui| {
         menu(ui, state, commands);
         let room = ui.available_width() - RIGHT - MIDDLE;
-        let size = egui::vec2(room.max(200.0), ui.available_height());
-        ui.allocate_ui_with_layout(size, Layout::left_to_right(Align::Center), |ui| {
-            ui.set_min_width(size.x);
-            query(ui, state, commands, panes);
-        });
-        let size = egui::vec2(MIDDLE, ui.available_height());
-        ui.allocate_ui_with_layout(size, Layout::left_to_right(Align::Center), |ui| {
-            ui.set_min_width(size.x);
-            running(ui, state, commands, panes);
-        });
+        let parts: [(f32, fn(&mut Ui, &AppState, &Queue, &mut Panes)); 2] =
+            [(room.max(200.0), query), (MIDDLE, running)];
+        for (width, part) in parts {
+            let size = egui::vec2(width, ui.available_height());
+            ui.allocate_ui_with_layout(size, Layout::left_to_right(Align::Center), |ui| {
+                ui.set_min_width(width);
+                part(ui, state, commands, panes);
+            });
+        }
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             shown(ui, state, commands);
         });
@@ -81,13 +80,9 @@ fn query(ui: &mut Ui, state: &AppState, commands: &Queue, panes: &mut Panes) {
         [one] => one.clone(),
         [first, others @ ..] => format!("{first} and {} more", others.len()),
     };
-    let config = MenuConfig::new().close_behavior(PopupCloseBehavior::CloseOnClickOutside);
     let chip = Button::new(format!("{text} ▾")).truncate();
-    let (response, _) = MenuButton::from_button(chip).config(config).ui(ui, |ui| {
-        ui.set_min_size(egui::vec2(380.0, 420.0));
-        ui.set_max_size(egui::vec2(380.0, 420.0));
-        panes.show(ui, "references", state, commands);
-    });
+    let show = |ui: &mut Ui| panes.show(ui, "references", state, commands);
+    let response = popup(ui, chip, [380.0, 420.0], show);
     let all = names.join(", ");
     let spoken = format!("References: {all}");
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, &spoken));
@@ -106,15 +101,22 @@ fn running(ui: &mut Ui, state: &AppState, commands: &Queue, panes: &mut Panes) {
         button(ui, state, commands, "Stage", "Step over the stage");
         button(ui, state, commands, "Step", "Step to the next event");
     });
-    let config = MenuConfig::new().close_behavior(PopupCloseBehavior::CloseOnClickOutside);
     let count = state.setup.task.breakpoints.len();
     let text = if count == 0 { "Break".to_owned() } else { format!("Break ({count})") };
-    let (response, _) = MenuButton::new(text).config(config).ui(ui, |ui| {
-        ui.set_min_size(egui::vec2(320.0, 260.0));
-        ui.set_max_size(egui::vec2(320.0, 260.0));
-        panes.show(ui, "breakpoints", state, commands);
-    });
+    let show = |ui: &mut Ui| panes.show(ui, "breakpoints", state, commands);
+    let response = popup(ui, Button::new(text), [320.0, 260.0], show);
     response.on_hover_text("Where the run stops");
+}
+
+/// A button that opens something of a fixed size below it, until a click beside it.
+fn popup(ui: &mut Ui, button: Button<'_>, size: [f32; 2], show: impl FnOnce(&mut Ui)) -> Response {
+    let config = MenuConfig::new().close_behavior(PopupCloseBehavior::CloseOnClickOutside);
+    let (response, _) = MenuButton::from_button(button).config(config).ui(ui, |ui| {
+        ui.set_min_size(size.into());
+        ui.set_max_size(size.into());
+        show(ui);
+    });
+    response
 }
 
 /// What is shown, and the layouts; from the right.

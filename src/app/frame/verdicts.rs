@@ -25,7 +25,7 @@ const HINT: &str =
     "Space runs the query to its end, I steps into the next event, ? lists all keys.";
 
 /// Draws the cells, the sentence and the remedy.
-pub(in crate::app) fn ui(ui: &mut Ui, state: &AppState, commands: &Queue) {
+pub(crate) fn ui(ui: &mut Ui, state: &AppState, commands: &Queue) {
     let area = ui.available_rect_before_wrap();
     let methods = &state.setup.task.protocol.methods;
     let width = if methods.len() > 4 { NARROW_CELL } else { CELL };
@@ -40,7 +40,7 @@ pub(in crate::app) fn ui(ui: &mut Ui, state: &AppState, commands: &Queue) {
     let rest = Rect::from_min_max(pos2(left + 12.0, area.top()), area.max);
     let (words, button) = rest.split_left_right_at_x(rest.right() - BUTTON);
     let span = state.shown_span();
-    let result = span.filter(|span| state.has_come(span)).and_then(|span| state.shown_result(span));
+    let result = span.and_then(|span| state.outcome(span));
     let layout = Layout::top_down(Align::Min);
     ui.scope_builder(
         UiBuilder::new().max_rect(words.shrink2(vec2(0.0, 4.0))).layout(layout),
@@ -164,16 +164,20 @@ fn sentence(
         let latest = lecture::latest(state.shown_run(), span, state.shown_cursor());
         return (first, latest.unwrap_or_default());
     };
-    let text = match (result.diagnosis.first(), &result.reason) {
+    split(&told(result))
+}
+
+/// What a result is, in its own words: its verdict, or why it has no pose, or what speaks for it.
+pub(super) fn told(result: &QueryResult) -> String {
+    match (result.diagnosis.first(), &result.reason) {
         (Some(found), _) => found.text.clone(),
         (None, Some(reason)) => reason.text.clone(),
         (None, None) => result.evidence(),
-    };
-    split(&text)
+    }
 }
 
 /// The first sentence, and the others; without the marks of code, which a page would show.
-pub(in crate::app) fn split(text: &str) -> (String, String) {
+pub(crate) fn split(text: &str) -> (String, String) {
     let text = text.replace('`', "");
     let (first, others) = first_sentence(&text);
     (first.to_owned(), others.to_owned())

@@ -2,19 +2,19 @@
 
 mod cameras;
 mod cloud;
-mod gpu;
 mod ground;
 mod labels;
 mod orbit;
+mod picture;
 mod scene_geometry;
 mod view_camera;
 
 use std::sync::Arc;
 
-use eframe::egui_wgpu::RenderState;
 use egui::containers::menu::{MenuButton, MenuConfig};
 use egui::{
-    Align, Layout, PointerButton, PopupCloseBehavior, Rect, Response, Sense, Ui, UiBuilder, Vec2,
+    Align, Color32, Layout, PointerButton, PopupCloseBehavior, Pos2, Rect, Response, Sense, Stroke,
+    TextureHandle, TextureOptions, Ui, UiBuilder, Vec2, pos2,
 };
 use nalgebra::Point3;
 
@@ -25,8 +25,8 @@ use crate::app::memo::{Memo, Same};
 use crate::problem::ReferenceTuple;
 use crate::render::RenderParams;
 use cameras::{CameraKind, SceneCamera};
-use gpu::{Frame, Painter, Points};
 use orbit::Orbit;
+use picture::{Spot, picture};
 use scene_geometry::SceneGeometry;
 use view_camera::ViewCamera;
 
@@ -42,34 +42,25 @@ enum Eye {
     Through(CameraKind),
 }
 
+/// The points of a reference's cloud depend on these.
+type CloudKey = (Same<ReferenceTuple>, SceneGeometry, RenderParams);
+
 /// The view of the scene in 3-D.
+#[derive(Default)]
 pub struct SpaceView {
-    /// `None` without a graphics card.
-    painter: Option<Painter>,
     eye: Eye,
     /// The shape of the pane.
     height_over_width: f32,
-    /// The points of a reference's cloud.
-    cloud: Memo<(Same<ReferenceTuple>, SceneGeometry, RenderParams), Arc<Points>>,
+    cloud: Memo<CloudKey, Arc<Vec<Spot>>>,
+    /// What is seen of the cloud.
+    picture: Memo<(Same<Vec<Spot>>, ViewCamera, f32), TextureHandle>,
 }
 
 /// What there is to draw at the cursor.
 struct SceneContent {
     geometry: SceneGeometry,
     cameras: Vec<SceneCamera>,
-    points: Arc<Points>,
-}
-
-impl SpaceView {
-    /// A view for a window with or without a graphics card.
-    pub fn new(state: Option<&RenderState>) -> Self {
-        Self {
-            painter: state.map(Painter::new),
-            eye: Eye::default(),
-            height_over_width: 1.0,
-            cloud: Memo::default(),
-        }
-    }
+    points: Arc<Vec<Spot>>,
 }
 
 impl View for SpaceView {
@@ -78,13 +69,6 @@ impl View for SpaceView {
             ui.weak("The scene appears when the query and its reference are read");
             return;
         };
-        let trouble = match &self.painter {
-            None => Some("No graphics card: points, lines and surfaces are not drawn".to_owned()),
-            Some(painter) => painter.trouble().map(|why| format!("Nothing is drawn in 3-D: {why}")),
-        };
-        if let Some(words) = trouble {
-            ui.colored_label(ui.visuals().error_fg_color, words);
-        }
         // The marks are made for a dark ground.
         let style = ui.ctx().style_of(egui::Theme::Dark);
         ui.scope(|ui| {
@@ -219,25 +203,30 @@ impl SpaceView {
         }
     }
 
-    /// Draws all but marks and labels of cameras.
-    fn draw(&self, ui: &Ui, pane: Rect, content: &SceneContent, view_camera: &ViewCamera) {
-        let (visuals, geometry) = (ui.visuals(), &content.geometry);
+    /// Draws all but marks and labels of cameras. The cloud is painted anew when it is seen from elsewhere.
+    fn draw(&mut self, ui: &Ui, pane: Rect, content: &SceneContent, view_camera: &ViewCamera) {
+        let visuals = ui.visuals();
+        let most = ui.input(|input| input.max_texture_side) as f32;
+        let scale = ui.pixels_per_point().min(most / pane.size().max_elem());
+        let key = (Same(Arc::clone(&content.points)), *view_camera, scale);
+        let texture = self.picture.get(key, || {
+            let image = picture(&content.points, view_camera, scale, visuals.extreme_bg_color);
+            ui.ctx().load_texture("cloud", image, TextureOptions::NEAREST)
+        });
+        let whole = Rect::from_min_max(Pos2::ZERO, pos2(1.0, 1.0));
+        let painter = ui.painter_at(pane);
+        painter.image(texture.id(), pane, whole, Color32::WHITE);
         let [pale, strong] = [0.25, 0.6].map(|share| visuals.text_color().gamma_multiply(share));
-        let mut lines = ground::grid(geometry, pale, strong);
+        let mut lines = ground::grid(&content.geometry, pale, strong);
         for camera in &content.cameras {
             if self.eye != Eye::Through(camera.kind) {
-                lines.extend(camera.lines(&geometry.below(&camera.centre())));
+                lines.extend(camera.lines(&content.geometry.below(&camera.centre())));
             }
         }
-        let background = visuals.extreme_bg_color;
-        match &self.painter {
-            Some(painter) => {
-                let points = Arc::clone(&content.points);
-                let frame = Frame { view_camera: *view_camera, background, points, lines };
-                painter.paint(&ui.painter_at(pane), pane, frame);
-            }
-            None => {
-                ui.painter().rect_filled(pane, 0.0, background);
+        for line in &lines {
+            if let Some(ends) = view_camera.segment(line) {
+                let ends = ends.map(|end| end + pane.min.to_vec2());
+                painter.line_segment(ends, Stroke::new(line.width, line.color));
             }
         }
     }

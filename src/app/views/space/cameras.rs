@@ -2,8 +2,8 @@
 
 use nalgebra::{Point2, Point3};
 
-use super::gpu::Line;
-use super::scene_geometry::{SceneGeometry, spot};
+use super::scene_geometry::SceneGeometry;
+use super::view_camera::Line;
 use crate::app::views::features::FeatureProgress;
 use crate::app::views::legend;
 use crate::app::{ViewContext, theme};
@@ -97,7 +97,7 @@ impl SceneCamera {
         let up = 0.35 * (corners[0] - corners[3]);
         let roof = middle + up;
         let line = |from: Point3<f64>, to: Point3<f64>| Line {
-            ends: [spot(&from), spot(&to)],
+            ends: [from, to],
             color: theme::rgb(self.thing.color()),
             width: self.kind.look().1,
         };

@@ -2,8 +2,8 @@
 
 use egui::Color32;
 
-use super::gpu::Line;
-use super::scene_geometry::{SceneGeometry, spot};
+use super::scene_geometry::SceneGeometry;
+use super::view_camera::Line;
 
 /// Lines on the ground at round distances, and the circle around the reference that is searched.
 pub(super) fn grid(geometry: &SceneGeometry, color: Color32, strong: Color32) -> Vec<Line> {
@@ -12,7 +12,7 @@ pub(super) fn grid(geometry: &SceneGeometry, color: Color32, strong: Color32) ->
     let count = (geometry.radius_m / step).ceil() as i32;
     let reach = f64::from(count) * step;
     let line = |from: (f64, f64), to: (f64, f64), color| Line {
-        ends: [from, to].map(|(x, z)| spot(&geometry.on_ground(x, z))),
+        ends: [from, to].map(|(x, z)| geometry.on_ground(x, z)),
         color,
         width: 1.0,
     };
@@ -44,7 +44,7 @@ mod tests {
             radius_m: 5.0,
         };
         let lines = grid(&geometry, Color32::GRAY, Color32::WHITE);
-        let farthest = lines.iter().flat_map(|line| line.ends).map(|[x, ..]| x);
-        assert!((farthest.fold(0.0, f32::max) - 5.0).abs() < 1e-6);
+        let farthest = lines.iter().flat_map(|line| line.ends).map(|end| end.x);
+        assert!((farthest.fold(0.0, f64::max) - 5.0).abs() < 1e-6);
     }
 }

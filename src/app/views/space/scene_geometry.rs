@@ -12,7 +12,7 @@ const GROUND_M: f64 = 1.6;
 /// The scene's frame, seen from the world and from the reference at the cursor.
 ///
 /// It is that of the first reference camera, so that it stays while the cursor moves, and so that
-/// single precision suffices for what is drawn.
+/// single precision suffices for the cloud.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct SceneGeometry {
     pub(super) scene_from_world: Pose,
@@ -36,7 +36,7 @@ impl SceneGeometry {
 
     /// A place in the reference camera's frame, as it is drawn.
     pub(super) fn spot(&self, in_reference: &Point3<f64>) -> [f32; 3] {
-        spot(&(self.scene_from_reference * in_reference))
+        (self.scene_from_reference * in_reference).coords.cast::<f32>().into()
     }
 
     /// A place on the ground.
@@ -103,11 +103,6 @@ impl SceneGeometry {
         let steps = [1.0, 2.0, 5.0, 10.0].map(|step| step * tens);
         steps.into_iter().find(|step| *step >= wanted).unwrap_or(10.0 * tens)
     }
-}
-
-/// A place in the scene as the graphics card takes it.
-pub(super) fn spot(in_scene: &Point3<f64>) -> [f32; 3] {
-    in_scene.coords.cast::<f32>().into()
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! The camera that the pane shows the scene through: an eye in the scene, and its projection.
 
-use egui::{Pos2, Vec2, pos2};
+use egui::{Color32, Pos2, Vec2, pos2};
 use nalgebra::{Point3, Unit, Vector3};
 
 use crate::camera::Intrinsics;
@@ -55,13 +55,28 @@ impl ViewCamera {
 
     /// Where a point of the scene is seen; `None` where it is not in front of the eye.
     pub(super) fn project(&self, point: &Point3<f64>) -> Option<Pos2> {
-        let point = self.scene_from_eye.inverse_transform_point(point);
-        (point.z >= NEAR_M).then(|| {
-            pos2(
-                (self.focal[0] * point.x / point.z + self.centre[0]) as f32,
-                (self.focal[1] * point.y / point.z + self.centre[1]) as f32,
-            )
-        })
+        let seen = self.scene_from_eye.inverse_transform_point(point);
+        (seen.z >= NEAR_M).then(|| self.in_pane(&seen))
+    }
+
+    /// Where a line is seen: the part of it that is in front of the eye.
+    pub(super) fn segment(&self, line: &Line) -> Option<[Pos2; 2]> {
+        let [a, b] = line.ends.map(|end| self.scene_from_eye.inverse_transform_point(&end));
+        // What is behind the eye has no place in the pane.
+        let cut = |end: Point3<f64>, other: Point3<f64>| match end.z < NEAR_M {
+            true => end + (NEAR_M - end.z) / (other.z - end.z) * (other - end),
+            false => end,
+        };
+        let is_seen = a.z.max(b.z) >= NEAR_M;
+        is_seen.then(|| [cut(a, b), cut(b, a)].map(|end| self.in_pane(&end)))
+    }
+
+    /// The place in the pane of a point in the frame of the eye.
+    fn in_pane(&self, seen: &Point3<f64>) -> Pos2 {
+        pos2(
+            (self.focal[0] * seen.x / seen.z + self.centre[0]) as f32,
+            (self.focal[1] * seen.y / seen.z + self.centre[1]) as f32,
+        )
     }
 
     /// The direction in which a place of the pane looks, in the scene.
@@ -76,23 +91,16 @@ impl ViewCamera {
             direction: self.scene_from_eye.rotation * Unit::new_normalize(in_eye),
         }
     }
+}
 
-    /// The projection as the graphics card takes it, column by column.
-    ///
-    /// The depth is `NEAR_M / z`: 1 at the near plane, 0 at infinity, so that a floating-point
-    /// depth buffer is equally sharp everywhere.
-    pub(super) fn clip_from_scene(&self) -> [[f32; 4]; 4] {
-        let (across, down) = (f64::from(self.size.x), f64::from(self.size.y));
-        let eye_from_scene = self.scene_from_eye.inverse().to_homogeneous();
-        #[rustfmt::skip]
-        let clip_from_eye = nalgebra::Matrix4::new(
-            2.0 * self.focal[0] / across, 0.0, 2.0 * self.centre[0] / across - 1.0, 0.0,
-            0.0, -2.0 * self.focal[1] / down, 1.0 - 2.0 * self.centre[1] / down, 0.0,
-            0.0, 0.0, 0.0, NEAR_M,
-            0.0, 0.0, 1.0, 0.0,
-        );
-        (clip_from_eye * eye_from_scene).cast::<f32>().into()
-    }
+/// A stroke from one place of the scene to another.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Line {
+    /// Both ends \[m\].
+    pub(super) ends: [Point3<f64>; 2],
+    pub(super) color: Color32,
+    /// Width in egui's points.
+    pub(super) width: f32,
 }
 
 /// A half line in the scene.
@@ -105,7 +113,6 @@ pub(super) struct Ray {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::Vector4;
     use proptest::prelude::*;
 
     const KITTI: Intrinsics =
@@ -113,15 +120,6 @@ mod tests {
 
     fn pose(shift: [f64; 3], turn: [f64; 3]) -> Pose {
         Pose::new(shift.into(), turn.into())
-    }
-
-    /// Where the matrix puts a point, in points of the pane, and its depth.
-    fn by_matrix(view_camera: &ViewCamera, point: &Point3<f64>) -> (Pos2, f32) {
-        let matrix = nalgebra::Matrix4::from(view_camera.clip_from_scene());
-        let clip = matrix * Vector4::from(point.to_homogeneous().cast::<f32>());
-        let [x, y] = [clip.x / clip.w, clip.y / clip.w];
-        let at = pos2(0.5 * (x + 1.0) * view_camera.size.x, 0.5 * (1.0 - y) * view_camera.size.y);
-        (at, clip.z / clip.w)
     }
 
     proptest! {
@@ -144,12 +142,10 @@ mod tests {
                 0.5 * size.x + scale * (pixel.x as f32 + 0.5 - 620.5),
                 0.5 * size.y + scale * (pixel.y as f32 + 0.5 - 188.0),
             );
-            let (seen, _) = by_matrix(&view_camera, &(scene_from_camera * in_camera));
+            let seen = view_camera.project(&(scene_from_camera * in_camera)).expect("in front");
             // Half a pixel of the photo; far outside of the pane single precision is coarser.
             let near = 0.5 * scale * (1.0 + 1e-3 * (expected - size.to_pos2()).length() / scale);
             prop_assert!((seen - expected).length() < near, "{seen:?} {expected:?}");
-            let straight = view_camera.project(&(scene_from_camera * in_camera)).expect("in front");
-            prop_assert!((straight - expected).length() < near);
         }
 
         /// A ray goes through all that is seen where it begins.
@@ -175,11 +171,22 @@ mod tests {
     }
 
     #[test]
-    fn nearer_things_have_the_greater_depth() {
-        let view_camera = ViewCamera::centred(Pose::identity(), 1.0, Vec2::new(100.0, 100.0));
-        let depth = |z: f64| by_matrix(&view_camera, &Point3::new(0.0, 0.0, z)).1;
-        assert!((depth(NEAR_M) - 1.0).abs() < 1e-6);
-        assert!(depth(1.0) > depth(1.001) && depth(900.0) > depth(901.0));
-        assert!(depth(1e6) > 0.0);
+    fn a_line_from_behind_the_eye_is_seen_as_far_as_it_is_in_front() {
+        let eye = pose([1.0, -2.0, -5.0], [-0.2, 0.3, 0.1]);
+        let view_camera = ViewCamera::centred(eye, 0.9, Vec2::new(320.0, 240.0));
+        let line = |a: [f64; 3], b: [f64; 3]| Line {
+            ends: [a, b].map(|end| eye * Point3::from(end)),
+            color: Color32::WHITE,
+            width: 1.0,
+        };
+        let [from, to] =
+            view_camera.segment(&line([-1.0, 0.5, -3.0], [1.0, 0.2, 4.0])).expect("is seen");
+        let end = view_camera.project(&(eye * Point3::new(1.0, 0.2, 4.0))).expect("in front");
+        assert!((to - end).length() < 1e-3);
+        // A place on it that is in front lies between.
+        let middle = view_camera.project(&(eye * Point3::new(0.5, 0.275, 2.25))).expect("in front");
+        let off = (middle - to).normalized().dot((from - to).normalized());
+        assert!(off > 0.999 && (from - to).length() > (middle - to).length());
+        assert_eq!(view_camera.segment(&line([-1.0, 0.5, -3.0], [1.0, 0.2, -4.0])), None);
     }
 }
