@@ -141,11 +141,9 @@ impl App {
     /// Takes in what other threads have done, and does what was asked for.
     fn update(&mut self, ctx: &egui::Context) {
         self.state.poll();
-        for written in self.pictures.write() {
-            match written {
-                Ok(text) => self.state.note(text, false),
-                Err(why) => self.state.note(why, true),
-            }
+        for written in self.pictures.take() {
+            let is_error = written.is_err();
+            self.state.note(written.unwrap_or_else(|why| why), is_error);
         }
         self.obey();
         let title = self.state.setup.title();

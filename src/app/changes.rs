@@ -182,18 +182,8 @@ impl AppState {
             Some(Part::Fusion(_)) => Part::Fusion(method),
             _ => Part::Reference(method, run.reference_at(self.cursor())),
         };
-        let span = run.span_of(part);
-        match span.and_then(|span| span.records.end.checked_sub(1)) {
-            Some(last) => {
-                let why = self.options.shows_why && self.needs_why(part);
-                self.move_cursor(last);
-                self.options.shows_why = why;
-            }
-            None => {
-                let name = method.name().to_uppercase();
-                self.note(format!("{name} has not begun yet"), false);
-            }
-        }
+        let why = self.options.shows_why && self.needs_why(part);
+        self.show_part(part, why);
     }
 
     /// Localises another query.

@@ -7,6 +7,7 @@ use egui::{Key, Modifiers, ProgressBar, RichText, ScrollArea, Ui};
 use egui_commonmark::{CommonMarkCache, CommonMarkViewer};
 
 use super::App;
+use super::action;
 use super::command::Queue;
 use super::setup::Setup;
 use super::state::AppState;
@@ -175,15 +176,12 @@ impl OpenLesson {
         let progress = ProgressBar::new(number as f32 / pages as f32).desired_height(6.0);
         ui.add(progress);
         ui.horizontal(|ui| {
-            let back = ui.add_enabled(number > 1, egui::Button::new("◀ Back"));
-            if back.on_hover_text("The page before (PageUp)").clicked() {
-                commands.send(|app| app.turn_page(true));
-            }
+            let turn = |ui: &mut Ui, is_on: bool, name: &str, text: &str| {
+                ui.add_enabled_ui(is_on, |ui| action::button(ui, state, commands, name, text));
+            };
+            turn(ui, number > 1, "◀ Back", "Previous page");
             ui.label(format!("page {number} of {pages}"));
-            let next = ui.add_enabled(number < pages, egui::Button::new("Next ▶"));
-            if next.on_hover_text("The next page (PageDown)").clicked() {
-                commands.send(|app| app.turn_page(false));
-            }
+            turn(ui, number < pages, "Next ▶", "Next page");
             if matches!(state.run_state(), RunState::Loading | RunState::Running) {
                 ui.spinner();
             }

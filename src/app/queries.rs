@@ -93,12 +93,7 @@ impl Queries {
         setup: Option<&Setup>,
     ) -> Option<TextureHandle> {
         let mut thumbnails = self.thumbnails.borrow_mut();
-        thumbnails.ask((side, frame), || {
-            Some(Arc::clone(match side {
-                Side::Query => &setup?.queries,
-                Side::Reference => &setup?.references,
-            }))
-        });
+        thumbnails.ask((side, frame), || Some(Arc::clone(setup?.scene(side))));
         thumbnails.get(&(side, frame))?.clone()
     }
 

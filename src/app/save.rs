@@ -190,52 +190,41 @@ impl AppState {
     }
 }
 
-/// A picture that was asked for and is not there yet.
+/// What to say of pictures that were asked for and have been written.
 #[derive(Clone, Default)]
-pub(super) struct Pictures(Arc<Mutex<Vec<Picture>>>);
-
-struct Picture {
-    path: PathBuf,
-    /// The part of the window \[points\], and pixels per point; `None` for all of it.
-    part: Option<(egui::Rect, f32)>,
-    image: Arc<egui::ColorImage>,
-}
+pub(super) struct Pictures(Arc<Mutex<Vec<Result<String, String>>>>);
 
 impl Pictures {
-    /// Asks the window for its pixels.
+    /// Asks the window for its pixels, or for those of a part \[points\], and writes them.
     pub(super) fn ask(&self, ctx: &egui::Context, path: PathBuf, part: Option<egui::Rect>) {
         let part = part.map(|rect| (rect, ctx.pixels_per_point()));
-        let (pictures, waker) = (Arc::clone(&self.0), ctx.clone());
+        let (written, waker) = (Arc::clone(&self.0), ctx.clone());
         ctx.request_screenshot(move |image| {
-            let mut pictures = pictures.lock().unwrap_or_else(PoisonError::into_inner);
-            pictures.push(Picture { path, part, image });
+            let image = match part {
+                Some((rect, pixels_per_point)) => image.region(&rect, Some(pixels_per_point)),
+                None => egui::ColorImage::clone(&image),
+            };
+            let said = write(&image, &path).map_err(|why| format!("{}: {why}", path.display()));
+            let said = said.map(|()| format!("Picture: {}", path.display()));
+            written.lock().unwrap_or_else(PoisonError::into_inner).push(said);
             waker.request_repaint();
         });
         ctx.request_repaint();
     }
 
-    /// Writes what has come. What to say of each.
-    pub(super) fn write(&self) -> Vec<Result<String, String>> {
-        let taken = std::mem::take(&mut *self.0.lock().unwrap_or_else(PoisonError::into_inner));
-        taken.iter().map(Picture::write).collect()
+    /// What to say of those that were written since the last call.
+    pub(super) fn take(&self) -> Vec<Result<String, String>> {
+        std::mem::take(&mut *self.0.lock().unwrap_or_else(PoisonError::into_inner))
     }
 }
 
-impl Picture {
-    fn write(&self) -> Result<String, String> {
-        let image = match self.part {
-            Some((rect, pixels_per_point)) => self.image.region(&rect, Some(pixels_per_point)),
-            None => egui::ColorImage::clone(&self.image),
-        };
-        let [width, height] = image.size.map(|side| side as u32);
-        let bytes: Vec<u8> = image.pixels.iter().flat_map(|p| [p.r(), p.g(), p.b()]).collect();
-        let picture = image::RgbImage::from_raw(width, height, bytes)
-            .ok_or_else(|| "the window gave no picture".to_owned())?;
-        let said = |error: &dyn std::fmt::Display| format!("{}: {error}", self.path.display());
-        if let Some(folder) = self.path.parent() {
-            std::fs::create_dir_all(folder).map_err(|error| said(&error))?;
-        }
-        picture.save(&self.path).map_err(|error| said(&error))?;
-        Ok(format!("Picture: {}", self.path.display()))
+fn write(image: &egui::ColorImage, path: &Path) -> Result<(), Box<dyn std::error::Error>> {
+    let [width, height] = image.size.map(|side| side as u32);
+    let bytes: Vec<u8> = image.pixels.iter().flat_map(|p| [p.r(), p.g(), p.b()]).collect();
+    let picture = image::RgbImage::from_raw(width, height, bytes);
+    if let Some(folder) = path.parent() {
+        std::fs::create_dir_all(folder)?;
     }
+    picture.ok_or("the window gave no picture")?.save(path)?;
+    Ok(())
 }

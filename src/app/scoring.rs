@@ -11,6 +11,7 @@ use crate::grid::{DenseSurface, GridParams, LatticeTooLarge};
 use crate::method::Method;
 use crate::params::Params;
 use crate::problem::Problem;
+use crate::proof::between;
 use crate::render::{Comparison, Score};
 
 /// The direct methods at one pose.
@@ -134,19 +135,7 @@ impl CostLine {
 
     /// The pose at a share of the way; below 0 and above 1 it goes on in the same direction.
     pub fn pose(&self, share: f64) -> Pose {
-        /// Below this sine of the angle between two rotations they are taken for equal.
-        const PARALLEL: f64 = 1e-12;
-        // To the last bit, so that the costs there are those of the poses themselves.
-        if share == 0.0 {
-            return self.from;
-        }
-        if share == 1.0 {
-            return self.to;
-        }
-        let (from, to) = (&self.from, &self.to);
-        let translation = from.translation.vector.lerp(&to.translation.vector, share);
-        let rotation = from.rotation.try_slerp(&to.rotation, share, PARALLEL);
-        Pose::from_parts(translation.into(), rotation.unwrap_or(from.rotation))
+        between(&self.from, &self.to, share)
     }
 
     /// Its length \[m\].

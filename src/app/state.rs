@@ -18,7 +18,6 @@ use super::setup::Setup;
 use super::shown::ShownReason;
 use super::textures::Textures;
 use super::view_options::{CompareMode, ViewOptions};
-use crate::diagnosis::Grade;
 use crate::event::Side;
 use crate::geometry::Pose;
 use crate::lesson::Moment;
@@ -310,18 +309,15 @@ impl AppState {
 
     /// Goes to the first method that is wrong and shows why; where all are right, to the end of the first.
     fn go_to_cause(&mut self) {
-        let run = self.session.run();
-        let results = || run.spans().iter().filter(|span| span.result.is_some());
+        let mut spans = self.session.run().spans().iter().filter(|span| span.result.is_some());
         let has_failed = |span: &&Span| {
-            let grade =
-                span.result.as_ref().map(|result| result.grade_shown(self.options.shows_truth));
-            grade.is_some_and(Grade::is_failure)
+            let result = span.result.as_ref();
+            result.is_some_and(|result| result.grade_shown(self.options.shows_truth).is_failure())
         };
-        let failed = results().find(has_failed).map(|span| span.part);
-        match (failed, results().next().map(|span| span.part)) {
-            (Some(part), _) => self.show_part(part, true),
-            (None, Some(part)) => self.show_part(part, false),
-            (None, None) => {}
+        let failed = spans.clone().find(has_failed).map(|span| (span.part, true));
+        let first = spans.next().map(|span| (span.part, false));
+        if let Some((part, why)) = failed.or(first) {
+            self.show_part(part, why);
         }
     }
 
@@ -332,7 +328,7 @@ impl AppState {
 
     /// Moves the cursor to the end of a part of the run, where `why` with the picture that proves its result.
     pub(super) fn show_part(&mut self, part: Part, why: bool) {
-        let last = self.shown_run().span_of(part).and_then(|span| span.records.end.checked_sub(1));
+        let last = self.run().span_of(part).and_then(|span| span.records.end.checked_sub(1));
         match (last, part.method()) {
             (Some(last), _) => {
                 self.move_cursor(last);

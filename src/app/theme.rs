@@ -111,11 +111,6 @@ pub fn viridis(value: f64) -> Color32 {
     rgb(palette::viridis(value))
 }
 
-/// Turbo, for depths and heights: 0 the least, 1 the greatest.
-pub fn turbo(value: f64) -> Color32 {
-    rgb(palette::turbo(value))
-}
-
 /// What words of a theme stand on: panels, fields, rows of tables, buttons.
 fn grounds(visuals: &Visuals) -> [Color32; 5] {
     [

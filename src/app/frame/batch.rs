@@ -1,8 +1,8 @@
 //! The batch: what many queries came to, all results in a table, and the proof of the selected one.
 
 use egui::{
-    Align2, Color32, CornerRadius, Rect, RichText, Role, Sense, Ui, UiBuilder, WidgetInfo, pos2,
-    vec2,
+    Align2, Color32, CornerRadius, Painter, Rect, RichText, Role, Sense, Ui, UiBuilder, WidgetInfo,
+    pos2, vec2,
 };
 
 use super::inspector::capital;
@@ -57,18 +57,11 @@ pub(crate) fn left(ui: &mut Ui, state: &AppState, commands: &Queue, panes: &mut 
 fn draw_bars(ui: &Ui, overview: &Overview, area: Rect) {
     const NAME: f32 = 64.0;
     for (row, bar) in overview.bars.iter().take(MOST).enumerate() {
-        let top = area.top() + row as f32 * BAR;
-        let line = Rect::from_min_size(pos2(area.left(), top), vec2(area.width(), BAR - 4.0));
         let words = Grade::ALL.iter().filter(|grade| bar.count(**grade) > 0);
         let words: Vec<String> =
             words.map(|grade| format!("{} {grade}", bar.count(*grade))).collect();
         let spoken = format!("{}: {}", bar.name, words.join(", "));
-        let response = ui.interact(line, ui.scope_id().with(("bar", row)), Sense::hover());
-        response.widget_info(|| WidgetInfo::labeled(Role::Image, true, &spoken));
-        let painter = ui.painter_at(line);
-        let text = ui.visuals().text_color();
-        let name = elided(ui, &bar.name, text, NAME - 4.0);
-        painter.galley(pos2(line.left(), line.center().y - name.size().y / 2.0), name, text);
+        let (painter, line) = bar_row(ui, area, row, spoken, &bar.name, NAME - 4.0);
         let width = (line.width() - NAME) / bar.total().max(1) as f32;
         let mut left = line.left() + NAME;
         for grade in Grade::ALL {
@@ -97,8 +90,28 @@ fn draw_bars(ui: &Ui, overview: &Overview, area: Rect) {
             }
             left = part.right();
         }
-        response.on_hover_text(spoken);
     }
+}
+
+/// The place of a row with its name at the left, and what paints there. The whole row is said on hover.
+fn bar_row(
+    ui: &Ui,
+    area: Rect,
+    row: usize,
+    spoken: String,
+    name: &str,
+    width: f32,
+) -> (Painter, Rect) {
+    let top = area.top() + row as f32 * BAR;
+    let line = Rect::from_min_size(pos2(area.left(), top), vec2(area.width(), BAR - 4.0));
+    let id = ui.scope_id().with((area.left().to_bits(), row));
+    let response = ui.interact(line, id, Sense::hover());
+    response.widget_info(|| WidgetInfo::labeled(Role::Image, true, &spoken));
+    response.on_hover_text(spoken);
+    let (painter, text) = (ui.painter_at(line), ui.visuals().text_color());
+    let name = elided(ui, name, text, width);
+    painter.galley(pos2(line.left(), line.center().y - name.size().y / 2.0), name, text);
+    (painter, line)
 }
 
 /// The causes of all failures, in words.
@@ -107,16 +120,9 @@ fn draw_causes(ui: &Ui, overview: &Overview, area: Rect) {
     let most = overview.causes.first().map_or(1, |(_, times)| *times);
     let names = area.width() * 0.62;
     for (row, (code, times)) in overview.causes.iter().take(MOST).enumerate() {
-        let top = area.top() + row as f32 * BAR;
-        let line = Rect::from_min_size(pos2(area.left(), top), vec2(area.width(), BAR - 4.0));
         let title = capital(code.title());
         let spoken = format!("{title} ({code}): {times} results");
-        let response = ui.interact(line, ui.scope_id().with(("cause", row)), Sense::hover());
-        response.widget_info(|| WidgetInfo::labeled(Role::Image, true, &spoken));
-        let painter = ui.painter_at(line);
-        let text = ui.visuals().text_color();
-        let name = elided(ui, &title, text, names - 8.0);
-        painter.galley(pos2(line.left(), line.center().y - name.size().y / 2.0), name, text);
+        let (painter, line) = bar_row(ui, area, row, spoken, &title, names - 8.0);
         let longest = area.width() - names - COUNT;
         let bar = Rect::from_min_size(
             pos2(line.left() + names, line.top() + 2.0),
@@ -128,9 +134,8 @@ fn draw_causes(ui: &Ui, overview: &Overview, area: Rect) {
             Align2::LEFT_CENTER,
             times,
             theme::caption(),
-            text,
+            ui.visuals().text_color(),
         );
-        response.on_hover_text(spoken);
     }
 }
 

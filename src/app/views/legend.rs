@@ -74,14 +74,6 @@ pub(super) fn cost_bar(ui: &mut Ui, width: f32, what: &str, [dark, bright]: &[St
     color_bar(ui, width, &name, theme::viridis, &[(0.0, dark), (1.0, bright)]);
 }
 
-/// The bar of [`palette::depth`].
-pub(super) fn depth_bar(ui: &mut Ui, width: f32) {
-    let metres = [2.0, 5.0, 10.0, 20.0, 40.0, 80.0];
-    let words = ["2", "5", "10", "20", "40", "80 m"];
-    let ticks: Vec<(f64, &str)> = metres.into_iter().map(palette::depth_share).zip(words).collect();
-    color_bar(ui, width, "depth, m", theme::turbo, &ticks);
-}
-
 /// A square of a colour.
 pub(super) fn swatch(ui: &mut Ui, color: Color32) {
     let (rect, _) = ui.allocate_exact_size(Vec2::splat(10.0), Sense::hover());
