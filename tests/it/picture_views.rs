@@ -244,7 +244,7 @@ fn a_pose_of_ones_own_has_the_costs_of_both_methods() {
 #[test]
 fn the_pictures_of_the_synthetic_view_are_chosen_by_name_and_blink_with_the_query() {
     let mut window = at_end(Method::MI, "synthetic");
-    let common = ["query", "view", "blend", "residual", "coverage"];
+    let common = ["query", "view", "blend", "residual"];
     for (method, own) in [(Method::MI, "shares"), (Method::PM, "weights")] {
         send(&mut window, |app| app.app_state_mut().select_method(method));
         for name in common.into_iter().chain([own]) {

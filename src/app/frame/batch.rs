@@ -75,15 +75,12 @@ fn draw_bars(ui: &Ui, overview: &Overview, area: Rect) {
             );
             let color = theme::rgb(palette::dark(palette::grade(grade)));
             painter.rect_filled(part, CornerRadius::ZERO, color);
-            let galley = painter.layout_no_wrap(
-                format!("{count} {grade}"),
-                theme::caption(),
-                Color32::WHITE,
-            );
+            let galley =
+                painter.layout_no_wrap(format!("{count} {grade}"), theme::CAPTION, Color32::WHITE);
             let galley = if galley.size().x + 6.0 <= part.width() {
                 galley
             } else {
-                painter.layout_no_wrap(count.to_string(), theme::caption(), Color32::WHITE)
+                painter.layout_no_wrap(count.to_string(), theme::CAPTION, Color32::WHITE)
             };
             if galley.size().x + 4.0 <= part.width() {
                 painter.galley(part.center() - galley.size() / 2.0, galley, Color32::WHITE);
@@ -133,7 +130,7 @@ fn draw_causes(ui: &Ui, overview: &Overview, area: Rect) {
             bar.right_center() + vec2(6.0, 0.0),
             Align2::LEFT_CENTER,
             times,
-            theme::caption(),
+            theme::CAPTION,
             ui.visuals().text_color(),
         );
     }

@@ -84,7 +84,7 @@ fn small_title(ui: &mut Ui, state: &AppState, commands: &Queue, name: &'static s
     } else {
         ui.visuals().weak_text_color()
     };
-    let galley = ui.painter().layout_no_wrap(title.to_owned(), theme::caption(), color);
+    let galley = ui.painter().layout_no_wrap(title.to_owned(), theme::CAPTION, color);
     ui.painter().galley(rect.min + vec2(2.0, 2.0), galley, color);
     if response.on_hover_text(spoken).clicked() {
         let large = Some((state.shown_stage(), name));

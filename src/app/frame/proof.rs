@@ -94,7 +94,7 @@ fn labels<'a>(
     let within = place_of(panel);
     let mut taken: Vec<Place> = taken.into_iter().map(place_of).collect();
     for (mark, at) in marks.filter(|(mark, _)| !mark.label.is_empty()) {
-        let galley = painter.layout_no_wrap(mark.label.clone(), theme::caption(), Color32::WHITE);
+        let galley = painter.layout_no_wrap(mark.label.clone(), theme::CAPTION, Color32::WHITE);
         let size = galley.size();
         if mark.thing == Thing::Words {
             painter.galley(at - vec2(0.0, size.y / 2.0), galley, Color32::WHITE);
@@ -126,7 +126,7 @@ fn color_scale(
     const BAR: egui::Vec2 = vec2(90.0, 12.0);
     const STEPS: usize = 45;
     let galley =
-        |words: &str| painter.layout_no_wrap(words.to_owned(), theme::caption(), Color32::WHITE);
+        |words: &str| painter.layout_no_wrap(words.to_owned(), theme::CAPTION, Color32::WHITE);
     let (dark, bright) = (galley(&scale.dark), galley(&scale.bright));
     let width = dark.size().x + bright.size().x + BAR.x + 20.0;
     let size = vec2(width, 18.0);
@@ -155,8 +155,7 @@ pub(super) fn elided(
     color: Color32,
     width: f32,
 ) -> std::sync::Arc<egui::Galley> {
-    let mut job =
-        egui::text::LayoutJob::simple_singleline(words.to_owned(), theme::caption(), color);
+    let mut job = egui::text::LayoutJob::simple_singleline(words.to_owned(), theme::CAPTION, color);
     job.wrap = egui::text::TextWrapping::truncate_at_width(width.max(1.0));
     ui.fonts_mut(|fonts| fonts.layout_job(job))
 }

@@ -262,8 +262,8 @@ fn name(ui: &mut Ui, state: &AppState, commands: &Queue, row: &Row<'_>, height: 
     let left = rect.left() + 4.0;
     let (upper, lower) = (rect.center().y - 7.0, rect.center().y + 8.0);
     let name = part_name(row.part);
-    painter.text(pos2(left, upper), Align2::LEFT_CENTER, name, theme::body(), color);
-    let small = theme::caption();
+    painter.text(pos2(left, upper), Align2::LEFT_CENTER, name, theme::BODY, color);
+    let small = theme::CAPTION;
     let at =
         painter.text(pos2(left, lower), Align2::LEFT_CENTER, &grade, small.clone(), grade_color);
     let weak = ui.visuals().weak_text_color();

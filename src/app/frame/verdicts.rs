@@ -51,7 +51,7 @@ pub(crate) fn ui(ui: &mut Ui, state: &AppState, commands: &Queue) {
             let rows = lines(ui, &first, egui::FontId::proportional(15.0), strong, 2);
             if !second.is_empty() {
                 let weak = ui.visuals().weak_text_color();
-                lines(ui, &second, theme::body(), weak, if rows > 1 { 1 } else { 2 });
+                lines(ui, &second, theme::BODY, weak, if rows > 1 { 1 } else { 2 });
             }
         },
     );
@@ -97,7 +97,7 @@ fn cell(ui: &Ui, state: &AppState, commands: &Queue, rect: Rect, part: Part, spa
         ui.visuals().widgets.noninteractive.bg_stroke,
     );
     let color = theme::text(ui.visuals(), theme::method(method));
-    let name = painter.layout_no_wrap(part_name(part), theme::strong(), color);
+    let name = painter.layout_no_wrap(part_name(part), theme::STRONG, color);
     painter.galley(rect.min + vec2(10.0, 12.0), name, color);
     let (words, color) = match &result {
         Some(result) => worth(ui, result),
@@ -193,7 +193,7 @@ pub(super) fn short(args: &[String]) -> String {
 fn fitted(ui: &Ui, words: &str, number: &str, width: f32) -> String {
     let fits = |text: &str| {
         let text = text.to_owned();
-        let galley = ui.painter().layout_no_wrap(text, theme::body(), ui.visuals().text_color());
+        let galley = ui.painter().layout_no_wrap(text, theme::BODY, ui.visuals().text_color());
         galley.size().x <= width
     };
     let whole = format!("Try {words}{number}");

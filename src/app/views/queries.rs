@@ -88,14 +88,14 @@ fn row(ui: &mut Ui, context: &ViewContext<'_>, query: usize, height: f32) {
     let color =
         if is_here { ui.visuals().selection.stroke.color } else { ui.visuals().text_color() };
     let left = pos2(below.left() + 4.0, below.center().y);
-    painter.text(left, egui::Align2::LEFT_CENTER, name, theme::caption(), color);
+    painter.text(left, egui::Align2::LEFT_CENTER, name, theme::CAPTION, color);
     let mut right = below.right() - 4.0;
     for (glyph, color, _) in marks.iter().rev() {
         let at = pos2(right, below.center().y);
         // On the ground of what is selected the shape alone says the grade.
         let color = if is_here { ui.visuals().selection.stroke.color } else { *color };
-        right = painter.text(at, egui::Align2::RIGHT_CENTER, glyph, theme::caption(), color).left()
-            - 1.0;
+        right =
+            painter.text(at, egui::Align2::RIGHT_CENTER, glyph, theme::CAPTION, color).left() - 1.0;
     }
     let words: Vec<&str> = marks.iter().map(|(.., words)| words.as_str()).collect();
     let response = match words.as_slice() {

@@ -62,9 +62,9 @@ fn chip(ui: &mut Ui, kind: usize, count: usize, width: f32, is_shown: bool) -> e
     let write = |at, words: String, font| {
         painter.text(at, Align2::LEFT_CENTER, words, font, text);
     };
-    write(pos2(left + 13.0, upper), count.to_string(), theme::body());
+    write(pos2(left + 13.0, upper), count.to_string(), theme::BODY);
     if rect.width() >= NAMED_WIDTH {
-        write(pos2(left, lower), name(kind).to_owned(), theme::caption());
+        write(pos2(left, lower), name(kind).to_owned(), theme::CAPTION);
     }
     response.on_hover_text(format!(
         "{label}\n{}\nClick to show or hide, right-click to show these alone",

@@ -34,7 +34,7 @@ pub(super) fn cameras(
     for (at, camera) in shown {
         let visuals = ui.visuals();
         let color = visuals.strong_text_color();
-        let galley = painter.layout_no_wrap(camera.kind.name(), theme::label(), color);
+        let galley = painter.layout_no_wrap(camera.kind.name(), theme::LABEL, color);
         let size = galley.size() + vec2(24.0, 4.0);
         let corner = at + vec2(12.0, -0.5 * size.y);
         let mut place = inside(Rect::from_min_size(corner, size), pane);
@@ -78,7 +78,7 @@ pub(super) fn headline(ui: &Ui, pane: Rect, words: &str) {
     let painter = ui.painter_at(pane);
     let color = ui.visuals().strong_text_color();
     // The menu is on the right.
-    let galley = painter.layout(words.to_owned(), theme::label(), color, pane.width() - 80.0);
+    let galley = painter.layout(words.to_owned(), theme::LABEL, color, pane.width() - 80.0);
     let place = Rect::from_min_size(pane.min + vec2(8.0, 6.0), galley.size());
     let ground = ui.visuals().extreme_bg_color.gamma_multiply(0.6);
     painter.rect_filled(place.expand(2.0), CornerRadius::same(2), ground);

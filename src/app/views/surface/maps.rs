@@ -214,7 +214,7 @@ fn plot(
     let narrow = |axis: AxisHints<'static>, thickness| {
         axis.min_thickness(thickness)
             .label_spacing(egui::Rangef::new(24.0, 40.0))
-            .tick_label_font(theme::small())
+            .tick_label_font(theme::SMALL)
             .formatter(|mark, _| format!("{}", (1000.0 * mark.value).round() / 1000.0))
     };
     let right = narrow(AxisHints::new_x(), LOWER_AXIS).label(small(ui, "right [m]"));
@@ -251,7 +251,7 @@ fn plot(
 }
 
 fn small(ui: &Ui, text: &str) -> egui::RichText {
-    egui::RichText::new(text).font(theme::small()).color(ui.visuals().weak_text_color())
+    egui::RichText::new(text).font(theme::SMALL).color(ui.visuals().weak_text_color())
 }
 
 /// How many positions of a lattice are scored, in words.

@@ -65,45 +65,38 @@ impl<'a> Search<'a> {
             steps: Vec::new(),
         };
         let mut centre = Offset::default();
-        let mut filling: Option<Filling> = None;
+        // An unfinished lattice reports single hypotheses; their cells follow from the parameters.
+        let mut single: Vec<&PoseScored> = Vec::new();
         for event in events {
             match event {
-                Event::PoseScored(scored) => {
-                    // An unfinished lattice reports single hypotheses; their cells follow from the
-                    // parameters.
-                    let radius_m = problem.uncertainty_radius_m;
-                    if filling.is_none() {
-                        let lattice = Lattice::new(scored.phase, centre, radius_m, params);
-                        filling = lattice.ok().map(Filling::new);
-                    }
-                    if let Some(filling) = &mut filling {
-                        filling.take(scored);
-                    }
-                    search.hypothesis = Some(scored);
-                }
+                Event::PoseScored(scored) => single.push(scored),
                 Event::PhaseSearched(searched) => {
-                    filling = None;
-                    search.hypothesis = None;
+                    single.clear();
                     centre = searched.best.unwrap_or(centre);
                     let surface = Arc::clone(&searched.surface);
-                    search.lattices.push(Searched {
-                        tried: surface.scores.iter().flatten().count(),
-                        surface,
-                        is_complete: true,
-                    });
+                    let tried = surface.scores.iter().flatten().count();
+                    search.lattices.push(Searched { surface, tried, is_complete: true });
                 }
                 Event::MinimumAssessed(assessed) => search.assessed = Some(assessed),
                 Event::DescentStepped(step) => search.steps.push(step),
                 _ => {}
             }
         }
-        if search.lattices.is_empty() && filling.is_none() && search.assessed.is_none() {
-            // The parameters say where it will search: an empty map, to point at.
-            let radius_m = problem.uncertainty_radius_m;
-            let coarse = Lattice::new(Phase::PositionCoarse, centre, radius_m, params);
-            filling = coarse.ok().map(Filling::new);
-        }
-        search.lattices.extend(filling.map(|filling| filling.done(least_covered)));
+        search.hypothesis = single.last().copied();
+        // Before the first hypothesis the parameters say where it will search: an empty map, to point at.
+        let is_new = search.lattices.is_empty() && search.assessed.is_none();
+        let first = single.first().map(|scored| scored.phase);
+        let phase = first.or(is_new.then_some(Phase::PositionCoarse));
+        let radius_m = problem.uncertainty_radius_m;
+        let lattice = phase.and_then(|phase| Lattice::new(phase, centre, radius_m, params).ok());
+        search.lattices.extend(lattice.map(|lattice| {
+            let mut scores = vec![None; lattice.cells()];
+            for ((cell, offset), scored) in lattice.hypotheses().zip(&single) {
+                scores[cell] = (offset == scored.offset).then_some(scored.score);
+            }
+            let surface = Arc::new(ScoredLattice { lattice, scores, least_covered });
+            Searched { surface, tried: single.len(), is_complete: false }
+        }));
         Some(search)
     }
 
@@ -164,46 +157,6 @@ pub(super) struct Minimum {
     pub(super) cell: usize,
     pub(super) offset: Offset,
     pub(super) cost: f64,
-}
-
-/// A lattice whose scores come in one by one.
-struct Filling {
-    lattice: Lattice,
-    cells: Vec<(usize, Offset)>,
-    tried: usize,
-    scores: Vec<Option<crate::render::Score>>,
-}
-
-impl Filling {
-    fn new(lattice: Lattice) -> Self {
-        Self {
-            cells: lattice.hypotheses().collect(),
-            tried: 0,
-            scores: vec![None; lattice.cells()],
-            lattice,
-        }
-    }
-
-    fn take(&mut self, scored: &PoseScored) {
-        if let Some(&(cell, offset)) = self.cells.get(self.tried)
-            && offset == scored.offset
-        {
-            self.scores[cell] = Some(scored.score);
-        }
-        self.tried += 1;
-    }
-
-    fn done(self, least_covered: u32) -> Searched {
-        Searched {
-            tried: self.tried,
-            is_complete: false,
-            surface: Arc::new(ScoredLattice {
-                lattice: self.lattice,
-                scores: self.scores,
-                least_covered,
-            }),
-        }
-    }
 }
 
 /// The cell that a position lies in.
