@@ -23,10 +23,12 @@ const THUMBNAIL_WIDTH: u32 = 124;
 /// The results of a query, or why it could not be run.
 pub(super) type BatchOutcome = (usize, Result<Vec<QueryResult>, String>);
 
+/// Of the queries' and the references' frames; `None` for a photo that cannot be read.
+type Thumbnails = Answers<(Side, usize), Arc<dyn Scene>, Option<TextureHandle>>;
+
 /// Thumbnails and results that are made beside the window's thread.
 pub struct Queries {
-    /// Of the queries' and the references' frames; `None` for a photo that cannot be read.
-    thumbnails: RefCell<Answers<(Side, usize), Arc<dyn Scene>, Option<TextureHandle>>>,
+    thumbnails: RefCell<Thumbnails>,
     worker: Worker<(Setup, UntilStopped), BatchOutcome>,
     batch: Option<Batch>,
 }

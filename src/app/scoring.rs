@@ -183,10 +183,6 @@ pub struct DenseAsk {
     pub method: Method,
     /// The reference, by its position among those of the run.
     pub reference: usize,
-    /// Distance of neighbouring positions \[m\].
-    pub step_m: f64,
-    /// Distance of neighbouring headings \[°\].
-    pub yaw_step_deg: f64,
     /// Pixels that a hypothesis must cover to be eligible.
     pub least_covered: u32,
 }
@@ -201,8 +197,8 @@ pub struct DenseMap {
 impl DenseMap {
     fn new(ask: DenseAsk, problem: &Problem, params: &Params) -> Self {
         let grid = GridParams {
-            coarse_step_m: ask.step_m,
-            yaw_step_deg: ask.yaw_step_deg,
+            coarse_step_m: params.surface.step_m,
+            yaw_step_deg: params.surface.yaw_step_deg,
             ..params.grid.clone()
         };
         let radius_m = problem.uncertainty_radius_m;

@@ -76,10 +76,13 @@ pub(super) struct Wanted {
     pub(super) only_changed: bool,
 }
 
+/// The rows that are wanted, or what is wrong with the condition.
+type Found = Result<Rc<[ResultRow]>, ConditionError>;
+
 /// The latest answers, which hold as long as nothing changes.
 #[derive(Default)]
 pub(super) struct Selection {
-    rows: RefCell<Memo<(u64, Wanted), Result<Rc<[ResultRow]>, ConditionError>>>,
+    rows: RefCell<Memo<(u64, Wanted), Found>>,
     migrations: RefCell<Memo<u64, Rc<[Migration]>>>,
 }
 
@@ -122,7 +125,7 @@ fn primary(result: &QueryResult) -> Option<Code> {
 }
 
 impl Wanted {
-    fn find(&self, known: Known<'_>) -> Result<Rc<[ResultRow]>, ConditionError> {
+    fn find(&self, known: Known<'_>) -> Found {
         let condition: Option<Condition> = match self.condition.trim() {
             "" => None,
             typed => Some(typed.parse()?),
@@ -146,11 +149,7 @@ impl Wanted {
 
 impl Selection {
     /// The results that are wanted, in the order of the queries.
-    pub(super) fn rows(
-        &self,
-        known: Known<'_>,
-        wanted: Wanted,
-    ) -> Result<Rc<[ResultRow]>, ConditionError> {
+    pub(super) fn rows(&self, known: Known<'_>, wanted: Wanted) -> Found {
         let mut rows = self.rows.borrow_mut();
         rows.get((known.version, wanted.clone()), || wanted.find(known)).clone()
     }

@@ -20,18 +20,20 @@ pub(crate) fn ui(ui: &mut Ui, state: &AppState, commands: &Queue, panes: &mut Pa
     ui.horizontal_centered(|ui| {
         menu(ui, state, commands);
         let room = ui.available_width() - RIGHT - MIDDLE;
-        let parts: [(f32, fn(&mut Ui, &AppState, &Queue, &mut Panes)); 2] =
-            [(room.max(200.0), query), (MIDDLE, running)];
-        for (width, part) in parts {
-            let size = egui::vec2(width, ui.available_height());
-            ui.allocate_ui_with_layout(size, Layout::left_to_right(Align::Center), |ui| {
-                ui.set_min_width(width);
-                part(ui, state, commands, panes);
-            });
-        }
+        part(ui, room.max(200.0), |ui| query(ui, state, commands, panes));
+        part(ui, MIDDLE, |ui| running(ui, state, commands, panes));
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             shown(ui, state, commands);
         });
+    });
+}
+
+/// Draws something in a fixed width.
+fn part(ui: &mut Ui, width: f32, draw: impl FnOnce(&mut Ui)) {
+    let size = egui::vec2(width, ui.available_height());
+    ui.allocate_ui_with_layout(size, Layout::left_to_right(Align::Center), |ui| {
+        ui.set_min_width(width);
+        draw(ui);
     });
 }
 

@@ -57,7 +57,7 @@ pub(super) fn ui(ui: &mut Ui, context: &ViewContext<'_>, results: &[Chosen<'_>],
             .map(|(method, own)| (method.label(), tally(own.into_iter(), condition, ok)))
             .collect(),
         Columns::Now => {
-            if !context.state.known().before.is_some() {
+            if context.state.known().before.is_none() {
                 ui.weak(
                     "Nothing to compare with. Open two runs with --before, or click Keep results as A in Batch, \
                      change a setting and run all queries again",

@@ -63,9 +63,9 @@ impl ViewCamera {
     pub(super) fn segment(&self, line: &Line) -> Option<[Pos2; 2]> {
         let [a, b] = line.ends.map(|end| self.scene_from_eye.inverse_transform_point(&end));
         // What is behind the eye has no place in the pane.
-        let cut = |end: Point3<f64>, other: Point3<f64>| match end.z < NEAR_M {
-            true => end + (NEAR_M - end.z) / (other.z - end.z) * (other - end),
-            false => end,
+        let cut = |end: Point3<f64>, other: Point3<f64>| {
+            let share = (NEAR_M - end.z) / (other.z - end.z);
+            if end.z < NEAR_M { end + share * (other - end) } else { end }
         };
         let is_seen = a.z.max(b.z) >= NEAR_M;
         is_seen.then(|| [cut(a, b), cut(b, a)].map(|end| self.in_pane(&end)))

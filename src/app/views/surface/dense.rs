@@ -11,12 +11,9 @@ use crate::grid::{DenseSurface, MOST_CELLS};
 /// The map to fill, if it is shown, for the present run.
 pub(super) fn wanted(context: &ViewContext<'_>, search: &Search<'_>) -> Option<DenseAsk> {
     let is_wanted = context.options.shows_dense_map && context.is_present();
-    let params = &context.run.params.surface;
     Some(DenseAsk {
         method: search.method,
         reference: search.span.part.reference().filter(|_| is_wanted)?,
-        step_m: params.step_m,
-        yaw_step_deg: params.yaw_step_deg,
         least_covered: search.least_covered,
     })
 }

@@ -149,13 +149,13 @@ fn minima(search: &Search<'_>) -> Vec<(Minimum, String)> {
     let Some(searched) = search.last(Phase::PositionCoarse) else {
         return Vec::new();
     };
-    let Some(lowest) = searched.minimum(search.least_covered) else {
+    let Some(lowest) = searched.minimum() else {
         return Vec::new();
     };
     let so_far = if searched.is_complete { "" } else { " so far" };
     let mut minima = vec![(lowest, format!(", {}{so_far}", number(lowest.cost)))];
     if searched.is_complete && searched.surface.flat_cost().is_none() {
-        let local = searched.surface.local_minima_with(search.least_covered);
+        let local = searched.surface.local_minima();
         let others = local.into_iter().filter(|(cell, _)| *cell != lowest.cell);
         minima.extend(others.take(MINIMA - 1).filter_map(|(cell, cost)| {
             let offset = searched.surface.lattice.offset(cell)?;
@@ -174,7 +174,7 @@ fn best_so_far(search: &Search<'_>) -> Option<(Pose, Option<f64>, String)> {
         return Some((pose, step.score.cost, note));
     }
     let fine = search.last(Phase::PositionFine)?;
-    let minimum = fine.minimum(search.least_covered)?;
+    let minimum = fine.minimum()?;
     let pose = search.pose(&minimum.offset);
     Some((pose, Some(minimum.cost), String::new()))
 }

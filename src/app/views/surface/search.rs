@@ -141,8 +141,8 @@ impl Searched {
     }
 
     /// The eligible cell of lowest cost.
-    pub(super) fn minimum(&self, least_covered: u32) -> Option<Minimum> {
-        let cell = self.surface.minimum_with(least_covered)?;
+    pub(super) fn minimum(&self) -> Option<Minimum> {
+        let cell = self.surface.minimum()?;
         Some(Minimum {
             cell,
             offset: self.surface.lattice.offset(cell)?,
