@@ -16,6 +16,7 @@ use crate::app::theme;
 use crate::app::view_options::Tab;
 use crate::diagnosis::{Code, Confidence, Diagnosis, Grade, confidence};
 use crate::localize::{Helped, QueryResult};
+use crate::params::Params;
 
 pub(crate) fn ui(ui: &mut Ui, state: &AppState, commands: &Queue, panes: &mut Panes) {
     let tab = state.options.tab;
@@ -56,6 +57,7 @@ fn why(ui: &mut Ui, state: &AppState, commands: &Queue) {
     match result.diagnosis.split_first() {
         Some((primary, others)) => {
             finding(ui, primary);
+            changed(ui, &state.shown_run().params);
             helped(ui, state, commands, &result, primary);
             if !others.is_empty() {
                 heading(ui, "Also found");
@@ -80,9 +82,9 @@ fn why(ui: &mut Ui, state: &AppState, commands: &Queue) {
         None => {
             ui.strong(format!("{}: {}", part_name(span.part), result.grade));
             ui.label(told(&result));
+            changed(ui, &state.shown_run().params);
         }
     }
-    changed(ui, &state.shown_run().params.changes());
     if let Some(known) = &result.confidence {
         ui.add_space(8.0);
         let mut words = format!(
@@ -111,19 +113,26 @@ fn why(ui: &mut Ui, state: &AppState, commands: &Queue) {
 }
 
 /// The parameters that are not at their defaults: they may be the cause.
-fn changed(ui: &mut Ui, changes: &[String]) {
+fn changed(ui: &mut Ui, params: &Params) {
     const MOST: usize = 5;
+    let rows = params.list().into_iter().zip(Params::default().list());
+    let changes: Vec<_> = rows.filter(|(row, default)| row.value != default.value).collect();
     if changes.is_empty() {
         return;
     }
     heading(ui, "Changed from the default");
-    for change in changes.iter().take(MOST) {
+    for (row, default) in changes.iter().take(MOST) {
+        let change = format!("{}={} (default {})", row.key, row.value, default.value);
         ui.label(RichText::new(change).monospace().size(12.0));
     }
     if let Some(more) = changes.len().checked_sub(MOST + 1) {
         ui.weak(format!("and {} more", more + 1));
     }
 }
+
+/// Where nothing that was tried helped.
+const NO_SETTING_HELPS: &str = "No setting and no other method made it right. The data may be wrong: check camera, \
+                                poses and clouds with `posescope doctor`.";
 
 fn heading(ui: &mut Ui, text: &str) {
     ui.add_space(10.0);
@@ -279,6 +288,10 @@ fn helped(
     ui.weak(words);
     if !explanation.helped.is_empty() {
         ui.weak("Found with the help of the truth. Click one to run it.");
+    } else if explanation.complete {
+        heading(ui, "What may help");
+        ui.label(result.advice(primary.code));
+        ui.label(NO_SETTING_HELPS);
     }
 }
 
