@@ -156,14 +156,8 @@ impl Plan {
         reference: Arc<ReferenceTuple>,
         truth: Pose,
     ) -> Case {
-        let problem = Problem {
-            query,
-            reference,
-            uncertainty_radius_m: self.radius_m,
-            prior_m: None,
-            matches: None,
-            seed: self.seed,
-        };
+        let mut problem = Problem::new(query, reference, self.radius_m).expect("a radius");
+        problem.seed = self.seed;
         Case { rows, problem, truth }
     }
 }

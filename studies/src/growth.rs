@@ -112,7 +112,8 @@ fn scaled(intrinsics: &Intrinsics, scale: f64) -> Intrinsics {
 /// A hypothesis of MI over the bins of its histogram.
 fn by_bins(rounds: usize) {
     let rows = BINS.map(|bins| {
-        let cost = MutualInformation { bins, ..MutualInformation::default() };
+        let mut cost = MutualInformation::default();
+        cost.bins = bins;
         let (query, cloud) = seen_by(&cost);
         let intrinsics = &PAIR.query.intrinsics;
         row(bins, [hypothesis(&cloud.points, &query, intrinsics, &cost, rounds)])
@@ -126,8 +127,12 @@ fn by_bins(rounds: usize) {
 /// enough.
 fn by_keypoints(rounds: usize) {
     let photos = [&PAIR.query.photo.gray, &PAIR.reference.photo.gray].map(enlarged);
-    let params =
-        |max_keypoints| SurfParams { threshold: 1.0, max_keypoints, ..SurfParams::default() };
+    let params = |max_keypoints| {
+        let mut params = SurfParams::default();
+        params.threshold = 1.0;
+        params.max_keypoints = max_keypoints;
+        params
+    };
     let most = params(KEYPOINTS[KEYPOINTS.len() - 1]);
     let [query, reference] = photos.each_ref().map(|photo| surf(photo, &most).descriptors);
     let known = query.len().min(reference.len());

@@ -43,6 +43,7 @@ pub type OpenMethods = ArrayVec<Method, MAX_METHODS>;
 
 /// One event with its place in the run.
 #[derive(Clone, Debug, serde::Serialize)]
+#[non_exhaustive]
 pub struct Record {
     /// Position among the events of the run, from 0. Events that no sink wants count too.
     pub index: u64,
@@ -57,7 +58,7 @@ pub struct Record {
 }
 
 /// A listener of a run.
-pub trait Sink {
+pub trait Sink: Send {
     /// The kinds of event this sink wants now. Stage events come in any case.
     ///
     /// Asked at the start, and again whenever the run attends to its observer.

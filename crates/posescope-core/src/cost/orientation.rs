@@ -9,7 +9,7 @@ use std::f32::consts::PI;
 
 use image::Luma;
 
-use super::{Cost, Entropies, Entry, LEAST_ENTROPY, Similarity, Statistic};
+use super::{Cost, Entropies, Entry, MIN_ENTROPY, Similarity, Statistic};
 use crate::describe::parameters;
 use crate::image::{FloatImage, GrayImage, gaussian_smoothed};
 use crate::memo::{Key, key};
@@ -96,7 +96,7 @@ impl Cost for Orientation {
 fn distance(entropies: &Entropies) -> Option<f64> {
     let share = entropies.mutual_information() / entropies.joint;
     let smaller = entropies.query.min(entropies.synthetic);
-    (smaller > LEAST_ENTROPY).then(|| 1.0 - share.clamp(0.0, 1.0))
+    (smaller > MIN_ENTROPY).then(|| 1.0 - share.clamp(0.0, 1.0))
 }
 
 #[cfg(test)]

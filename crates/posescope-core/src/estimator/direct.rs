@@ -36,6 +36,7 @@ pub struct Direct {
 
 impl Direct {
     /// The estimator that searches the pose of least registered cost.
+    #[doc(hidden)]
     pub fn new(entry: &cost::Entry, params: &Params) -> Self {
         let setting = params.costs.of(entry).cloned();
         let CostSetting { cost, search, .. } = setting.unwrap_or_else(|| CostSetting::new(entry));

@@ -7,7 +7,9 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use image::{GrayImage, Luma};
 use nalgebra::Point3;
 use posescope_core::cloud::Cloud;
-use posescope_core::cost::{self, Cost, Entropies, IntensityPair, Photometric, Statistic};
+use posescope_core::cost::{
+    self, Cost, Entropies, IntensityPair, Key, Photometric, Statistic, key,
+};
 use posescope_core::diagnosis::Code;
 use posescope_core::estimator::{self, Family, Outcome};
 use posescope_core::event::{
@@ -18,7 +20,6 @@ use posescope_core::features::FeatureState;
 use posescope_core::geometry::Pose;
 use posescope_core::history::History;
 use posescope_core::image::{FloatImage, gaussian_smoothed};
-use posescope_core::memo::{Key, key};
 use posescope_core::method::Method;
 use posescope_core::params::Params;
 use posescope_core::problem::Problem;
@@ -331,7 +332,9 @@ fn what_the_search_scores_is_what_the_view_shows() {
     let registered = cost::ALL.iter().map(|entry| (entry.make)() as Box<dyn Cost>);
     // More bins than a byte tells apart are scored the plain way.
     let many = [16, 256, 300].map(|bins| Box::new(ManyBins(bins)) as Box<dyn Cost>);
-    let squared_again: Box<dyn Cost> = Box::new(Photometric { power: 2, ..Photometric::default() });
+    let mut squared_again = Photometric::default();
+    squared_again.power = 2;
+    let squared_again: Box<dyn Cost> = Box::new(squared_again);
     let own = [squared_again, Box::new(Own(in_order))];
     let poses: Vec<_> =
         (0..9).map(|i| Pose::translation(0.1 * f64::from(i), 0.0, 0.3 * f64::from(i))).collect();

@@ -4,6 +4,8 @@ mod conformance;
 mod data;
 mod decisions;
 mod diagnosis;
+mod every_name;
+mod front_door;
 mod memory;
 mod methods;
 mod one_answer;
