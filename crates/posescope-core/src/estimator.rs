@@ -64,7 +64,7 @@ pub struct FeatureCounts {
     pub inliers: usize,
 }
 
-/// What the direct methods found out about their cost.
+/// The costs that a direct method found.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct CostSummary {
@@ -92,7 +92,7 @@ impl CostSummary {
     }
 }
 
-/// What an estimator has to say in the end. A query that cannot be localised is an answer too.
+/// The answer of an estimator. A query without a pose is an answer too.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Outcome {
@@ -263,7 +263,7 @@ pub fn all() -> &'static [Entry] {
     &ALL
 }
 
-/// Every method, in the order of [`all`].
+/// Every method: those of the paper in its order, then the others by name.
 pub fn methods() -> impl Iterator<Item = Method> {
     all().iter().map(|entry| entry.method)
 }

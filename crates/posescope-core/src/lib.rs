@@ -226,7 +226,7 @@ pub use rayon;
 pub use camera::Intrinsics;
 pub use cloud::Cloud;
 pub use cost::Cost;
-pub use estimator::{CostSummary, Direct, Estimator, Failure, FeatureCounts, Outcome};
+pub use estimator::{CostSummary, Direct, Estimator, Failure, FeatureCounts, Outcome, methods};
 pub use geometry::Pose;
 pub use history::History;
 pub use image::Photo;

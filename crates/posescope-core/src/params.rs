@@ -1,7 +1,7 @@
 //! Every parameter of every estimator, by group.
 //!
-//! The table of `posescope params`, `--set`, the configuration file and the app's sliders all follow
-//! from what the groups say of themselves ([`crate::describe`]).
+//! Each group describes its parameters: name, unit, range and meaning. [`Params::list`],
+//! [`Params::set`] and the TOML form follow from that, and so do posescope's command line and window.
 
 use std::str::FromStr;
 

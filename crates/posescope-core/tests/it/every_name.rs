@@ -54,7 +54,7 @@ use posescope_core::solver::{
 use posescope_core::{
     Cancelled, Cloud, Cost, CostSummary, Direct, Estimator, Failure, FeatureCounts, History,
     InputError, Intrinsics, Method, Outcome, Params, Photo, Pose, Problem, Query, Record,
-    ReferenceTuple, Sink, Trace, localize, localize_by, localize_traced,
+    ReferenceTuple, Sink, Trace, localize, localize_by, localize_traced, methods,
 };
 
 use crate::two_walls::{self, solvable};
@@ -190,6 +190,7 @@ fn a_query_is_localised_and_watched() {
     let query = Query::new("night", photo(1.0), camera).expect("fits");
     let problem = Problem::new(query, reference.expect("fits"), 3.0).expect("a radius");
     let params = Params::default();
+    assert!(methods().any(|method| method.name() == "robust"));
     for method in [Method::FB, Method::PM, Method::MI] {
         let mut history = History::default();
         let traced = localize_traced(&problem, method, &params, &mut Trace::to(&mut history));
