@@ -9,10 +9,10 @@
 //! is a cost with a search.
 
 mod entry;
+mod information_distance;
 mod joint_histogram;
 mod lesser_half;
 mod mutual_information;
-mod orientation;
 mod photometric;
 mod settings;
 mod statistic;
@@ -21,9 +21,9 @@ use rand::SeedableRng as _;
 use rand::seq::SliceRandom as _;
 use rand_pcg::Pcg64;
 
+pub use information_distance::InformationDistance;
 pub use joint_histogram::{Entropies, JointHistogram};
 pub use mutual_information::MutualInformation;
-pub use orientation::Orientation;
 pub use photometric::Photometric;
 pub use statistic::{CostOfPairs, Explanation, ExplanationKind, PhotometricWeights, Statistic};
 
@@ -105,7 +105,8 @@ pub trait Cost: Send + Sync {
 
 /// Every cost.
 #[doc(hidden)]
-pub const ALL: &[Entry] = &[photometric::ENTRY, mutual_information::ENTRY, orientation::ENTRY];
+pub const ALL: &[Entry] =
+    &[photometric::ENTRY, mutual_information::ENTRY, information_distance::ENTRY];
 
 #[cfg(test)]
 mod tests {

@@ -7,8 +7,8 @@ use std::fs;
 use std::sync::Arc;
 
 use posescope_core::cost::{
-    CostOfPairs, Entropies, Explanation, ExplanationKind, IntensityPair, JointHistogram, Key,
-    MutualInformation, Orientation, Pair, Photometric, PhotometricWeights, Statistic, key,
+    CostOfPairs, Entropies, Explanation, ExplanationKind, InformationDistance, IntensityPair,
+    JointHistogram, Key, MutualInformation, Pair, Photometric, PhotometricWeights, Statistic, key,
 };
 use posescope_core::event::{
     BranchTaken, CandidatesJudged, CloudColored, ColoredCloud, ColoredPoint, ColoringCounts,
@@ -241,7 +241,7 @@ fn a_cost_states_what_decides_it() {
         (Box::new(Brightness), None),
         (Box::new(Photometric::default()), Some(ExplanationKind::Weights)),
         (Box::new(MutualInformation::default()), Some(ExplanationKind::JointHistogram)),
-        (Box::new(Orientation::default()), Some(ExplanationKind::JointHistogram)),
+        (Box::new(InformationDistance::default()), Some(ExplanationKind::JointHistogram)),
     ];
     let pairs = [IntensityPair { query: 9.0, synthetic: 200.0 }];
     for (cost, expected) in costs {
