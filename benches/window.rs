@@ -11,7 +11,7 @@ use divan::Bencher;
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
 use nalgebra::Point3;
-use posescope::app::{self, App, Arrangement, Command, KnownResults, Results, Setup};
+use posescope::app::{self, App, Arrangement, KnownResults, Results, Setup};
 use posescope::cloud::Cloud;
 use posescope::localize::QueryResult;
 use posescope::method::Method;
@@ -117,10 +117,10 @@ fn scrub(bencher: Bencher, window: &mut Window, draw: fn(&mut Window)) {
     let mut cursor = 0;
     bencher.bench_local(|| {
         cursor = (cursor + records / 60) % records;
-        window.state_mut().send(Command::MoveCursor(cursor));
+        window.state_mut().app_state_mut().move_cursor(cursor);
         draw(window);
     });
-    window.state_mut().send(Command::Last);
+    window.state_mut().act("To the last step");
 }
 
 #[divan::bench(sample_count = 60, sample_size = 1)]
@@ -135,8 +135,8 @@ fn scrubbing(bencher: Bencher) {
 
 /// The window with the 3-D view alone, at the end of MI's search.
 fn in_space(window: &mut Window) -> egui::Pos2 {
-    window.state_mut().send(Command::SelectMethod(Method::MI));
-    window.state_mut().send(Command::Maximize(Some("space")));
+    window.state_mut().app_state_mut().select_method(Method::MI);
+    window.state_mut().app_state_mut().show_alone(Some("space"));
     window.run_steps(3);
     window.get_by_label_contains("3-D view of").rect().center()
 }
@@ -155,7 +155,7 @@ fn orbiting(bencher: Bencher) {
             draw(window);
         });
         window.drop_at(middle);
-        window.state_mut().send(Command::Maximize(None));
+        window.state_mut().app_state_mut().show_alone(None);
     });
 }
 
@@ -165,7 +165,7 @@ fn scrubbing_in_space(bencher: Bencher) {
     with_window(|window| {
         in_space(window);
         scrub(bencher, window, draw);
-        window.state_mut().send(Command::Maximize(None));
+        window.state_mut().app_state_mut().show_alone(None);
     });
 }
 
@@ -222,7 +222,7 @@ impl ManyResults {
         let mut window = Harness::builder()
             .with_size(SIZE)
             .build_eframe(|creation| App::new(creation, setup).with_results(known));
-        window.state_mut().send(Command::Arrange(Arrangement::Batch));
+        window.state_mut().arrange(Arrangement::Batch);
         window.run_steps(4);
         window
     }
@@ -246,7 +246,7 @@ fn filter_10000_results(bencher: Bencher) {
         bencher.bench_local(|| {
             asked += 1;
             let condition = format!("method = mi and coverage < 5 and error < {asked}");
-            batch.state_mut().send(Command::FilterResults(condition));
+            batch.state_mut().app_state_mut().options.results_filter = condition;
             draw_own(&mut batch);
         });
     });
@@ -259,7 +259,7 @@ fn own_frame_of_10000_results(bencher: Bencher, view: &str) {
         let mut batch = ManyResults::write(window).open(window);
         let mut entries = app::views::ALL.iter();
         let entry = entries.find(|entry| entry.name == view).expect("a view");
-        batch.state_mut().send(Command::Maximize(Some(entry.name)));
+        batch.state_mut().app_state_mut().show_alone(Some(entry.name));
         batch.run_steps(3);
         bencher.bench_local(|| draw_own(&mut batch));
     });

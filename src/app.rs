@@ -1,12 +1,12 @@
 //! The window: drive an estimator as in a debugger and see why it decides what it decides.
 //!
 //! ```text
-//! keys, buttons, views → Command → App::dispatch → AppState → ViewContext → views
+//! keys, buttons, views → command::Queue → App → AppState → ViewContext → views
 //! ```
 //!
 //! A view keeps no copy of the run. It is handed a [`ViewContext`], the run at the cursor, and
-//! answers with commands; so looking back costs no second run, and whatever a person can do, a test
-//! can do.
+//! sends what is to be done after the frame; so looking back costs no second run, and whatever a person
+//! can do, a test can do.
 
 mod action;
 mod adapter;
@@ -20,14 +20,13 @@ mod frame;
 mod headless;
 mod lecture;
 mod lesson;
+mod memo;
 mod navigation;
 mod pictures;
-mod proofs;
 mod queries;
 mod run_pictures;
 mod run_results;
 mod save;
-mod save_target;
 mod saved;
 mod scoring;
 mod selection;
@@ -47,9 +46,8 @@ mod worker;
 pub use action::{ACTIONS, Action, Group};
 pub use arrangement::Arrangement;
 pub use camera::NamedPose;
-pub use command::Command;
 pub use run_results::results_of_run;
-pub use save_target::SaveTarget;
+pub use save::SaveTarget;
 pub use scoring::{CostAlong, CostLine, DenseAsk, DenseMap, Probe};
 pub use selection::{KnownResults, ResultRow, Results, VerdictChange};
 pub use setup::{ReferencePick, Setup};
@@ -60,7 +58,6 @@ pub use view_context::ViewContext;
 pub use view_options::{CompareMode, Tab, ViewOptions};
 pub use window::{WindowError, has_display, open, open_lesson, window_options};
 
-use eframe::egui_wgpu::RenderState;
 use egui::{Margin, Panel};
 use frame::Panes;
 use frame::help::ActionSearch;
@@ -92,15 +89,14 @@ pub struct App {
 impl App {
     /// The window's content for a setup. It starts to run at once, in the mode of the setup.
     pub fn new(creation: &eframe::CreationContext<'_>, setup: Setup) -> Self {
-        let state = creation.wgpu_render_state.as_ref();
-        Self::of(&creation.egui_ctx, state, setup)
+        Self::of(&creation.egui_ctx, setup)
     }
 
-    fn of(ctx: &egui::Context, render_state: Option<&RenderState>, setup: Setup) -> Self {
+    fn of(ctx: &egui::Context, setup: Setup) -> Self {
         theme::install(ctx);
         Self {
             state: AppState::new(setup, ctx.clone()),
-            panes: Panes::new(render_state),
+            panes: Panes::new(),
             commands: command::Queue::default(),
             help: false,
             search: None,
@@ -121,7 +117,7 @@ impl App {
     /// With a lesson at its first page, of which the setup is what is localised there.
     pub fn with_lesson(mut self, lesson: Lesson) -> Self {
         self.lesson = Some(OpenLesson::new(lesson, &self.state.setup));
-        self.commands.send(Command::Arrange(Arrangement::Lecture));
+        self.arrange(Arrangement::Lecture);
         self
     }
 
@@ -135,9 +131,9 @@ impl App {
         self.canvas
     }
 
-    /// Does what a key or a button would do.
-    pub fn send(&mut self, command: Command) {
-        self.commands.send(command);
+    /// The same to be changed, as keys, buttons and views do.
+    pub fn app_state_mut(&mut self) -> &mut AppState {
+        &mut self.state
     }
 }
 
@@ -145,15 +141,11 @@ impl App {
     /// Takes in what other threads have done, and does what was asked for.
     fn update(&mut self, ctx: &egui::Context) {
         self.state.poll();
-        for written in self.pictures.write() {
-            match written {
-                Ok(text) => self.state.note(text, false),
-                Err(why) => self.state.note(why, true),
-            }
+        for written in self.pictures.take() {
+            let is_error = written.is_err();
+            self.state.note(written.unwrap_or_else(|why| why), is_error);
         }
-        for command in self.commands.take() {
-            self.dispatch(command, ctx);
-        }
+        self.obey();
         let title = self.state.setup.title();
         if title != self.title {
             ctx.send_viewport_cmd(egui::ViewportCommand::Title(title.clone()));
@@ -167,8 +159,13 @@ impl App {
         self.frame(ui);
         self.above(ui.ctx());
         self.state.textures.end_frame();
+        self.obey();
+    }
+
+    /// Does what was asked for.
+    fn obey(&mut self) {
         for command in self.commands.take() {
-            self.dispatch(command, ui.ctx());
+            command(self);
         }
     }
 
@@ -191,7 +188,7 @@ impl App {
             input.consume_key(egui::Modifiers::NONE, egui::Key::Enter)
         };
         if in_batch && !ctx.egui_wants_keyboard_input() && ctx.input_mut(enter) {
-            self.commands.send(Command::OpenSelected);
+            self.open_selected();
         }
         action::read_keys(ctx, &self.commands);
     }
@@ -202,52 +199,34 @@ impl App {
         let sizes = Sizes::of(ui.ctx().content_rect().size());
         let fill = ui.visuals().panel_fill;
         let plain = |margin: Margin| egui::Frame::NONE.fill(fill).inner_margin(margin);
-        let bar = |name: &'static str, height: f32| {
-            Panel::top(name)
-                .exact_size(height)
-                .resizable(false)
-                .frame(plain(Margin::symmetric(8, 0)))
+        let fixed = |panel: Panel, size: f32, margin: Margin| {
+            panel.exact_size(size).resizable(false).frame(plain(margin))
         };
-        bar("toolbar", sizes.toolbar).show(ui, |ui| frame::toolbar::ui(ui, state, commands, panes));
+        fixed(Panel::top("toolbar"), sizes.toolbar, Margin::symmetric(8, 0))
+            .show(ui, |ui| frame::toolbar::ui(ui, state, commands, panes));
         let mut canvas = egui::Rect::NOTHING;
         let central = egui::CentralPanel::default().frame(plain(Margin::same(6)));
         let options = &state.options;
-        if options.is_alone {
-            central.show(ui, |ui| {
-                canvas = ui.max_rect();
-                frame::canvas::alone(ui, state, commands, panes);
-            });
-            self.canvas = canvas;
-            return;
-        }
-        let below = |name: &'static str, height: f32| {
-            Panel::bottom(name)
-                .exact_size(height)
-                .resizable(false)
-                .frame(plain(Margin::symmetric(8, 4)))
-        };
+        let below = Margin::symmetric(8, 4);
         match options.layout {
+            _ if options.is_alone => {
+                central.show(ui, |ui| {
+                    canvas = ui.max_rect();
+                    frame::canvas::alone(ui, state, commands, panes);
+                });
+            }
             Arrangement::Inspect => {
-                Panel::top("verdicts")
-                    .exact_size(sizes.verdicts)
-                    .resizable(false)
-                    .frame(plain(Margin::ZERO))
+                fixed(Panel::top("verdicts"), sizes.verdicts, Margin::ZERO)
                     .show(ui, |ui| frame::verdicts::ui(ui, state, commands));
-                let height = frame::storyboard::height(&state.setup);
-                below("storyboard", sizes.storyboard.min(height))
+                let height = sizes.storyboard.min(frame::storyboard::height(&state.setup));
+                fixed(Panel::bottom("storyboard"), height, below)
                     .show(ui, |ui| frame::storyboard::ui(ui, state, commands));
                 if options.shows_queries && sizes.has_sides {
-                    Panel::left("queries")
-                        .exact_size(sizes.queries)
-                        .resizable(false)
-                        .frame(plain(Margin::same(6)))
+                    fixed(Panel::left("queries"), sizes.queries, Margin::same(6))
                         .show(ui, |ui| panes.show(ui, views::QUERIES, state, commands));
                 }
                 if options.shows_inspector && sizes.has_sides {
-                    Panel::right("inspector")
-                        .exact_size(sizes.inspector)
-                        .resizable(false)
-                        .frame(plain(Margin::symmetric(10, 6)))
+                    fixed(Panel::right("inspector"), sizes.inspector, Margin::symmetric(10, 6))
                         .show(ui, |ui| frame::inspector::ui(ui, state, commands, panes));
                 }
                 central.show(ui, |ui| {
@@ -256,7 +235,8 @@ impl App {
                 });
             }
             Arrangement::Lecture => {
-                below("lecture", sizes.sentence).show(ui, |ui| lecture::ui(ui, state, commands));
+                fixed(Panel::bottom("lecture"), sizes.sentence, below)
+                    .show(ui, |ui| lecture::ui(ui, state, commands));
                 if let Some(lesson) = lesson {
                     Panel::left("lesson")
                         .exact_size(lesson::WIDTH)
@@ -274,14 +254,10 @@ impl App {
             }
             Arrangement::Batch => {
                 let width = ui.available_width() * 0.44;
-                Panel::right("selected")
-                    .exact_size(width)
-                    .resizable(false)
-                    .frame(plain(Margin::same(10)))
-                    .show(ui, |ui| {
-                        canvas = ui.max_rect();
-                        frame::batch::right(ui, state, commands, panes);
-                    });
+                fixed(Panel::right("selected"), width, Margin::same(10)).show(ui, |ui| {
+                    canvas = ui.max_rect();
+                    frame::batch::right(ui, state, commands, panes);
+                });
                 central.show(ui, |ui| frame::batch::left(ui, state, commands, panes));
             }
         }

@@ -137,11 +137,6 @@ impl Axis {
 }
 
 impl Chart {
-    /// The chart as part of a page.
-    pub(crate) fn markup(&self) -> Markup {
-        self.svg(false, 0.0)
-    }
-
     fn inside(&self) -> (f64, f64) {
         let (width, height) = (self.x.length_px, self.y.length_px);
         (width.unwrap_or(SIZE.0), height.unwrap_or(SIZE.1))
@@ -157,8 +152,9 @@ impl Chart {
         (width + left + right, height + above + below + LEGEND.0 * self.legend_rows())
     }
 
-    /// The SVG element; with title and offset if it stands alone.
-    fn svg(&self, is_alone: bool, down: f64) -> Markup {
+    /// The chart as part of a page, or with a title, this far down in a file of its own.
+    pub(crate) fn svg(&self, down: Option<f64>) -> Markup {
+        let is_alone = down.is_some();
         let ((width, height), (inner, tall)) = (self.size(), self.inside());
         let (left, top) = (AROUND[0], AROUND[1]);
         let x = |value: f64| format!("{:.1}", left + inner * self.x.share(value));
@@ -166,7 +162,7 @@ impl Chart {
         let bottom = top + tall;
         let below = bottom + 34.0;
         html! {
-            svg role="img" aria-label=(self.title) width=(width) height=(height) y=[is_alone.then_some(down)]
+            svg role="img" aria-label=(self.title) width=(width) height=(height) y=[down]
                 viewBox={ "0 0 " (width) " " (height) } font-family="sans-serif" font-size="11" {
                 @if is_alone { text x=(left) y="14" font-size="13" { (self.title) } }
                 g stroke="#ddd" {
@@ -229,7 +225,7 @@ pub(crate) fn file(charts: &[Chart]) -> String {
     let height: f64 = charts.iter().map(|chart| chart.size().1).sum();
     let mut down = 0.0;
     let stacked = charts.iter().map(|chart| {
-        let svg = chart.svg(true, down);
+        let svg = chart.svg(Some(down));
         down += chart.size().1;
         svg.into_string()
     });
@@ -274,7 +270,7 @@ mod tests {
             marks: vec![mark],
             legend: vec![("FB".to_owned(), [0, 114, 178])],
         };
-        let svg = chart.markup().into_string();
+        let svg = chart.svg(None).into_string();
         let (middle, half) = (AROUND[0] + SIZE.0 / 2.0, AROUND[1] + SIZE.1 / 2.0);
         let dot = format!("<a href=\"#r1\"><circle cx=\"{middle:.1}\" cy=\"{half:.1}\"");
         assert!(svg.contains(&dot), "{svg}");

@@ -1,7 +1,6 @@
 //! The command line of posescope.
 
 mod args;
-mod choice;
 mod compare;
 mod compute;
 mod defaults;

@@ -67,18 +67,14 @@ pub fn examine(scene: &dyn Scene) -> Result<Examination, SceneError> {
         return Ok(examination);
     }
     let sample = Sample::read(scene)?;
-    if sample.is_empty() {
+    let Some(&first) = sample.anchors.first() else {
         return Ok(examination);
-    }
+    };
     let (agreement, finding) = sample.diagnose();
     examination.agreement = Some(agreement);
     examination.finding = finding;
-    examination.compared = sample.anchors().to_vec();
-    let first = sample.anchors().first();
-    let cloud = first.and_then(|&anchor| {
-        let (photo, seen) = sample.seen(anchor)?;
-        Some(picture::cloud_on(photo, &seen))
-    });
+    let cloud = sample.seen(first).map(|(photo, seen)| picture::cloud_on(photo, &seen));
     examination.picture = route::below(cloud, &poses);
+    examination.compared = sample.anchors;
     Ok(examination)
 }

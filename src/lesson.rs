@@ -18,7 +18,7 @@ use include_dir::{Dir, include_dir};
 pub use file::LessonError;
 pub use moment::{Moment, MomentError, Watch};
 pub use page::{Answer, Page, Question};
-pub use setting::{OpenSetting, Setting, SettingError, named_scenes};
+pub use setting::{Setting, SettingError, named_scenes};
 pub use turner::PageTurner;
 
 use crate::measure::Condition;
@@ -91,14 +91,13 @@ impl Lesson {
 
     /// Consecutive pages with the same setting, in order: the name of the setting, and the pages.
     pub fn groups(&self) -> Vec<(&str, Range<usize>)> {
-        let mut groups: Vec<(&str, Range<usize>)> = Vec::new();
-        for (index, page) in self.pages.iter().enumerate() {
-            match groups.last_mut() {
-                Some((variant, pages)) if *variant == page.variant => pages.end = index + 1,
-                _ => groups.push((&page.variant, index..index + 1)),
-            }
-        }
-        groups
+        let mut end = 0;
+        let groups = self.pages.chunk_by(|a, b| a.variant == b.variant).map(|pages| {
+            let start = end;
+            end += pages.len();
+            (pages[0].variant.as_str(), start..end)
+        });
+        groups.collect()
     }
 
     /// The setting of this name; the first one if there is none.

@@ -5,11 +5,11 @@ mod diff;
 #[cfg(feature = "cli")]
 mod export;
 mod gate;
+mod groups;
 #[cfg(feature = "cli")]
 mod junit;
 mod known;
 mod metrics;
-mod migration;
 mod overview;
 #[cfg(feature = "cli")]
 mod paper;
@@ -27,13 +27,12 @@ mod timings;
 mod triage;
 
 pub use crate::relation::Relation;
-pub use diff::{Change, Difference, RunComparison};
+pub use diff::{Change, Difference, Migration, RunComparison, migrations, verdict_name};
 #[cfg(feature = "cli")]
 pub use export::{Export, ExportError, ExportedFile, Format, export};
 pub use gate::{Gate, GateResult};
 pub use known::{KnownFailures, KnownReport};
 pub use metrics::{Group, Measures, RECALL_LIMITS, Spread, measure};
-pub use migration::{Migration, migrations, verdict_name};
 pub use overview::{Bar, Overview};
 #[cfg(feature = "cli")]
 pub use paper::scene as paper_scene;

@@ -183,16 +183,8 @@ fn fused(event: &ReferencesFused) -> String {
 fn ranked(event: &ReferencesRanked) -> String {
     let ranking = &event.ranking;
     let say = |reference: &RankedReference| {
-        let ranked = &reference.ranked;
-        let inliers = match &ranked.geometry {
-            Geometry::Verified(found) => format!(", {} inliers", found.inliers),
-            Geometry::Refused => ", not verified".to_owned(),
-            Geometry::Unchecked => String::new(),
-        };
-        match ranking.criterion {
-            Criterion::Words => format!("{} ({:.3}{inliers})", reference.name, ranked.score),
-            Criterion::Matches => format!("{} ({:.0} matches)", reference.name, ranked.score),
-        }
+        let score = score(ranking.criterion, reference.ranked.score);
+        format!("{} ({score}{})", reference.name, verified(&reference.ranked.geometry))
     };
     let chosen: Vec<String> = ranking.frames.iter().take(ranking.chosen).map(say).collect();
     format!(
@@ -201,6 +193,23 @@ fn ranked(event: &ReferencesRanked) -> String {
         ranking.candidates,
         chosen.join(", ")
     )
+}
+
+/// The score of a ranked frame.
+pub(crate) fn score(criterion: Criterion, score: f32) -> String {
+    match criterion {
+        Criterion::Words => format!("{score:.3}"),
+        Criterion::Matches => format!("{score:.0} matches"),
+    }
+}
+
+/// What verification says about a ranked frame, after its score. Frames ranked by matches are never verified.
+pub(crate) fn verified(geometry: &Geometry) -> String {
+    match geometry {
+        Geometry::Verified(found) => format!(", {} inliers", found.inliers),
+        Geometry::Refused => ", not verified".to_owned(),
+        Geometry::Unchecked => String::new(),
+    }
 }
 
 fn cost(cost: Option<f64>) -> String {

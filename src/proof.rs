@@ -25,6 +25,7 @@ use crate::problem::Problem;
 use crate::trace::Record;
 
 pub use layout::{MARK, Place, free_corner, label_place, title_end};
+pub(crate) use maps::between;
 
 /// The kinds of event that proofs are made from.
 pub const KINDS: KindSet = KindSet::of(&[

@@ -104,10 +104,8 @@ impl RunReport {
             notes.push(format!("Parameters of another version: {error}"));
         }
         let mut results = reported(folder, &run, &measured.results);
-        let baseline = match baseline {
-            Some(before) => Some(compared_with(before, &measured.results, &mut results)?),
-            None => None,
-        };
+        let compared = |before| compared_with(before, &measured.results, &mut results);
+        let baseline = baseline.map(compared).transpose()?;
         let worst = worst_first(&results);
         let mut thumbnails = BTreeMap::new();
         let protocol = &run.protocol;
@@ -248,11 +246,10 @@ fn draw_failures(
         let references = scenes.references[pair.scene_index].as_ref();
         let queries = scenes.of_queries(pair);
         let localizer = Localizer::new(references, queries, params, run.protocol.seed);
-        let Ok(foreign) = run.protocol.foreign(queries) else {
+        let Ok(localizer) = run.protocol.configured(localizer) else {
             continue;
         };
-        let localizer = run.protocol.configured(localizer);
-        let localizer = localizer.with_foreign(foreign).explaining(0);
+        let localizer = localizer.explaining(0);
         for &at in failures {
             let result = &results[at].result;
             let is_of_pair = run.pair_of(result).is_some_and(|found| std::ptr::eq(found, pair));
@@ -283,11 +280,8 @@ fn drawn_failure(
         setting: None,
     };
     let mut witness = Witness::default();
-    localizer
-        .localize(0, query, &[request], &[result.method], &mut witness, |_, _| {
-            Ok::<(), LocalizeError>(())
-        })
-        .ok()?;
+    let keep = |_, _| Ok::<(), LocalizeError>(());
+    localizer.localize(0, query, &[request], &[result.method], &mut witness, keep).ok()?;
     let truth = localizer.queries().pose(query);
     witness.proof(truth.as_ref(), result, params)
 }

@@ -4,7 +4,6 @@
 //!
 //! A new format is one file, its `mod` line and its entry in [`ALL`].
 
-mod argument;
 mod cloud_file;
 mod colmap;
 mod depth_image;

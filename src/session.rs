@@ -7,7 +7,6 @@
 mod breakpoint;
 mod index_file;
 mod job;
-mod loaded;
 mod message;
 mod pausing;
 mod run;
@@ -16,14 +15,11 @@ mod task;
 use std::sync::Arc;
 use std::sync::mpsc::{self, Receiver};
 
-use crate::localize::References;
-
-pub use breakpoint::{BreakAt, Breakpoint, BreakpointError, Breakpoints, StopAtBreakpoint};
+pub use breakpoint::{Breakpoint, BreakpointError, Breakpoints, StopAtBreakpoint};
 pub use index_file::IndexFile;
 pub use job::{Job, JobError};
-pub use loaded::Loaded;
 pub use pausing::RunMode;
-pub use run::{Explaining, Part, Run, RunState, Span, StageBar};
+pub use run::{Explaining, Loaded, Part, Run, RunState, Span, StageBar};
 pub use task::{Task, TaskScenes, command_line};
 
 use message::{Message, Outbox};
@@ -69,11 +65,6 @@ impl Session {
     /// The run so far.
     pub fn run(&self) -> &Run {
         &self.run
-    }
-
-    /// The references, once they are chosen.
-    pub fn chosen(&self) -> Option<&References> {
-        self.run.chosen.as_ref()
     }
 
     /// What the session is doing, as of the last [`Self::drain`].

@@ -4,12 +4,14 @@
 
 use egui::{Button, Key, KeyboardShortcut, Modifiers, Ui};
 
+use super::App;
 use super::arrangement::Arrangement;
 use super::camera::{NamedPose, Nudge};
-use super::command::{Command, Queue};
-use super::save_target::SaveTarget;
+use super::command::Queue;
+use super::save::SaveTarget;
 use super::state::AppState;
 use super::view_options::{CompareMode, Tab};
+use crate::session::RunMode;
 
 /// What an action is for. The list of keys is in these groups.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -54,8 +56,8 @@ pub struct Action {
     pub text: &'static str,
     /// Keys that do it.
     pub keys: &'static [KeyboardShortcut],
-    /// The command that it sends.
-    pub command: Command,
+    /// Does it.
+    pub run: fn(&mut App),
     /// Whether it is switched on; always `false` for what is done once.
     pub is_on: fn(&AppState) -> bool,
 }
@@ -84,19 +86,19 @@ const fn once(
     group: Group,
     keys: &'static [KeyboardShortcut],
     text: &'static str,
-    command: Command,
+    run: fn(&mut App),
 ) -> Action {
-    switch(group, keys, text, command, |_| false)
+    switch(group, keys, text, run, |_| false)
 }
 
 const fn switch(
     group: Group,
     keys: &'static [KeyboardShortcut],
     text: &'static str,
-    command: Command,
+    run: fn(&mut App),
     is_on: fn(&AppState) -> bool,
 ) -> Action {
-    Action { group, text, keys, command, is_on }
+    Action { group, text, keys, run, is_on }
 }
 
 use Group::{Camera, Compare, Lesson, Look, Query, Run, Show, Window};
@@ -105,96 +107,101 @@ use Group::{Camera, Compare, Lesson, Look, Query, Run, Show, Window};
 // A line for each: broken up, the table would be four times as long.
 #[rustfmt::skip]
 pub static ACTIONS: &[Action] = &[
-    once(Run, &[key(Key::Space)], "Run or pause", Command::RunOrPause),
-    once(Run, &[key(Key::F5)], "Run to the next breakpoint", Command::Run),
-    once(Run, &[key(Key::F9)], "Run to the end, past all breakpoints", Command::RunToEnd),
-    once(Run, &[shift(Key::F5)], "Restart and wait at the first step", Command::Restart),
-    once(Run, &[key(Key::I), key(Key::F11)], "Step to the next event", Command::StepInto),
-    once(Run, &[key(Key::F10)], "Step over the stage", Command::StepOver),
-    once(Run, &[shift(Key::I), shift(Key::F11)], "Step out of the stage", Command::StepOut),
-    once(Look, &[key(Key::ArrowRight)], "One step on", Command::Forward(1)),
-    once(Look, &[key(Key::ArrowLeft)], "One step back", Command::Back(1)),
-    once(Look, &[shift(Key::ArrowRight)], "Ten steps on", Command::Forward(10)),
-    once(Look, &[shift(Key::ArrowLeft)], "Ten steps back", Command::Back(10)),
-    once(Look, &[key(Key::ArrowDown)], "Next stage", Command::NextStage { back: false }),
-    once(Look, &[key(Key::ArrowUp)], "Previous stage", Command::NextStage { back: true }),
-    once(Look, &[key(Key::Home)], "To the first step", Command::First),
-    once(Look, &[key(Key::End)], "To the last step", Command::Last),
-    once(Look, &[key(Key::W)], "Why the result is what it is", Command::Why),
-    once(Look, &[key(Key::Num1)], "Show method 1", Command::SelectNth(0)),
-    once(Look, &[key(Key::Num2)], "Show method 2", Command::SelectNth(1)),
-    once(Look, &[key(Key::Num3)], "Show method 3", Command::SelectNth(2)),
-    once(Look, &[key(Key::Num4)], "Show method 4", Command::SelectNth(3)),
-    once(Look, &[key(Key::Num5)], "Show method 5", Command::SelectNth(4)),
-    once(Look, &[key(Key::Num6)], "Show method 6", Command::SelectNth(5)),
-    once(Look, &[key(Key::Num7)], "Show method 7", Command::SelectNth(6)),
-    once(Look, &[key(Key::Num8)], "Show method 8", Command::SelectNth(7)),
-    once(Look, &[key(Key::Period)], "All methods one step on", Command::GoTogether(1)),
-    once(Look, &[key(Key::Comma)], "All methods one step back", Command::GoTogether(-1)),
-    once(Look, &[shift(Key::Period)], "All methods fifty steps on", Command::GoTogether(50)),
-    once(Look, &[shift(Key::Comma)], "All methods fifty steps back", Command::GoTogether(-50)),
-    once(Query, &[key(Key::J)], "Next query", Command::NextQuery { back: false }),
-    once(Query, &[key(Key::K)], "Previous query", Command::NextQuery { back: true }),
-    once(Query, &[key(Key::N)], "Next failure", Command::NextFailure { back: false }),
-    once(Query, &[shift(Key::N)], "Previous failure", Command::NextFailure { back: true }),
-    switch(Query, &[key(Key::E)], "Try what would have helped", Command::Explain, |state| state.setup.task.protocol.explain > 0),
-    once(Query, &[key(Key::Slash)], "Filter the queries, the parameters or the results", Command::Filter),
-    switch(Query, &[], "Run all queries, or stop", Command::RunAllQueries, |state| state.queries.progress().is_some()),
-    switch(Show, &[key(Key::G)], "Ground truth", Command::ShowTruth, |state| state.options.shows_truth),
-    once(Show, &[key(Key::V)], "3-D view and back", Command::Toggle3d),
-    switch(Show, &[key(Key::B)], "Blink between query and synthetic view", Command::Blink, |state| state.options.blinking),
-    switch(Show, &[key(Key::F)], "Dense map of all positions and headings", Command::ShowDenseMap, |state| state.options.shows_dense_map),
-    switch(Show, &[key(Key::M)], "The canvas alone", Command::Maximize(None), |state| state.options.is_alone),
-    switch(Show, &[key(Key::Q)], "List of queries", Command::ToggleQueries, |state| state.options.shows_queries),
-    switch(Show, &[key(Key::T)], "Inspector", Command::ToggleInspector, |state| state.options.shows_inspector),
-    once(Show, &[], "Inspector: why", Command::ShowTab(Tab::Why)),
-    once(Show, &[], "Inspector: numbers", Command::ShowTab(Tab::Numbers)),
-    once(Show, &[], "Inspector: parameters", Command::ShowTab(Tab::Parameters)),
-    once(Show, &[], "Inspector: log", Command::ShowTab(Tab::Log)),
-    once(Compare, &[key(Key::P)], "Keep this run as A", Command::Pin),
-    switch(Compare, &[key(Key::X)], "Flip between the runs A and B", Command::Flip, |state| state.options.compare_mode == CompareMode::Kept),
-    switch(Compare, &[key(Key::D)], "Differences only", Command::OnlyDifferences, |state| state.options.only_differences),
-    once(Compare, &[], "Forget run A", Command::Unpin),
-    once(Compare, &[], "Keep all results as A", Command::KeepResults),
-    once(Compare, &[], "Forget the results A", Command::ForgetResults),
-    once(Camera, &[alt(Key::ArrowUp)], "Camera ahead", Command::MoveCamera(Nudge::Forward(1.0))),
-    once(Camera, &[alt(Key::ArrowDown)], "Camera back", Command::MoveCamera(Nudge::Forward(-1.0))),
-    once(Camera, &[alt(Key::ArrowRight)], "Camera to the right", Command::MoveCamera(Nudge::Right(1.0))),
-    once(Camera, &[alt(Key::ArrowLeft)], "Camera to the left", Command::MoveCamera(Nudge::Right(-1.0))),
-    once(Camera, &[alt_shift(Key::ArrowUp)], "Camera up", Command::MoveCamera(Nudge::Up(1.0))),
-    once(Camera, &[alt_shift(Key::ArrowDown)], "Camera down", Command::MoveCamera(Nudge::Up(-1.0))),
-    once(Camera, &[alt_shift(Key::ArrowLeft)], "Turn the camera left", Command::MoveCamera(Nudge::Yaw(1.0))),
-    once(Camera, &[alt_shift(Key::ArrowRight)], "Turn the camera right", Command::MoveCamera(Nudge::Yaw(-1.0))),
-    once(Camera, &[alt(Key::Num1)], "Camera to the start", Command::JumpCamera(NamedPose::Start)),
-    once(Camera, &[alt(Key::Num2)], "Camera to the coarse minimum", Command::JumpCamera(NamedPose::Coarse)),
-    once(Camera, &[alt(Key::Num3)], "Camera to the fine minimum", Command::JumpCamera(NamedPose::Fine)),
-    once(Camera, &[alt(Key::Num4)], "Camera to the estimate", Command::JumpCamera(NamedPose::Estimate)),
-    once(Camera, &[alt(Key::Num5), key(Key::Num9)], "Camera to the truth", Command::JumpCamera(NamedPose::Truth)),
-    once(Camera, &[key(Key::Num0)], "Camera to where it was before", Command::JumpCamera(NamedPose::Last)),
-    once(Camera, &[key(Key::Escape)], "Let the camera go", Command::TakeCamera(None)),
-    once(Lesson, &[key(Key::PageDown)], "Next page", Command::TurnPage { back: false }),
-    once(Lesson, &[key(Key::PageUp)], "Previous page", Command::TurnPage { back: true }),
-    once(Lesson, &[], "Close the lesson", Command::CloseLesson),
-    once(Window, &[key(Key::F2)], "Inspect one query", Command::Arrange(Arrangement::Inspect)),
-    once(Window, &[key(Key::F3)], "Lecture", Command::Arrange(Arrangement::Lecture)),
-    once(Window, &[key(Key::F4)], "Batch of results", Command::Arrange(Arrangement::Batch)),
-    once(Window, &[], "Save a recording …", Command::AskWhere(SaveTarget::Recording)),
-    once(Window, &[], "Stream the run to a Rerun viewer", Command::StreamRecording),
-    once(Window, &[], "Open the run in a new Rerun viewer", Command::SpawnViewer),
-    once(Window, &[ctrl(Key::P)], "Save a picture of the window …", Command::AskWhere(SaveTarget::Picture)),
-    once(Window, &[], "Save a picture of the canvas …", Command::AskWhere(SaveTarget::Canvas)),
-    once(Window, &[ctrl(Key::C)], "Copy the command line of this run", Command::CopyCommandLine),
-    once(Window, &[], "Save the session …", Command::AskWhere(SaveTarget::Session)),
-    once(Window, &[], "Restore a session …", Command::AskWhere(SaveTarget::Restored)),
-    once(Window, &[key(Key::L)], "Light or dark", Command::SwitchTheme),
-    once(Window, &[ctrl(Key::K)], "Search for an action", Command::Search),
+    once(Run, &[key(Key::Space)], "Run or pause", |app| app.state.run_or_pause()),
+    once(Run, &[key(Key::F5)], "Run to the next breakpoint", |app| app.state.go_on()),
+    once(Run, &[key(Key::F9)], "Run to the end, past all breakpoints", |app| app.state.run_to_end()),
+    once(Run, &[shift(Key::F5)], "Restart and wait at the first step", |app| app.state.start_run(RunMode::Paused)),
+    once(Run, &[key(Key::I), key(Key::F11)], "Step to the next event", |app| app.state.resume(RunMode::StepInto)),
+    once(Run, &[key(Key::F10)], "Step over the stage", |app| app.state.resume(RunMode::StepOver)),
+    once(Run, &[shift(Key::I), shift(Key::F11)], "Step out of the stage", |app| app.state.resume(RunMode::StepOut)),
+    once(Look, &[key(Key::ArrowRight)], "One step on", |app| app.state.forward(1)),
+    once(Look, &[key(Key::ArrowLeft)], "One step back", |app| app.state.back(1)),
+    once(Look, &[shift(Key::ArrowRight)], "Ten steps on", |app| app.state.forward(10)),
+    once(Look, &[shift(Key::ArrowLeft)], "Ten steps back", |app| app.state.back(10)),
+    once(Look, &[key(Key::ArrowDown)], "Next stage", |app| app.state.next_stage(false)),
+    once(Look, &[key(Key::ArrowUp)], "Previous stage", |app| app.state.next_stage(true)),
+    once(Look, &[key(Key::Home)], "To the first step", |app| app.state.move_cursor(0)),
+    once(Look, &[key(Key::End)], "To the last step", |app| app.state.follow()),
+    once(Look, &[key(Key::W)], "Why the result is what it is", |app| app.state.options.shows_why ^= true),
+    once(Look, &[key(Key::Num1)], "Show method 1", |app| app.state.select_nth(0)),
+    once(Look, &[key(Key::Num2)], "Show method 2", |app| app.state.select_nth(1)),
+    once(Look, &[key(Key::Num3)], "Show method 3", |app| app.state.select_nth(2)),
+    once(Look, &[key(Key::Num4)], "Show method 4", |app| app.state.select_nth(3)),
+    once(Look, &[key(Key::Num5)], "Show method 5", |app| app.state.select_nth(4)),
+    once(Look, &[key(Key::Num6)], "Show method 6", |app| app.state.select_nth(5)),
+    once(Look, &[key(Key::Num7)], "Show method 7", |app| app.state.select_nth(6)),
+    once(Look, &[key(Key::Num8)], "Show method 8", |app| app.state.select_nth(7)),
+    once(Look, &[key(Key::Period)], "All methods one step on", |app| app.state.go_together(1)),
+    once(Look, &[key(Key::Comma)], "All methods one step back", |app| app.state.go_together(-1)),
+    once(Look, &[shift(Key::Period)], "All methods fifty steps on", |app| app.state.go_together(50)),
+    once(Look, &[shift(Key::Comma)], "All methods fifty steps back", |app| app.state.go_together(-50)),
+    once(Query, &[key(Key::J)], "Next query", |app| app.state.next_query(false, |_, _| true)),
+    once(Query, &[key(Key::K)], "Previous query", |app| app.state.next_query(true, |_, _| true)),
+    once(Query, &[key(Key::N)], "Next failure", |app| app.state.next_failure(false)),
+    once(Query, &[shift(Key::N)], "Previous failure", |app| app.state.next_failure(true)),
+    switch(Query, &[key(Key::E)], "Try what would have helped", |app| app.state.switch_explaining(), |state| state.setup.task.protocol.explain > 0),
+    once(Query, &[key(Key::Slash)], "Filter the queries, the parameters or the results", |app| app.state.focus_filter()),
+    switch(Query, &[], "Run all queries, or stop", |app| app.state.queries.run_all(&app.state.setup), |state| state.queries.progress().is_some()),
+    switch(Show, &[key(Key::G)], "Ground truth", |app| app.state.options.shows_truth ^= true, |state| state.options.shows_truth),
+    once(Show, &[key(Key::V)], "3-D view and back", |app| app.state.toggle("space")),
+    switch(Show, &[key(Key::B)], "Blink between query and synthetic view", |app| app.state.options.blinking ^= true, |state| state.options.blinking),
+    switch(Show, &[key(Key::F)], "Dense map of all positions and headings", |app| app.state.options.shows_dense_map ^= true, |state| state.options.shows_dense_map),
+    switch(Show, &[key(Key::M)], "The canvas alone", |app| app.state.show_alone(None), |state| state.options.is_alone),
+    switch(Show, &[key(Key::Q)], "List of queries", |app| app.state.options.shows_queries ^= true, |state| state.options.shows_queries),
+    switch(Show, &[key(Key::T)], "Inspector", |app| app.state.options.shows_inspector ^= true, |state| state.options.shows_inspector),
+    once(Show, &[], "Inspector: why", |app| app.state.show_tab(Tab::Why)),
+    once(Show, &[], "Inspector: numbers", |app| app.state.show_tab(Tab::Numbers)),
+    once(Show, &[], "Inspector: parameters", |app| app.state.show_tab(Tab::Parameters)),
+    once(Show, &[], "Inspector: log", |app| app.state.show_tab(Tab::Log)),
+    once(Compare, &[key(Key::P)], "Keep this run as A", |app| app.state.keep_run()),
+    switch(Compare, &[key(Key::X)], "Flip between the runs A and B", |app| app.state.flip(), |state| state.options.compare_mode == CompareMode::Kept),
+    switch(Compare, &[key(Key::D)], "Differences only", |app| app.state.options.only_differences ^= true, |state| state.options.only_differences),
+    once(Compare, &[], "Forget run A", |app| app.state.forget_run()),
+    once(Compare, &[], "Keep all results as A", |app| app.state.keep_results()),
+    once(Compare, &[], "Forget the results A", |app| app.state.set_results_before(None)),
+    once(Camera, &[alt(Key::ArrowUp)], "Camera ahead", |app| app.state.move_camera(Nudge::Forward(1.0))),
+    once(Camera, &[alt(Key::ArrowDown)], "Camera back", |app| app.state.move_camera(Nudge::Forward(-1.0))),
+    once(Camera, &[alt(Key::ArrowRight)], "Camera to the right", |app| app.state.move_camera(Nudge::Right(1.0))),
+    once(Camera, &[alt(Key::ArrowLeft)], "Camera to the left", |app| app.state.move_camera(Nudge::Right(-1.0))),
+    once(Camera, &[alt_shift(Key::ArrowUp)], "Camera up", |app| app.state.move_camera(Nudge::Up(1.0))),
+    once(Camera, &[alt_shift(Key::ArrowDown)], "Camera down", |app| app.state.move_camera(Nudge::Up(-1.0))),
+    once(Camera, &[alt_shift(Key::ArrowLeft)], "Turn the camera left", |app| app.state.move_camera(Nudge::Yaw(1.0))),
+    once(Camera, &[alt_shift(Key::ArrowRight)], "Turn the camera right", |app| app.state.move_camera(Nudge::Yaw(-1.0))),
+    once(Camera, &[alt(Key::Num1)], "Camera to the start", |app| app.state.jump_camera(NamedPose::Start)),
+    once(Camera, &[alt(Key::Num2)], "Camera to the coarse minimum", |app| app.state.jump_camera(NamedPose::Coarse)),
+    once(Camera, &[alt(Key::Num3)], "Camera to the fine minimum", |app| app.state.jump_camera(NamedPose::Fine)),
+    once(Camera, &[alt(Key::Num4)], "Camera to the estimate", |app| app.state.jump_camera(NamedPose::Estimate)),
+    once(Camera, &[alt(Key::Num5), key(Key::Num9)], "Camera to the truth", |app| app.state.jump_camera(NamedPose::Truth)),
+    once(Camera, &[key(Key::Num0)], "Camera to where it was before", |app| app.state.jump_camera(NamedPose::Last)),
+    once(Camera, &[key(Key::Escape)], "Let the camera go", |app| app.state.camera = None),
+    once(Lesson, &[key(Key::PageDown)], "Next page", |app| app.turn_page(false)),
+    once(Lesson, &[key(Key::PageUp)], "Previous page", |app| app.turn_page(true)),
+    once(Lesson, &[], "Close the lesson", App::close_lesson),
+    once(Window, &[key(Key::F2)], "Inspect one query", |app| app.arrange(Arrangement::Inspect)),
+    once(Window, &[key(Key::F3)], "Lecture", |app| app.arrange(Arrangement::Lecture)),
+    once(Window, &[key(Key::F4)], "Batch of results", |app| app.arrange(Arrangement::Batch)),
+    once(Window, &[], "Save a recording …", |app| app.ask_where(SaveTarget::Recording)),
+    once(Window, &[], "Stream the run to a Rerun viewer", |app| app.state.stream_recording()),
+    once(Window, &[], "Open the run in a new Rerun viewer", |app| app.state.spawn_viewer()),
+    once(Window, &[ctrl(Key::P)], "Save a picture of the window …", |app| app.ask_where(SaveTarget::Picture)),
+    once(Window, &[], "Save a picture of the canvas …", |app| app.ask_where(SaveTarget::Canvas)),
+    once(Window, &[ctrl(Key::C)], "Copy the command line of this run", |app| app.state.copy_command_line()),
+    once(Window, &[], "Save the session …", |app| app.ask_where(SaveTarget::Session)),
+    once(Window, &[], "Restore a session …", |app| app.ask_where(SaveTarget::Restored)),
+    once(Window, &[key(Key::L)], "Light or dark", |app| app.switch_theme()),
+    once(Window, &[ctrl(Key::K)], "Search for an action", |app| app.open_search()),
     // Named by what it types, wherever it is on the keyboard.
-    once(Window, &[key(Key::Questionmark), key(Key::F1)], "All keys", Command::Help),
+    once(Window, &[key(Key::Questionmark), key(Key::F1)], "All keys", |app| app.help ^= true),
 ];
 
-/// The action that sends a command.
-pub(super) fn of(command: &Command) -> Option<&'static Action> {
-    ACTIONS.iter().find(|action| action.command == *command)
+/// The action that has this text.
+pub(super) fn of(text: &str) -> Option<&'static Action> {
+    ACTIONS.iter().find(|action| action.text == text)
+}
+
+/// What an action does, with its keys.
+pub(super) fn tooltip(ctx: &egui::Context, text: &str) -> String {
+    of(text).map(|action| action.tooltip(ctx)).unwrap_or_default()
 }
 
 impl Action {
@@ -217,29 +224,18 @@ impl Action {
         let keys = self.keys_text(ui.ctx());
         let button = Button::selectable((self.is_on)(state), self.text).shortcut_text(keys);
         if ui.add(button).clicked() {
-            commands.send(self.command.clone());
+            commands.send(self.run);
             ui.close();
         }
     }
 }
 
-/// A button that sends a command; its tooltip comes from the table.
-pub(super) fn button(
-    ui: &mut Ui,
-    state: &AppState,
-    commands: &Queue,
-    text: &str,
-    command: Command,
-) {
-    let action = of(&command);
-    let is_on = action.is_some_and(|action| (action.is_on)(state));
-    let response = ui.add(Button::selectable(is_on, text).frame_when_inactive(true));
-    let response = match action {
-        Some(action) => response.on_hover_text(action.tooltip(ui.ctx())),
-        None => response,
-    };
-    if response.clicked() {
-        commands.send(command);
+/// A button that does the action of this text; its tooltip comes from the table.
+pub(super) fn button(ui: &mut Ui, state: &AppState, commands: &Queue, name: &str, text: &str) {
+    let Some(action) = of(text) else { return };
+    let button = Button::selectable((action.is_on)(state), name).frame_when_inactive(true);
+    if ui.add(button).on_hover_text(action.tooltip(ui.ctx())).clicked() {
+        commands.send(action.run);
     }
 }
 
@@ -262,7 +258,7 @@ pub(super) fn read_keys(ctx: &egui::Context, commands: &Queue) {
     });
     for (keys, action) in pairs {
         while ctx.input_mut(|input| input.consume_shortcut(keys)) {
-            commands.send(action.command.clone());
+            commands.send(action.run);
         }
     }
 }
@@ -272,12 +268,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn no_key_does_two_things_and_no_command_has_two_entries() {
+    fn no_key_does_two_things_and_no_text_has_two_entries() {
         let keys = ACTIONS.iter().flat_map(|action| action.keys);
         let mut keys: Vec<_> = keys.map(|keys| format!("{keys:?}")).collect();
-        let mut commands: Vec<_> =
-            ACTIONS.iter().map(|action| format!("{:?}", action.command)).collect();
-        for names in [&mut keys, &mut commands] {
+        let mut texts: Vec<_> = ACTIONS.iter().map(|action| action.text.to_owned()).collect();
+        for names in [&mut keys, &mut texts] {
             names.sort();
             let all = names.len();
             names.dedup();

@@ -16,10 +16,10 @@ pub enum Arrangement {
 }
 
 impl Arrangement {
-    /// All arrangements, with their titles and keys.
-    pub const ALL: [(Self, &'static str, egui::Key); 3] = [
-        (Self::Inspect, "Inspect", egui::Key::F2),
-        (Self::Lecture, "Lecture", egui::Key::F3),
-        (Self::Batch, "Batch", egui::Key::F4),
+    /// All arrangements, with their titles and the texts of their actions.
+    pub const ALL: [(Self, &'static str, &'static str); 3] = [
+        (Self::Inspect, "Inspect", "Inspect one query"),
+        (Self::Lecture, "Lecture", "Lecture"),
+        (Self::Batch, "Batch", "Batch of results"),
     ];
 }

@@ -1,19 +1,22 @@
 //! How commands change the state: the run, the cursor, the query, its references, the camera.
 
-use super::camera::NamedPose;
+use super::arrangement::Arrangement;
+use super::camera::{NamedPose, Nudge};
 use super::deciding::deciding;
 use super::navigation::Navigation;
 use super::queries::Queries;
 use super::run_pictures::RunPictures;
 use super::setup::ReferencePick;
 use super::state::{AppState, KeptRun};
-use super::view_options::Tab;
+use super::view_options::{CompareMode, Tab};
 use crate::event::PhaseSearched;
+use crate::fusion::Fusion;
 use crate::geometry::Pose;
 use crate::grid::Phase;
 use crate::image::Degradation;
 use crate::localize::References;
 use crate::method::Method;
+use crate::params::Params;
 use crate::session::{Breakpoint, Breakpoints, Part, RunMode, RunState};
 
 impl AppState {
@@ -27,13 +30,47 @@ impl AppState {
         self.session.set_mode(mode);
     }
 
-    pub(super) fn forward(&mut self, steps: usize) {
+    /// Runs, or pauses what runs.
+    pub(super) fn run_or_pause(&mut self) {
+        match self.run_state() {
+            RunState::Running | RunState::Loading => self.session.set_mode(RunMode::Paused),
+            _ => self.go_on(),
+        }
+    }
+
+    /// Runs from where the run stands; a run that is over begins again.
+    pub(super) fn go_on(&mut self) {
+        if self.session.is_alive() {
+            self.resume(RunMode::Running);
+        } else {
+            self.start_run(RunMode::Running);
+        }
+    }
+
+    /// Runs to the end, past all breakpoints.
+    pub(super) fn run_to_end(&mut self) {
+        self.session.set_breakpoints(Breakpoints::default());
+        self.resume(RunMode::Running);
+    }
+
+    /// Moves the cursor ahead; at the last record of a paused run, steps.
+    pub fn forward(&mut self, steps: usize) {
         let last = self.run().len().saturating_sub(1);
         if self.cursor() < last {
             self.move_cursor(self.cursor() + steps);
         } else if matches!(self.run_state(), RunState::Paused { .. }) {
             self.resume(RunMode::StepInto);
         }
+    }
+
+    pub(super) fn back(&mut self, steps: usize) {
+        self.move_cursor(self.cursor().saturating_sub(steps));
+    }
+
+    /// Moves the cursor to the last record, and keeps it there as more come in.
+    pub(super) fn follow(&mut self) {
+        self.move_cursor(self.run().len());
+        self.navigation.follow();
     }
 
     /// Moves all methods by that many of their steps, once lock-step is on.
@@ -48,7 +85,8 @@ impl AppState {
         self.options.lockstep = Some(here.saturating_add_signed(steps).min(last));
     }
 
-    pub(super) fn move_cursor(&mut self, cursor: usize) {
+    /// Moves the cursor to a record.
+    pub fn move_cursor(&mut self, cursor: usize) {
         self.options.shows_why = false;
         // The user looks elsewhere by now.
         self.opens_at_cause = false;
@@ -87,21 +125,34 @@ impl AppState {
     }
 
     /// Shows a view on the canvas, in the inspector or alone, wherever its place is.
-    pub(super) fn show_view(&mut self, name: &'static str) {
-        let tab = match name {
-            super::views::PARAMETERS => Some(Tab::Parameters),
-            "log" => Some(Tab::Log),
-            _ => None,
-        };
-        match tab {
-            Some(tab) => {
-                self.options.tab = tab;
-                self.options.shows_inspector = true;
-            }
-            None => {
+    pub fn show_view(&mut self, name: &'static str) {
+        match name {
+            super::views::PARAMETERS => self.show_tab(Tab::Parameters),
+            "log" => self.show_tab(Tab::Log),
+            _ => {
                 self.options.shows_why = false;
                 self.options.large = Some((self.shown_stage(), name));
             }
+        }
+    }
+
+    /// Shows a tab of the inspector.
+    pub fn show_tab(&mut self, tab: Tab) {
+        self.options.tab = tab;
+        self.options.shows_inspector = true;
+    }
+
+    /// Gives all the room to a view; without one to the canvas, or back to all parts of the window.
+    pub fn show_alone(&mut self, view: Option<&'static str>) {
+        self.options.is_alone = view.is_some() || !self.options.is_alone;
+        self.options.alone = view;
+    }
+
+    /// Puts the keyboard into the filter of what is shown.
+    pub(super) fn focus_filter(&mut self) {
+        self.options.wants_filter = true;
+        if self.options.layout == Arrangement::Inspect {
+            self.show_tab(Tab::Parameters);
         }
     }
 
@@ -115,7 +166,15 @@ impl AppState {
         }
     }
 
-    pub(super) fn select_method(&mut self, method: Method) {
+    /// Shows what the nth method came to, counted from 0.
+    pub(super) fn select_nth(&mut self, nth: usize) {
+        if let Some(&method) = self.setup.task.protocol.methods.get(nth) {
+            self.select_method(method);
+        }
+    }
+
+    /// Moves the cursor to the last record of a method.
+    pub fn select_method(&mut self, method: Method) {
         let run = self.run();
         let here = run.span_at(self.cursor()).map(|span| span.part);
         let part = match here {
@@ -123,28 +182,19 @@ impl AppState {
             Some(Part::Fusion(_)) => Part::Fusion(method),
             _ => Part::Reference(method, run.reference_at(self.cursor())),
         };
-        let span = run.span_of(part);
-        match span.and_then(|span| span.records.end.checked_sub(1)) {
-            Some(last) => {
-                let why = self.options.shows_why && self.needs_why(part);
-                self.move_cursor(last);
-                self.options.shows_why = why;
-            }
-            None => {
-                let name = method.name().to_uppercase();
-                self.note(format!("{name} has not begun yet"), false);
-            }
-        }
+        let why = self.options.shows_why && self.needs_why(part);
+        self.show_part(part, why);
     }
 
-    pub(super) fn select_query(&mut self, query: usize) {
+    /// Localises another query.
+    pub fn select_query(&mut self, query: usize) {
         self.setup.go_to(query);
         self.camera = None;
         self.start_run(RunMode::Running);
     }
 
     /// Localises a query and goes to the step that decided what became of one of its results.
-    pub(super) fn open_result(&mut self, query: usize, result: usize) {
+    pub fn open_result(&mut self, query: usize, result: usize) {
         let known = self.results.get(&query).and_then(|known| known.get(result));
         let moment = known.map(deciding);
         self.select_query(query);
@@ -190,7 +240,8 @@ impl AppState {
         }
     }
 
-    pub(super) fn pick_references(&mut self, pick: ReferencePick) {
+    /// Chooses the references in another way.
+    pub fn pick_references(&mut self, pick: ReferencePick) {
         self.stop_queries();
         match pick {
             ReferencePick::ByHand => {
@@ -205,7 +256,8 @@ impl AppState {
         }
     }
 
-    pub(super) fn set_references(&mut self, frames: Vec<usize>) {
+    /// Uses other reference frames.
+    pub fn set_references(&mut self, frames: Vec<usize>) {
         if frames.is_empty() {
             self.note("A query needs at least one reference", true);
             return;
@@ -215,7 +267,43 @@ impl AppState {
         self.start_run(RunMode::Running);
     }
 
-    pub(super) fn degrade(&mut self, degradation: Degradation) {
+    /// Fuses what several references give, in these ways, and runs again.
+    pub fn set_fusions(&mut self, fusions: Vec<Fusion>) {
+        self.setup.task.protocol.fusions = fusions;
+        self.restart_run();
+    }
+
+    /// Changes the uncertainty radius \[m\] and runs again.
+    pub(super) fn set_radius(&mut self, radius_m: f64) {
+        self.setup.task.protocol.radii_m = vec![radius_m];
+        self.setup.go_to(self.setup.query);
+        self.restart_run();
+    }
+
+    /// Changes the seed and runs again.
+    pub fn set_seed(&mut self, seed: u64) {
+        self.setup.set_seed(seed);
+        self.setup.go_to(self.setup.query);
+        self.restart_run();
+    }
+
+    /// Sets a parameter, named `group.name`, and runs again what depends on it.
+    pub fn set_param(&mut self, key: &str, value: &str) {
+        match self.setup.task.params.set(key, value) {
+            Ok(()) if self.setup.task.params != self.run().params => self.restart_run(),
+            Ok(()) => {}
+            Err(error) => self.note(error.to_string(), true),
+        }
+    }
+
+    /// Sets all parameters to their defaults.
+    pub fn reset_params(&mut self) {
+        self.setup.task.params = Params::default();
+        self.restart_run();
+    }
+
+    /// Degrades the photos of queries this way and runs again.
+    pub fn degrade(&mut self, degradation: Degradation) {
         if degradation == self.setup.task.protocol.degrade {
             return;
         }
@@ -225,8 +313,37 @@ impl AppState {
         self.queries = Queries::new(self.ctx.clone());
     }
 
-    /// Keeps the present run as A.
-    pub(super) fn keep(&mut self) {
+    /// Keeps the present run as A, to compare the following ones with.
+    pub(super) fn keep_run(&mut self) {
+        self.keep();
+        self.note("This run is kept as A; change a parameter to compare", false);
+    }
+
+    /// Forgets the run A.
+    pub(super) fn forget_run(&mut self) {
+        self.kept = None;
+        self.options.compare_mode = CompareMode::Present;
+    }
+
+    /// Shows A instead of B, or the other way round.
+    pub(super) fn flip(&mut self) {
+        if self.kept.is_none() {
+            self.note("There is no run A; keep one first (P)", true);
+            return;
+        }
+        self.options.compare_mode = match self.options.compare_mode {
+            CompareMode::Kept => CompareMode::Present,
+            CompareMode::Present => CompareMode::Kept,
+        }
+    }
+
+    /// Keeps all results that are known as A, to compare those that follow with.
+    pub(super) fn keep_results(&mut self) {
+        self.set_results_before(Some(self.results.clone()));
+        self.note("These results are kept as A; change a setting and run all again", false);
+    }
+
+    fn keep(&mut self) {
         self.kept = Some(KeptRun {
             run: self.run().clone(),
             cursor: self.cursor(),
@@ -235,7 +352,7 @@ impl AppState {
     }
 
     /// Localises with what helped; the run in which it was missing is A.
-    pub(super) fn try_again(&mut self, args: &[String]) {
+    pub fn try_again(&mut self, args: &[String]) {
         let mut setup = self.setup.clone();
         if let Err(why) = setup.change(args) {
             self.note(why, true);
@@ -247,7 +364,8 @@ impl AppState {
         self.note(format!("Localised with {}; X shows the run before", args.join(" ")), false);
     }
 
-    pub(super) fn set_breakpoints(&mut self, texts: Vec<String>) {
+    /// Replaces the breakpoints.
+    pub fn set_breakpoints(&mut self, texts: Vec<String>) {
         let parsed: Result<Vec<Breakpoint>, _> = texts.iter().map(|text| text.parse()).collect();
         match parsed {
             Ok(breakpoints) => {
@@ -258,7 +376,16 @@ impl AppState {
         }
     }
 
-    pub(super) fn jump_camera(&mut self, target: NamedPose) {
+    /// Moves the camera in hand, in its own frame.
+    pub(super) fn move_camera(&mut self, nudge: Nudge) {
+        match self.camera.or_else(|| self.named_pose(NamedPose::Start)) {
+            Some(pose) => self.camera = Some(nudge.apply(&pose)),
+            None => self.note("There is no camera before the query is loaded", true),
+        }
+    }
+
+    /// Takes the camera to a place of the search.
+    pub fn jump_camera(&mut self, target: NamedPose) {
         let Some(pose) = self.named_pose(target) else {
             let name = target.name().to_lowercase();
             self.note(format!("There is no pose for {name} here"), false);

@@ -14,7 +14,6 @@ pub(super) mod verdicts;
 
 use std::collections::BTreeMap;
 
-use eframe::egui_wgpu::RenderState;
 use egui::Ui;
 
 use super::command::Queue;
@@ -32,10 +31,10 @@ pub(super) struct Panes {
 }
 
 impl Panes {
-    pub(super) fn new(render_state: Option<&RenderState>) -> Self {
+    pub(super) fn new() -> Self {
         let views = views::ALL.iter();
         Self {
-            views: views.map(|entry| (entry.name, (entry.new)(render_state))).collect(),
+            views: views.map(|entry| (entry.name, (entry.new)())).collect(),
             swapped: None,
             proof_of: None,
         }
@@ -47,10 +46,7 @@ impl Panes {
             ui.weak(format!("There is no view `{name}`"));
             return;
         };
-        let context = match ViewContext::kept(state, commands) {
-            Some(kept) if state.is_showing_kept() => kept,
-            _ => ViewContext::present(state, commands),
-        };
+        let context = ViewContext::new(state, commands);
         ui.push_id(name.to_owned(), |ui| view.ui(ui, &context));
     }
 }

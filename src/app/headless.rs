@@ -36,11 +36,6 @@ impl Painter {
         Ok(Self { state, size_px })
     }
 
-    /// What views that draw on the card themselves need.
-    pub(super) fn render_state(&self) -> &RenderState {
-        &self.state
-    }
-
     /// The greatest side of a texture \[px\].
     pub(super) fn max_side(&self) -> usize {
         self.state.device.limits().max_texture_dimension_2d as usize

@@ -2,7 +2,8 @@
 
 use egui::{Align, Button, Layout, RichText, Ui};
 
-use super::command::{Command, Queue};
+use super::action;
+use super::command::Queue;
 use super::frame::storyboard::part_name;
 use super::state::AppState;
 use super::theme;
@@ -47,18 +48,16 @@ pub(super) fn ui(ui: &mut Ui, state: &AppState, commands: &Queue) {
             ui.add(egui::Label::new(RichText::new(first).size(LARGE).color(color)).wrap());
             ui.add(egui::Label::new(RichText::new(second).size(SMALL).weak()).truncate());
         });
-        let button = |ui: &mut Ui, text: &str, help: &str, command: Command| {
-            let button = ui.add_sized([52.0, 34.0], Button::new(text)).on_hover_text(help);
-            if button.clicked() {
-                commands.send(command);
-            }
+        let texts = match state.options.lockstep {
+            Some(_) => ["All methods one step back", "All methods one step on"],
+            None => ["Previous stage", "Next stage"],
         };
-        if state.options.lockstep.is_some() {
-            button(ui, "◀", "All methods one step back (,)", Command::GoTogether(-1));
-            button(ui, "▶", "All methods one step on (.)", Command::GoTogether(1));
-        } else {
-            button(ui, "◀", "Previous stage (↑)", Command::NextStage { back: true });
-            button(ui, "▶", "Next stage (↓)", Command::NextStage { back: false });
+        for (name, action) in ["◀", "▶"].into_iter().zip(texts.into_iter().filter_map(action::of))
+        {
+            let button = ui.add_sized([52.0, 34.0], Button::new(name));
+            if button.on_hover_text(action.tooltip(ui.ctx())).clicked() {
+                commands.send(action.run);
+            }
         }
     });
 }

@@ -6,7 +6,9 @@ use std::sync::Arc;
 use egui::{Key, Modifiers, ProgressBar, RichText, ScrollArea, Ui};
 use egui_commonmark::{CommonMarkCache, CommonMarkViewer};
 
-use super::command::{Command, Queue};
+use super::App;
+use super::action;
+use super::command::Queue;
 use super::setup::Setup;
 use super::state::AppState;
 use super::theme;
@@ -145,13 +147,13 @@ impl OpenLesson {
             Answer::Choice { choices, .. } => {
                 for (choice, key) in DIGITS.into_iter().take(choices.len()).enumerate() {
                     if taken(key) {
-                        commands.send(Command::Answer(choice));
+                        commands.send(move |app| app.answer(choice));
                     }
                 }
             }
             Answer::Place(_) => {
                 if taken(Key::Enter) {
-                    commands.send(Command::Guess);
+                    commands.send(App::guess);
                 }
             }
         }
@@ -168,21 +170,18 @@ impl OpenLesson {
                 .on_hover_text("Back to the window as it is without a lesson");
             let close = close.accessible_name("Close the lesson");
             if close.clicked() {
-                commands.send(Command::CloseLesson);
+                commands.send(App::close_lesson);
             }
         });
         let progress = ProgressBar::new(number as f32 / pages as f32).desired_height(6.0);
         ui.add(progress);
         ui.horizontal(|ui| {
-            let back = ui.add_enabled(number > 1, egui::Button::new("◀ Back"));
-            if back.on_hover_text("The page before (PageUp)").clicked() {
-                commands.send(Command::TurnPage { back: true });
-            }
+            let turn = |ui: &mut Ui, is_on: bool, name: &str, text: &str| {
+                ui.add_enabled_ui(is_on, |ui| action::button(ui, state, commands, name, text));
+            };
+            turn(ui, number > 1, "◀ Back", "Previous page");
             ui.label(format!("page {number} of {pages}"));
-            let next = ui.add_enabled(number < pages, egui::Button::new("Next ▶"));
-            if next.on_hover_text("The next page (PageDown)").clicked() {
-                commands.send(Command::TurnPage { back: false });
-            }
+            turn(ui, number < pages, "Next ▶", "Next page");
             if matches!(state.run_state(), RunState::Loading | RunState::Running) {
                 ui.spinner();
             }
@@ -232,7 +231,7 @@ fn asked_ui(
                     let size = [ui.available_width(), 0.0];
                     let button = egui::Button::new(text).wrap().min_size(size.into());
                     if ui.add(button).clicked() {
-                        commands.send(Command::Answer(index));
+                        commands.send(move |app| app.answer(index));
                     }
                     continue;
                 };
@@ -254,7 +253,7 @@ fn asked_ui(
             ui.label(words.unwrap_or_else(|| "Nothing is chosen yet".to_owned()));
             let button = ui.add_enabled(is_placed, egui::Button::new("This is my guess (Enter)"));
             if button.clicked() {
-                commands.send(Command::Guess);
+                commands.send(App::guess);
             }
         }
         (Answer::Place(method), Some(Given::Place(guess))) => {

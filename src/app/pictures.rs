@@ -1,17 +1,17 @@
-//! Pictures of synthetic views for the window: residuals, weights, contributions and coverage.
+//! Pictures of synthetic views for the window: residuals, weights and contributions.
 
-use image::{GrayImage, Rgb, RgbImage};
+use image::{GrayImage, RgbImage};
 
 use crate::cost::{IntensityPair, JointHistogram, PhotometricWeights};
 use crate::palette;
 use crate::picture::{Painter, RESIDUAL_RANGE, WEIGHT_GRAYS, in_gray};
-use crate::render::{SplattedPixel, SyntheticView};
+use crate::render::SyntheticView;
 
 /// The range of contributions to mutual information with distinct colours \[nat\].
 const CONTRIBUTION_RANGE: f64 = 2.0;
 
 /// The range of differences that 98 % of the pixels are within. A power of two, so similar views have the same range.
-pub(in crate::app) fn residual_range(pairs: &[IntensityPair]) -> f64 {
+pub(crate) fn residual_range(pairs: &[IntensityPair]) -> f64 {
     const BEYOND: f64 = 0.02;
     let differences = pairs.iter().map(|pair| (pair.query - pair.synthetic).abs());
     let mut differences: Vec<f32> = differences.collect();
@@ -27,7 +27,7 @@ pub(in crate::app) fn residual_range(pairs: &[IntensityPair]) -> f64 {
 
 /// Query minus synthetic view, coloured over ±`range` grey values: blue where the query is darker, orange where it is
 /// brighter.
-pub(in crate::app) fn residual_within(
+pub(crate) fn residual_within(
     view: &SyntheticView,
     pairs: &[IntensityPair],
     range: f64,
@@ -38,14 +38,14 @@ pub(in crate::app) fn residual_within(
 }
 
 /// The pixels that the photometric cost counted (white) and ignored (grey).
-pub(in crate::app) fn weights(view: &SyntheticView, weights: &PhotometricWeights) -> GrayImage {
+pub(crate) fn weights(view: &SyntheticView, weights: &PhotometricWeights) -> GrayImage {
     let values = weights.counted.iter().map(|&counted| WEIGHT_GRAYS[usize::from(counted)]);
     in_gray(view, Painter::new(view).paint(0, values))
 }
 
 /// The contribution of each pixel to mutual information, −2 … 2 nat: orange if its pair of grey values is more
 /// frequent than by chance, blue if it is rarer.
-pub(in crate::app) fn contributions(
+pub(crate) fn contributions(
     view: &SyntheticView,
     pairs: &[IntensityPair],
     histogram: &JointHistogram,
@@ -58,33 +58,6 @@ pub(in crate::app) fn contributions(
     in_color(view, Painter::new(view).paint(palette::NOTHING, values))
 }
 
-/// The covered pixels coloured by depth over the darkened query. Their uncovered neighbours get a shade of the
-/// colour, so the few pixels are visible in a small picture.
-pub(in crate::app) fn coverage(query: &GrayImage, view: &SyntheticView) -> RgbImage {
-    let color = |pixel: &SplattedPixel| palette::depth(f64::from(pixel.depth));
-    let place = |pixel: &SplattedPixel| (pixel.index % view.width, pixel.index / view.width);
-    let ground = |x: u32, y: u32| query.get_pixel(x, y).0[0] / 3;
-    let (width, height) = query.dimensions();
-    let mut picture = RgbImage::from_fn(width, height, |x, y| Rgb([ground(x, y); 3]));
-    for pixel in &view.pixels {
-        let (x, y) = place(pixel);
-        for row in y.saturating_sub(1)..(y + 2).min(height) {
-            for column in x.saturating_sub(1)..(x + 2).min(width) {
-                let below = ground(column, row);
-                let shade = color(pixel).map(|value| value / 2 + below / 2);
-                picture.put_pixel(column, row, Rgb(shade));
-            }
-        }
-    }
-    for pixel in &view.pixels {
-        let (x, y) = place(pixel);
-        if let Some(here) = picture.get_pixel_mut_checked(x, y) {
-            *here = Rgb(color(pixel));
-        }
-    }
-    picture
-}
-
 fn in_color(view: &SyntheticView, colors: Vec<palette::Rgb>) -> RgbImage {
     let values = colors.into_flattened();
     RgbImage::from_raw(view.width, view.height, values).expect("a colour for each pixel")
@@ -92,9 +65,8 @@ fn in_color(view: &SyntheticView, colors: Vec<palette::Rgb>) -> RgbImage {
 
 #[cfg(test)]
 mod tests {
-    use image::Luma;
-
     use super::*;
+    use crate::render::SplattedPixel;
 
     #[test]
     fn residuals_have_colours_up_to_the_range_that_they_have() {
@@ -116,20 +88,6 @@ mod tests {
         let pixels =
             indices.iter().map(|&index| SplattedPixel { index, depth: 10.0, intensity: 50.0 });
         SyntheticView { width, height, pixels: pixels.collect() }
-    }
-
-    #[test]
-    fn coverage_marks_the_covered_pixels_and_shades_their_neighbours() {
-        let query = GrayImage::from_pixel(6, 2, Luma([90]));
-        let picture = coverage(&query, &view(6, 2, &[6, 7]));
-        let color = palette::depth(10.0);
-        let is = |wanted: [u8; 3]| picture.pixels().filter(|p| p.0 == wanted).count();
-        assert_eq!(picture.get_pixel(0, 1).0, color);
-        assert_eq!(picture.get_pixel(1, 1).0, color);
-        let shade = color.map(|value| value / 2 + 15);
-        assert_eq!([is(color), is(shade), is([30; 3])], [2, 4, 6]);
-        // A view of another size than the query marks what both have.
-        assert_eq!(coverage(&query, &view(100, 1, &[99])).dimensions(), (6, 2));
     }
 
     #[test]

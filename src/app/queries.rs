@@ -1,16 +1,15 @@
 //! What is known about the queries beside the one at work: thumbnails, and whether they fail.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::cell::RefCell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{self, Receiver, Sender};
-use std::sync::{Arc, Mutex, PoisonError};
-use std::thread;
 
 use egui::{ColorImage, TextureHandle, TextureOptions};
 
 use super::setup::Setup;
 use super::textures::color_image;
+use super::worker::{Answers, Worker};
 use crate::event::{KindSet, Side};
 use crate::localize::{LocalizeObserver, QueryResult};
 use crate::picture;
@@ -24,37 +23,31 @@ const THUMBNAIL_WIDTH: u32 = 124;
 /// The results of a query, or why it could not be run.
 pub(super) type BatchOutcome = (usize, Result<Vec<QueryResult>, String>);
 
+/// Of the queries' and the references' frames; `None` for a photo that cannot be read.
+type Thumbnails = Answers<(Side, usize), Arc<dyn Scene>, Option<TextureHandle>>;
+
 /// Thumbnails and results that are made beside the window's thread.
 pub struct Queries {
-    ctx: egui::Context,
-    thumbnails: BTreeMap<(Side, usize), Option<TextureHandle>>,
-    wanted: Arc<Mutex<BTreeSet<(Side, usize)>>>,
-    pictures: (Sender<PainterMessage>, Receiver<PainterMessage>),
-    painter_is_busy: bool,
+    thumbnails: RefCell<Thumbnails>,
+    worker: Worker<(Setup, UntilStopped), BatchOutcome>,
     batch: Option<Batch>,
 }
 
-enum PainterMessage {
-    Thumbnail((Side, usize), Option<ColorImage>),
-    Idle,
-}
-
-/// All queries at work, one after the other. Nobody joins the worker: it ends soon after the batch is
-/// dropped.
+/// All queries at work, one after the other.
 struct Batch {
-    outcomes: Receiver<BatchOutcome>,
-    stop: Arc<AtomicBool>,
+    stop: UntilStopped,
     done: usize,
     all: usize,
 }
 
 impl Drop for Batch {
     fn drop(&mut self) {
-        self.stop.store(true, Ordering::Release);
+        self.stop.0.store(true, Ordering::Release);
     }
 }
 
 /// Wants to hear nothing. Whoever raises the flag wants the run to stop.
+#[derive(Clone, Default)]
 struct UntilStopped(Arc<AtomicBool>);
 
 impl Sink for UntilStopped {
@@ -79,33 +72,36 @@ impl LocalizeObserver for UntilStopped {
 
 impl Queries {
     pub(super) fn new(ctx: egui::Context) -> Self {
-        Self {
-            ctx,
-            thumbnails: BTreeMap::new(),
-            wanted: Arc::default(),
-            pictures: mpsc::channel(),
-            painter_is_busy: false,
-            batch: None,
-        }
+        let painter = ctx.clone();
+        let thumbnails =
+            Answers::new("thumbnails", ctx.clone(), move |of: &_, scene: Arc<dyn Scene>| {
+                let image = thumbnail(&*scene, *of)?;
+                Some(painter.load_texture(
+                    format!("thumbnail {of:?}"),
+                    image,
+                    TextureOptions::LINEAR,
+                ))
+            });
+        let worker = Worker::in_parts("queries", ctx, localize_all);
+        Self { thumbnails: RefCell::new(thumbnails), worker, batch: None }
     }
 
-    /// The thumbnail of a frame of the queries' or the references' scene, once it is made. Asking for
-    /// it has it made.
-    pub fn thumbnail(&self, side: Side, frame: usize) -> Option<&TextureHandle> {
-        match self.thumbnails.get(&(side, frame)) {
-            Some(thumbnail) => thumbnail.as_ref(),
-            None => {
-                let mut wanted = self.wanted.lock().unwrap_or_else(PoisonError::into_inner);
-                wanted.insert((side, frame));
-                None
-            }
-        }
+    /// The thumbnail of a frame of the queries' or the references' scene, once it is made. With a setup, asking for it
+    /// has it made.
+    pub(super) fn thumbnail(
+        &self,
+        side: Side,
+        frame: usize,
+        setup: Option<&Setup>,
+    ) -> Option<TextureHandle> {
+        let mut thumbnails = self.thumbnails.borrow_mut();
+        thumbnails.ask((side, frame), || Some(Arc::clone(setup?.scene(side))));
+        thumbnails.get(&(side, frame))?.clone()
     }
 
     /// Whether thumbnails that were asked for are still to come.
     pub fn is_painting(&self) -> bool {
-        let wanted = self.wanted.lock().unwrap_or_else(PoisonError::into_inner);
-        self.painter_is_busy || !wanted.is_empty()
+        self.thumbnails.borrow().is_busy()
     }
 
     /// How far the run over all queries is: done, and all.
@@ -115,6 +111,7 @@ impl Queries {
 
     /// Stops running all queries. Whether that was going on.
     pub(super) fn stop_all(&mut self) -> bool {
+        self.worker.forget();
         self.batch.take().is_some()
     }
 
@@ -123,113 +120,57 @@ impl Queries {
         if self.stop_all() {
             return;
         }
-        let (outbox, outcomes) = mpsc::channel();
-        let stop = Arc::new(AtomicBool::new(false));
-        let (setup, flag, ctx) = (setup.clone(), Arc::clone(&stop), self.ctx.clone());
-        let all = setup.offered.len();
-        let started = thread::Builder::new().name("queries".to_owned()).spawn(move || {
-            let frames = Arc::default();
-            for &query in &setup.offered {
-                let localized =
-                    catch_unwind(AssertUnwindSafe(|| localize(&setup, query, &frames, &flag)));
-                let outcome = match localized {
-                    Ok(Ok(results)) => Ok(results),
-                    Ok(Err(error)) if error.is_cancelled() => break,
-                    Ok(Err(error)) => Err(error.to_string()),
-                    Err(_) => {
-                        let name = &setup.queries.frames()[query];
-                        Err(format!("internal error at query {name}"))
-                    }
-                };
-                if outbox.send((query, outcome)).is_err() {
-                    break;
-                }
-                ctx.request_repaint();
-            }
-        });
-        if started.is_ok() {
-            self.batch = Some(Batch { outcomes, stop, done: 0, all });
-        }
+        let stop = UntilStopped::default();
+        self.worker.ask((setup.clone(), stop.clone()));
+        self.batch = Some(Batch { stop, done: 0, all: setup.offered.len() });
     }
 
-    /// Takes in what was made; has what is wanted made.
+    /// Takes in what was made.
     pub(super) fn poll(&mut self) -> Vec<BatchOutcome> {
-        while let Ok(picture) = self.pictures.1.try_recv() {
-            match picture {
-                PainterMessage::Thumbnail(frame, image) => {
-                    let texture = image.map(|image| {
-                        let name = format!("thumbnail {frame:?}");
-                        self.ctx.load_texture(name, image, TextureOptions::LINEAR)
-                    });
-                    self.thumbnails.insert(frame, texture);
-                }
-                PainterMessage::Idle => self.painter_is_busy = false,
-            }
+        self.thumbnails.get_mut().poll();
+        let outcomes: Vec<BatchOutcome> = self.worker.poll().into_iter().flatten().collect();
+        if let Some(batch) = &mut self.batch {
+            batch.done += outcomes.len();
         }
-        let Some(batch) = &mut self.batch else {
-            return Vec::new();
-        };
-        let outcomes: Vec<BatchOutcome> = batch.outcomes.try_iter().collect();
-        batch.done += outcomes.len();
-        if batch.done == batch.all {
+        if !self.worker.is_busy() {
             self.batch = None;
         }
         outcomes
     }
-
-    /// Has the wanted thumbnails made.
-    pub(super) fn paint_thumbnails(&mut self, setup: &Setup) {
-        if self.painter_is_busy || !self.is_painting() {
-            return;
-        }
-        let (queries, references) = (Arc::clone(&setup.queries), Arc::clone(&setup.references));
-        let wanted = Arc::clone(&self.wanted);
-        let (outbox, ctx) = (self.pictures.0.clone(), self.ctx.clone());
-        let started = thread::Builder::new().name("thumbnails".to_owned()).spawn(move || {
-            loop {
-                let next = wanted.lock().unwrap_or_else(PoisonError::into_inner).pop_first();
-                let Some((side, frame)) = next else { break };
-                let scene = match side {
-                    Side::Query => queries.as_ref(),
-                    Side::Reference => references.as_ref(),
-                };
-                let image = catch_unwind(AssertUnwindSafe(|| thumbnail(scene, frame)));
-                let picture = PainterMessage::Thumbnail((side, frame), image.ok().flatten());
-                let told = outbox.send(picture);
-                if told.is_err() {
-                    return;
-                }
-                ctx.request_repaint();
-            }
-            let _ = outbox.send(PainterMessage::Idle);
-            ctx.request_repaint();
-        });
-        self.painter_is_busy = started.is_ok();
-    }
 }
 
-impl Drop for Queries {
-    fn drop(&mut self) {
-        self.wanted.lock().unwrap_or_else(PoisonError::into_inner).clear();
-    }
-}
-
-fn thumbnail(scene: &dyn Scene, frame: usize) -> Option<ColorImage> {
+fn thumbnail(scene: &dyn Scene, (_, frame): (Side, usize)) -> Option<ColorImage> {
     let photo = scene.photo(frame).ok()?;
     let (width, height) = photo.dimensions();
     let small = picture::photo(&photo).thumbnail(THUMBNAIL_WIDTH, height * THUMBNAIL_WIDTH / width);
     Some(color_image(&small))
 }
 
+/// Localises all queries of a setup; one with a fault of ours is told like one that cannot be read.
+fn localize_all((setup, stop): (Setup, UntilStopped), emit: &mut dyn FnMut(BatchOutcome) -> bool) {
+    let frames = Arc::default();
+    for &query in &setup.offered {
+        let localized = catch_unwind(AssertUnwindSafe(|| localize(&setup, query, &frames, &stop)));
+        let outcome = match localized {
+            Ok(Ok(results)) => Ok(results),
+            Ok(Err(error)) if error.is_cancelled() => break,
+            Ok(Err(error)) => Err(error.to_string()),
+            Err(_) => Err(format!("internal error at query {}", setup.queries.frames()[query])),
+        };
+        if !emit((query, outcome)) {
+            break;
+        }
+    }
+}
+
 fn localize(
     setup: &Setup,
     query: usize,
     frames: &Arc<FrameStore>,
-    stop: &Arc<AtomicBool>,
+    stop: &UntilStopped,
 ) -> Result<Vec<QueryResult>, JobError> {
     let mut setup = setup.clone();
     setup.go_to(query);
     setup.leave_itself_out();
-    let mut observer = UntilStopped(Arc::clone(stop));
-    setup.job(frames).work(0, &mut observer, |_| {})
+    setup.job(frames).work(0, &mut stop.clone(), |_| {})
 }

@@ -3,14 +3,41 @@
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use super::command::{Command, Queue};
-use super::save_target::SaveTarget;
+use super::command::Queue;
 use super::setup::Setup;
 use super::state::AppState;
 use crate::localize::LocalizeObserver as _;
 use crate::session::Part;
 use crate::sink::rerun::{Identity, RecordError, Recorder, Targets};
 use crate::trace::Sink as _;
+
+/// Something that leaves the window for a file, or comes from one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SaveTarget {
+    /// All that was reported so far, for the Rerun viewer.
+    Recording,
+    /// The whole window, as PNG.
+    Picture,
+    /// The canvas, as PNG.
+    Canvas,
+    /// Scene, query, settings and layout.
+    Session,
+    /// Back from such a file.
+    Restored,
+}
+
+impl SaveTarget {
+    /// What is asked, as the title of the question.
+    fn title(self) -> &'static str {
+        match self {
+            Self::Recording => "Save the recording",
+            Self::Picture => "Save the window as a picture",
+            Self::Canvas => "Save the canvas as a picture",
+            Self::Session => "Save the session",
+            Self::Restored => "Restore a session",
+        }
+    }
+}
 
 /// The file that is offered: what is looked at gives its name.
 fn offered(target: SaveTarget, setup: &Setup) -> PathBuf {
@@ -22,17 +49,6 @@ fn offered(target: SaveTarget, setup: &Setup) -> PathBuf {
         SaveTarget::Session | SaveTarget::Restored => "session.json".to_owned(),
     };
     setup.folder.join(file)
-}
-
-fn command(target: SaveTarget, path: PathBuf) -> Command {
-    match target {
-        SaveTarget::Recording => Command::SaveRecording(path),
-        SaveTarget::Picture | SaveTarget::Canvas => {
-            Command::SavePicture { of_canvas: target == SaveTarget::Canvas, path }
-        }
-        SaveTarget::Session => Command::SaveSession(path),
-        SaveTarget::Restored => Command::RestoreSession(path),
-    }
 }
 
 /// Scene, query and references, as a file is called.
@@ -88,7 +104,8 @@ impl Asking {
                 };
                 let button = ui.add_enabled(is_named, egui::Button::new(does));
                 if button.on_hover_text("Enter").clicked() || (enter && is_named) {
-                    commands.send(command(self.target, self.path.trim().into()));
+                    let (target, path) = (self.target, self.path.trim().into());
+                    commands.send(move |app| app.save(target, path));
                     is_over = true;
                 }
                 let cancel = ui.button("Cancel").on_hover_text("Escape");
@@ -101,7 +118,7 @@ impl Asking {
 
 impl AppState {
     /// Tells the run to a recording, from the history: nothing is computed anew.
-    pub(super) fn record(&self, targets: &Targets) -> Result<(), RecordError> {
+    fn record(&self, targets: &Targets) -> Result<(), RecordError> {
         let run = self.run();
         let Some(loaded) = run.loaded.as_deref() else {
             return Ok(());
@@ -138,8 +155,28 @@ impl AppState {
         recorder.close()
     }
 
+    pub(super) fn save_recording(&mut self, path: PathBuf) {
+        let done = format!("Recording: {}", path.display());
+        self.record_to(&Targets { save: Some(path), ..Targets::default() }, done);
+    }
+
+    pub(super) fn stream_recording(&mut self) {
+        let targets = Targets { connect: Some(String::new()), ..Targets::default() };
+        self.record_to(&targets, "The run was sent to the Rerun viewer".to_owned());
+    }
+
+    pub(super) fn spawn_viewer(&mut self) {
+        let targets = Targets { spawn: true, ..Targets::default() };
+        self.record_to(&targets, "A Rerun viewer shows the run".to_owned());
+    }
+
+    pub(super) fn copy_command_line(&mut self) {
+        self.ctx.copy_text(self.setup.command_line());
+        self.note("The command line is on the clipboard", false);
+    }
+
     /// Records the run, and says how that went.
-    pub(super) fn record_to(&mut self, targets: &Targets, done: String) {
+    fn record_to(&mut self, targets: &Targets, done: String) {
         if let Some(folder) = targets.save.as_deref().and_then(Path::parent)
             && let Err(error) = std::fs::create_dir_all(folder)
         {
@@ -153,52 +190,41 @@ impl AppState {
     }
 }
 
-/// A picture that was asked for and is not there yet.
+/// What to say of pictures that were asked for and have been written.
 #[derive(Clone, Default)]
-pub(super) struct Pictures(Arc<Mutex<Vec<Picture>>>);
-
-struct Picture {
-    path: PathBuf,
-    /// The part of the window \[points\], and pixels per point; `None` for all of it.
-    part: Option<(egui::Rect, f32)>,
-    image: Arc<egui::ColorImage>,
-}
+pub(super) struct Pictures(Arc<Mutex<Vec<Result<String, String>>>>);
 
 impl Pictures {
-    /// Asks the window for its pixels.
+    /// Asks the window for its pixels, or for those of a part \[points\], and writes them.
     pub(super) fn ask(&self, ctx: &egui::Context, path: PathBuf, part: Option<egui::Rect>) {
         let part = part.map(|rect| (rect, ctx.pixels_per_point()));
-        let (pictures, waker) = (Arc::clone(&self.0), ctx.clone());
+        let (written, waker) = (Arc::clone(&self.0), ctx.clone());
         ctx.request_screenshot(move |image| {
-            let mut pictures = pictures.lock().unwrap_or_else(PoisonError::into_inner);
-            pictures.push(Picture { path, part, image });
+            let image = match part {
+                Some((rect, pixels_per_point)) => image.region(&rect, Some(pixels_per_point)),
+                None => egui::ColorImage::clone(&image),
+            };
+            let said = write(&image, &path).map_err(|why| format!("{}: {why}", path.display()));
+            let said = said.map(|()| format!("Picture: {}", path.display()));
+            written.lock().unwrap_or_else(PoisonError::into_inner).push(said);
             waker.request_repaint();
         });
         ctx.request_repaint();
     }
 
-    /// Writes what has come. What to say of each.
-    pub(super) fn write(&self) -> Vec<Result<String, String>> {
-        let taken = std::mem::take(&mut *self.0.lock().unwrap_or_else(PoisonError::into_inner));
-        taken.iter().map(Picture::write).collect()
+    /// What to say of those that were written since the last call.
+    pub(super) fn take(&self) -> Vec<Result<String, String>> {
+        std::mem::take(&mut *self.0.lock().unwrap_or_else(PoisonError::into_inner))
     }
 }
 
-impl Picture {
-    fn write(&self) -> Result<String, String> {
-        let image = match self.part {
-            Some((rect, pixels_per_point)) => self.image.region(&rect, Some(pixels_per_point)),
-            None => egui::ColorImage::clone(&self.image),
-        };
-        let [width, height] = image.size.map(|side| side as u32);
-        let bytes: Vec<u8> = image.pixels.iter().flat_map(|p| [p.r(), p.g(), p.b()]).collect();
-        let picture = image::RgbImage::from_raw(width, height, bytes)
-            .ok_or_else(|| "the window gave no picture".to_owned())?;
-        let said = |error: &dyn std::fmt::Display| format!("{}: {error}", self.path.display());
-        if let Some(folder) = self.path.parent() {
-            std::fs::create_dir_all(folder).map_err(|error| said(&error))?;
-        }
-        picture.save(&self.path).map_err(|error| said(&error))?;
-        Ok(format!("Picture: {}", self.path.display()))
+fn write(image: &egui::ColorImage, path: &Path) -> Result<(), Box<dyn std::error::Error>> {
+    let [width, height] = image.size.map(|side| side as u32);
+    let bytes: Vec<u8> = image.pixels.iter().flat_map(|p| [p.r(), p.g(), p.b()]).collect();
+    let picture = image::RgbImage::from_raw(width, height, bytes);
+    if let Some(folder) = path.parent() {
+        std::fs::create_dir_all(folder)?;
     }
+    picture.ok_or("the window gave no picture")?.save(path)?;
+    Ok(())
 }

@@ -4,13 +4,14 @@
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use super::worker::Worker;
+use super::worker::{Answers, Worker};
 use crate::estimator;
 use crate::geometry::Pose;
 use crate::grid::{DenseSurface, LatticeTooLarge};
 use crate::method::Method;
 use crate::params::Params;
 use crate::problem::Problem;
+use crate::proof::between;
 use crate::render::{Comparison, Score};
 
 /// The direct methods at one pose.
@@ -25,7 +26,7 @@ pub struct Probe {
 struct ProbeRequest {
     problem: Problem,
     methods: Vec<Method>,
-    params: Arc<Params>,
+    params: Params,
     pose: Pose,
 }
 
@@ -50,7 +51,7 @@ impl Prober {
         &mut self,
         problem: &Problem,
         methods: &[Method],
-        params: &Arc<Params>,
+        params: &Params,
         pose: Pose,
     ) {
         if self.asked == Some(pose) {
@@ -61,7 +62,7 @@ impl Prober {
         self.worker.ask(ProbeRequest {
             problem: problem.clone(),
             methods: methods.to_vec(),
-            params: Arc::clone(params),
+            params: params.clone(),
             pose,
         });
     }
@@ -134,19 +135,7 @@ impl CostLine {
 
     /// The pose at a share of the way; below 0 and above 1 it goes on in the same direction.
     pub fn pose(&self, share: f64) -> Pose {
-        /// Below this sine of the angle between two rotations they are taken for equal.
-        const PARALLEL: f64 = 1e-12;
-        // To the last bit, so that the costs there are those of the poses themselves.
-        if share == 0.0 {
-            return self.from;
-        }
-        if share == 1.0 {
-            return self.to;
-        }
-        let (from, to) = (&self.from, &self.to);
-        let translation = from.translation.vector.lerp(&to.translation.vector, share);
-        let rotation = from.rotation.try_slerp(&to.rotation, share, PARALLEL);
-        Pose::from_parts(translation.into(), rotation.unwrap_or(from.rotation))
+        between(&self.from, &self.to, share)
     }
 
     /// Its length \[m\].
@@ -166,81 +155,25 @@ impl CostLine {
 pub struct CostAlong {
     /// The line.
     pub line: CostLine,
-    /// Shares of the way, rising, with the score of each pose; empty until they are computed.
+    /// Shares of the way, rising, with the score of each pose.
     pub scores: Vec<(f64, Option<Score>)>,
 }
 
-impl CostAlong {
-    /// Whether the costs are computed.
-    pub fn is_complete(&self) -> bool {
-        !self.scores.is_empty()
-    }
-}
+/// The costs along lines: of each method the one that was asked for last.
+pub(super) type Lines = Answers<CostLine, (Problem, Params), CostAlong>;
 
-/// Scores the poses of lines: of each method the one that was asked for last.
-pub(super) struct LineTracer {
-    worker: Worker<(Problem, Arc<Params>, CostLine), CostAlong>,
-    along: Vec<CostAlong>,
-}
-
-impl LineTracer {
-    pub(super) fn new(ctx: egui::Context) -> Self {
-        let worker = Worker::new(
-            "cost line",
-            ctx,
-            |(problem, params, line): (Problem, Arc<Params>, CostLine)| {
-                let poses: Vec<Pose> = CostLine::shares()
-                    .map(|share| problem.reference_from_query(&line.pose(share)))
-                    .collect();
-                let estimator = estimator::entry(line.method).make(&params);
-                let scorer = estimator.scorer(&problem);
-                let scores = scorer.map_or_else(Vec::new, |scorer| scorer.score(&poses));
-                CostAlong {
-                    line,
-                    scores: CostLine::shares().zip(scores.into_iter().map(Some)).collect(),
-                }
-            },
-        );
-        Self { worker, along: Vec::new() }
-    }
-
-    /// Asks for the cost along a line, unless it is known or asked for.
-    pub(super) fn ask(&mut self, problem: &Problem, params: &Arc<Params>, line: CostLine) {
-        if self.along.iter().any(|along| along.line == line) {
-            return;
-        }
-        self.along.retain(|along| along.line.method != line.method);
-        self.along.push(CostAlong { line, scores: Vec::new() });
-        self.worker.ask((problem.clone(), Arc::clone(params), line));
-    }
-
-    /// Forgets all lines: the problem or the parameters have changed.
-    pub(super) fn forget(&mut self) {
-        self.worker.forget();
-        self.along.clear();
-    }
-
-    /// Takes in answers. An error is a fault of ours.
-    pub(super) fn poll(&mut self) -> Result<(), String> {
-        for answer in self.worker.poll() {
-            let answer = answer.ok_or("the cost between two poses could not be computed")?;
-            // Another line may be wanted by now.
-            if let Some(along) = self.along.iter_mut().find(|along| along.line == answer.line) {
-                *along = answer;
-            }
-        }
-        Ok(())
-    }
-
-    /// The line of a method that was asked for last.
-    pub(super) fn along(&self, method: Method) -> Option<&CostAlong> {
-        self.along.iter().find(|along| along.line.method == method)
-    }
-
-    /// Whether more is to come.
-    pub(super) fn is_busy(&self) -> bool {
-        self.worker.is_busy()
-    }
+/// Starts the thread that scores the poses of lines.
+pub(super) fn lines(ctx: egui::Context) -> Lines {
+    Answers::new("cost line", ctx, |line: &CostLine, question: (Problem, Params)| {
+        let (problem, params) = question;
+        let pose = |share| problem.reference_from_query(&line.pose(share));
+        let poses: Vec<Pose> = CostLine::shares().map(pose).collect();
+        let estimator = estimator::entry(line.method).make(&params);
+        let scorer = estimator.scorer(&problem);
+        let scores = scorer.map_or_else(Vec::new, |scorer| scorer.score(&poses));
+        let scores = CostLine::shares().zip(scores.into_iter().map(Some)).collect();
+        CostAlong { line: *line, scores }
+    })
 }
 
 /// Which dense map is wanted.
@@ -250,10 +183,6 @@ pub struct DenseAsk {
     pub method: Method,
     /// The reference, by its position among those of the run.
     pub reference: usize,
-    /// Distance of neighbouring positions \[m\].
-    pub step_m: f64,
-    /// Distance of neighbouring headings \[°\].
-    pub yaw_step_deg: f64,
     /// Pixels that a hypothesis must cover to be eligible.
     pub least_covered: u32,
 }
@@ -268,8 +197,8 @@ pub struct DenseMap {
 impl DenseMap {
     fn new(ask: DenseAsk, problem: &Problem, params: &Params) -> Self {
         let mut grid = params.grid.clone();
-        grid.coarse_step_m = ask.step_m;
-        grid.yaw_step_deg = ask.yaw_step_deg;
+        grid.coarse_step_m = params.surface.step_m;
+        grid.yaw_step_deg = params.surface.yaw_step_deg;
         let radius_m = problem.uncertainty_radius_m;
         Self {
             ask,
@@ -297,7 +226,7 @@ impl DenseMap {
 /// A map to go on with from where it is.
 struct DenseRequest {
     problem: Problem,
-    params: Arc<Params>,
+    params: Params,
     ask: DenseAsk,
     surface: DenseSurface,
 }
@@ -332,7 +261,7 @@ impl DenseFiller {
 
     /// Has a map filled for as long as this is called in each frame. Another map of the same method is forgotten; one
     /// that was begun goes on.
-    pub(super) fn ask(&mut self, problem: &Problem, params: &Arc<Params>, ask: DenseAsk) {
+    pub(super) fn ask(&mut self, problem: &Problem, params: &Params, ask: DenseAsk) {
         self.is_shown = true;
         if self.filling == Some(ask) {
             return;
@@ -350,7 +279,7 @@ impl DenseFiller {
         self.filling = Some(ask);
         self.worker.ask(DenseRequest {
             problem: problem.clone(),
-            params: Arc::clone(params),
+            params: params.clone(),
             ask,
             surface: surface.clone(),
         });

@@ -4,6 +4,7 @@ use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::rc::Rc;
 
+use super::memo::Memo;
 use crate::diagnosis::Code;
 use crate::localize::QueryResult;
 use crate::measure::{Condition, ConditionError, Migration, migrations, verdict_name};
@@ -75,14 +76,14 @@ pub(super) struct Wanted {
     pub(super) only_changed: bool,
 }
 
-/// The rows that met what was wanted of results of a version.
-type FoundRows = (u64, Wanted, Rc<[ResultRow]>);
+/// The rows that are wanted, or what is wrong with the condition.
+type Found = Result<Rc<[ResultRow]>, ConditionError>;
 
 /// The latest answers, which hold as long as nothing changes.
 #[derive(Default)]
 pub(super) struct Selection {
-    rows: RefCell<Option<FoundRows>>,
-    migrations: RefCell<Option<(u64, Rc<[Migration]>)>>,
+    rows: RefCell<Memo<(u64, Wanted), Found>>,
+    migrations: RefCell<Memo<u64, Rc<[Migration]>>>,
 }
 
 impl<'a> Known<'a> {
@@ -92,13 +93,18 @@ impl<'a> Known<'a> {
     }
 
     /// What the same method gave for the same query and setting before.
-    pub(super) fn before(&self, query: usize, now: &QueryResult) -> Option<&'a QueryResult> {
+    fn before(&self, query: usize, now: &QueryResult) -> Option<&'a QueryResult> {
         let before = self.before?.get(&query)?;
         before.iter().find(|before| {
             before.method == now.method
                 && before.fusion == now.fusion
                 && before.setting == now.setting
         })
+    }
+
+    /// The same for the result of a row.
+    pub(super) fn before_row(&self, row: ResultRow) -> Option<&'a QueryResult> {
+        self.before(row.query, self.result(row)?)
     }
 
     fn rows(&self) -> impl Iterator<Item = (ResultRow, &'a QueryResult)> {
@@ -118,26 +124,14 @@ fn primary(result: &QueryResult) -> Option<Code> {
     Some(result.diagnosis.first()?.code)
 }
 
-impl Selection {
-    /// The results that are wanted, in the order of the queries.
-    pub(super) fn rows(
-        &self,
-        known: Known<'_>,
-        wanted: &Wanted,
-    ) -> Result<Rc<[ResultRow]>, ConditionError> {
-        let mut latest = self.rows.borrow_mut();
-        if let Some((version, made_for, rows)) = &*latest
-            && *version == known.version
-            && made_for == wanted
-        {
-            return Ok(Rc::clone(rows));
-        }
-        let condition: Option<Condition> = match wanted.condition.trim() {
+impl Wanted {
+    fn find(&self, known: Known<'_>) -> Found {
+        let condition: Option<Condition> = match self.condition.trim() {
             "" => None,
             typed => Some(typed.parse()?),
         };
         let is_wanted = |(row, result): &(ResultRow, &QueryResult)| {
-            let mut changes = wanted.change.iter();
+            let mut changes = self.change.iter();
             let has_become = changes.all(|change| {
                 change.method == result.method
                     && known.verdicts(row.query, result).is_some_and(|codes| {
@@ -146,27 +140,28 @@ impl Selection {
             });
             let is_other = |[before, now]: [Option<Code>; 2]| before != now;
             has_become
-                && (!wanted.only_changed || known.verdicts(row.query, result).is_some_and(is_other))
+                && (!self.only_changed || known.verdicts(row.query, result).is_some_and(is_other))
                 && condition.as_ref().is_none_or(|condition| condition.is_met(result))
         };
-        let rows: Rc<[ResultRow]> = known.rows().filter(is_wanted).map(|(row, _)| row).collect();
-        *latest = Some((known.version, wanted.clone(), Rc::clone(&rows)));
-        Ok(rows)
+        Ok(known.rows().filter(is_wanted).map(|(row, _)| row).collect())
+    }
+}
+
+impl Selection {
+    /// The results that are wanted, in the order of the queries.
+    pub(super) fn rows(&self, known: Known<'_>, wanted: Wanted) -> Found {
+        let mut rows = self.rows.borrow_mut();
+        rows.get((known.version, wanted.clone()), || wanted.find(known)).clone()
     }
 
     /// What became of the verdicts that both have, also of those that stayed what they were.
     pub(super) fn migrations(&self, known: Known<'_>) -> Rc<[Migration]> {
-        let mut latest = self.migrations.borrow_mut();
-        if let Some((version, migrations)) = &*latest
-            && *version == known.version
-        {
-            return Rc::clone(migrations);
-        }
-        let common = known
-            .rows()
-            .filter_map(|(row, result)| Some((result.method, known.verdicts(row.query, result)?)));
-        let counted: Rc<[Migration]> = migrations(common).into();
-        *latest = Some((known.version, Rc::clone(&counted)));
-        counted
+        let count = || {
+            let verdicts = |(row, result): (ResultRow, &QueryResult)| {
+                Some((result.method, known.verdicts(row.query, result)?))
+            };
+            migrations(known.rows().filter_map(verdicts)).into()
+        };
+        Rc::clone(self.migrations.borrow_mut().get(known.version, count))
     }
 }

@@ -8,7 +8,6 @@ use std::sync::Arc;
 use crate::estimator;
 use crate::event::Side;
 use crate::image::Degradation;
-use crate::lesson::OpenSetting;
 use crate::localize::{References, Selection, frames_within, is_one_drive};
 use crate::method::Method;
 use crate::scene::{FrameStore, Scene};
@@ -71,15 +70,15 @@ pub struct Setup {
 
 impl Setup {
     /// What a lesson localises.
-    pub fn of_lesson(open: OpenSetting, folder: PathBuf) -> Self {
-        let OpenSetting { task, scenes, query, references } = open;
+    pub fn of_lesson(job: Job, folder: PathBuf) -> Self {
+        let Job { references, queries, query, chosen, task, index, .. } = job;
         Self {
             offered: vec![query],
-            references: scenes.references,
-            queries: scenes.queries,
+            references,
+            queries,
             query,
-            chosen: references.into(),
-            index: Arc::new(IndexFile::of(&task)),
+            chosen,
+            index,
             task,
             mode: RunMode::Running,
             folder,
@@ -214,25 +213,25 @@ impl Setup {
         self.queries = self.task.protocol.degraded(&self.queries);
     }
 
-    /// Query and reference frames as a person tells them apart: with their scene where there are two.
-    pub fn label(&self, side: Side, frame: usize) -> String {
-        let scene = match side {
+    /// The scene of the queries or of the references.
+    pub(super) fn scene(&self, side: Side) -> &Arc<dyn Scene> {
+        match side {
             Side::Query => &self.queries,
             Side::Reference => &self.references,
-        };
-        self.label_of(side, &scene.frames()[frame])
+        }
+    }
+
+    /// Query and reference frames as a person tells them apart: with their scene where there are two.
+    pub fn label(&self, side: Side, frame: usize) -> String {
+        self.label_of(side, &self.scene(side).frames()[frame])
     }
 
     /// The same for a frame that is known by its name.
     pub(super) fn label_of(&self, side: Side, name: &str) -> String {
-        let scene = match side {
-            Side::Query => &self.queries,
-            Side::Reference => &self.references,
-        };
         if self.queries.name() == self.references.name() {
             name.to_owned()
         } else {
-            format!("{} {name}", scene.name())
+            format!("{} {name}", self.scene(side).name())
         }
     }
 

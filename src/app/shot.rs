@@ -7,7 +7,6 @@ use std::time::Duration;
 use image::RgbImage;
 
 use super::App;
-use super::command::Command;
 use super::headless::Painter;
 use super::selection::KnownResults;
 use super::setup::Setup;
@@ -109,7 +108,7 @@ impl<'a> Window<'a> {
     fn new(setup: Setup, results: KnownResults, shot: &'a Shot, painter: &'a Painter) -> Self {
         let ctx = egui::Context::default();
         ctx.set_theme(shot.theme);
-        let app = App::of(&ctx, Some(painter.render_state()), setup).with_results(results);
+        let app = App::of(&ctx, setup).with_results(results);
         // Nothing moves in a picture.
         ctx.all_styles_mut(|style| style.animation_time = 0.0);
         Self { app, ctx, painter, shot, frames: 0 }
@@ -132,7 +131,7 @@ impl<'a> Window<'a> {
                     return Err(ShotError::Broken("the run was cancelled".to_owned()));
                 }
                 // A breakpoint stopped it.
-                RunState::Paused { .. } => self.app.send(Command::RunToEnd),
+                RunState::Paused { .. } => self.app.state.run_to_end(),
                 RunState::Loading | RunState::Running => std::thread::sleep(Self::PAUSE),
             }
         }
@@ -143,7 +142,7 @@ impl<'a> Window<'a> {
         match moment {
             // The window is at the cause by itself.
             Moment::End => {}
-            Moment::Step(step) if step < steps => self.app.send(Command::MoveCursor(step)),
+            Moment::Step(step) if step < steps => self.app.state.move_cursor(step),
             Moment::Step(step) => {
                 return Err(ShotError::Unknown(format!(
                     "step {step}: the run has the steps 0 to {}",
@@ -161,7 +160,7 @@ impl<'a> Window<'a> {
                 }
                 let part = self.app.state.deciding_span(method).map(|span| span.part);
                 let part = part.unwrap_or(Part::Reference(method, 0));
-                self.app.send(Command::ShowPart(part));
+                self.app.state.show_outcome(part);
             }
         }
         Ok(())

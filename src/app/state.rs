@@ -5,22 +5,23 @@ mod shown;
 use std::sync::Arc;
 use std::time::Duration;
 
+use egui::TextureHandle;
+
 use super::navigation::Navigation;
 use super::queries::Queries;
 use super::run_pictures::RunPictures;
 use super::scoring::{
-    CostAlong, CostLine, DenseAsk, DenseFiller, DenseMap, LineTracer, Probe, Prober,
+    self, CostAlong, CostLine, DenseAsk, DenseFiller, DenseMap, Lines, Probe, Prober,
 };
 use super::selection::{Known, KnownResults, Results, Selection};
 use super::setup::Setup;
 use super::shown::ShownReason;
 use super::textures::Textures;
 use super::view_options::{CompareMode, ViewOptions};
-use crate::diagnosis::Grade;
+use crate::event::Side;
 use crate::geometry::Pose;
 use crate::lesson::Moment;
 use crate::method::Method;
-use crate::params::Params;
 use crate::run::Protocol;
 use crate::scene::FrameStore;
 use crate::session::{Breakpoints, Part, Run, RunMode, RunState, Session, Span};
@@ -49,8 +50,6 @@ pub struct KeptRun {
 pub struct AppState {
     /// What is run: scenes, query, references, parameters.
     pub setup: Setup,
-    /// The parameters of the setup, shared with the prober.
-    pub(super) params: Arc<Params>,
     /// Frames of the setup's scenes, with what its runs have worked out about them.
     frames: Arc<FrameStore>,
     pub(super) session: Session,
@@ -72,7 +71,7 @@ pub struct AppState {
     pub(super) camera_before: Option<Pose>,
     pub(super) prober: Prober,
     /// For the cost along the line from a result to the truth.
-    pub(super) line_tracer: LineTracer,
+    lines: Lines,
     /// For the map of every position with every heading.
     dense_filler: DenseFiller,
     /// The queries, what is known of them.
@@ -94,13 +93,11 @@ pub struct AppState {
 
 impl AppState {
     pub(super) fn new(setup: Setup, ctx: egui::Context) -> Self {
-        let params = Arc::new(setup.task.params.clone());
         let frames = Arc::default();
         let session = start(&setup, setup.mode, &frames, &ctx);
         Self {
-            params,
             prober: Prober::new(ctx.clone()),
-            line_tracer: LineTracer::new(ctx.clone()),
+            lines: scoring::lines(ctx.clone()),
             dense_filler: DenseFiller::new(ctx.clone()),
             queries: Queries::new(ctx.clone()),
             frames,
@@ -213,7 +210,7 @@ impl AppState {
         self.forget_notes();
         let was_alive = self.session.is_alive();
         if self.session.drain() {
-            if let Some(chosen) = self.session.chosen()
+            if let Some(chosen) = self.session.run().chosen.as_ref()
                 && *chosen != self.setup.chosen
             {
                 self.setup.chosen = chosen.clone();
@@ -235,27 +232,28 @@ impl AppState {
                 Err(why) => self.note(why, true),
             }
         }
-        // The query at work comes first.
-        if *self.session.state() != RunState::Loading {
-            self.queries.paint_thumbnails(&self.setup);
-        }
         if let Some((pose, _)) = self.looking_at()
             && let Some(problem) = self.problem().cloned()
         {
             let methods = self.setup.direct_methods();
-            self.prober.ask(&problem, &methods, &self.params, pose);
+            self.prober.ask(&problem, &methods, &self.session.run().params, pose);
         }
-        self.pictures.update(self.session.run(), &self.params, self.options.shows_truth);
+        self.pictures.update(self.session.run(), self.options.shows_truth);
         if let Some(kept) = &mut self.kept {
-            let params = Arc::new(kept.run.params.clone());
-            kept.pictures.update(&kept.run, &params, self.options.shows_truth);
+            kept.pictures.update(&kept.run, self.options.shows_truth);
         }
-        if let Err(why) = self.line_tracer.poll() {
-            self.note(why, true);
+        if !self.lines.poll() {
+            self.note("the cost between two poses could not be computed", true);
         }
         if let Err(why) = self.dense_filler.poll() {
             self.note(why, true);
         }
+    }
+
+    /// The small picture of a frame, once it is made; asking for it has it made. The query at work comes first.
+    pub(super) fn frame_picture(&self, side: Side, frame: usize) -> Option<TextureHandle> {
+        let is_loading = *self.session.state() == RunState::Loading;
+        self.queries.thumbnail(side, frame, (!is_loading).then_some(&self.setup))
     }
 
     /// Whether anything of what the views show is still worked out, beside a run.
@@ -270,19 +268,19 @@ impl AppState {
 
     /// What is known of a method's cost along the line that was asked for last.
     pub fn cost_along(&self, method: Method) -> Option<&CostAlong> {
-        self.line_tracer.along(method)
+        self.lines.find(|line| line.method == method)
     }
 
     /// Whether the cost along a line is still worked out.
     pub fn is_tracing_line(&self) -> bool {
-        self.line_tracer.is_busy()
+        self.lines.is_busy()
     }
 
     /// Has the cost along a line worked out for the problem at the cursor.
     pub(super) fn trace_line(&mut self, line: CostLine) {
-        if let Some(problem) = self.problem().cloned() {
-            self.line_tracer.ask(&problem, &self.params, line);
-        }
+        let question = self.problem().map(|problem| (problem.clone(), self.run().params.clone()));
+        self.lines.forget_where(|other| other.method == line.method && *other != line);
+        self.lines.ask(line, || question);
     }
 
     /// The dense map of a method that was asked for last.
@@ -297,9 +295,10 @@ impl AppState {
 
     /// Has a dense map filled, as long as somebody looks at it.
     pub(super) fn fill_dense_map(&mut self, ask: DenseAsk) {
-        let loaded = self.session.run().loaded.as_deref();
+        let run = self.session.run();
+        let loaded = run.loaded.as_deref();
         if let Some(problem) = loaded.and_then(|loaded| loaded.problems.get(ask.reference)) {
-            self.dense_filler.ask(problem, &self.params, ask);
+            self.dense_filler.ask(problem, &run.params, ask);
         }
     }
 
@@ -310,24 +309,26 @@ impl AppState {
 
     /// Goes to the first method that is wrong and shows why; where all are right, to the end of the first.
     fn go_to_cause(&mut self) {
-        let run = self.session.run();
-        let results = || run.spans().iter().filter(|span| span.result.is_some());
+        let mut spans = self.session.run().spans().iter().filter(|span| span.result.is_some());
         let has_failed = |span: &&Span| {
-            let grade =
-                span.result.as_ref().map(|result| result.grade_shown(self.options.shows_truth));
-            grade.is_some_and(Grade::is_failure)
+            let result = span.result.as_ref();
+            result.is_some_and(|result| result.grade_shown(self.options.shows_truth).is_failure())
         };
-        let failed = results().find(has_failed).map(|span| span.part);
-        match (failed, results().next().map(|span| span.part)) {
-            (Some(part), _) => self.show_part(part, true),
-            (None, Some(part)) => self.show_part(part, false),
-            (None, None) => {}
+        let failed = spans.clone().find(has_failed).map(|span| (span.part, true));
+        let first = spans.next().map(|span| (span.part, false));
+        if let Some((part, why)) = failed.or(first) {
+            self.show_part(part, why);
         }
+    }
+
+    /// Shows what a part of the run came to: why it failed, or its end.
+    pub fn show_outcome(&mut self, part: Part) {
+        self.show_part(part, self.needs_why(part));
     }
 
     /// Moves the cursor to the end of a part of the run, where `why` with the picture that proves its result.
     pub(super) fn show_part(&mut self, part: Part, why: bool) {
-        let last = self.shown_run().span_of(part).and_then(|span| span.records.end.checked_sub(1));
+        let last = self.run().span_of(part).and_then(|span| span.records.end.checked_sub(1));
         match (last, part.method()) {
             (Some(last), _) => {
                 self.move_cursor(last);
@@ -370,6 +371,13 @@ impl AppState {
         self.notes.drain(..surplus);
     }
 
+    /// Takes a note away.
+    pub(super) fn dismiss(&mut self, index: usize) {
+        if index < self.notes.len() {
+            self.notes.remove(index);
+        }
+    }
+
     /// Another query, or other references: everything begins anew.
     pub(super) fn start_run(&mut self, mode: RunMode) {
         // The run before would go on beside the new one.
@@ -382,7 +390,7 @@ impl AppState {
         self.options.shows_why = false;
         self.opens_at_cause = mode == RunMode::Running;
         self.prober.forget();
-        self.line_tracer.forget();
+        self.lines.forget();
         self.dense_filler.forget();
     }
 
@@ -413,17 +421,11 @@ impl AppState {
 
     /// Another setup altogether; the cursor goes to a record as soon as the run has come so far.
     pub(super) fn restore(&mut self, setup: Setup, cursor: usize) {
-        self.results = self.first_results.clone();
-        self.set_results_before(None);
         self.queries = Queries::new(self.ctx.clone());
-        self.setup = setup;
-        self.params = Arc::new(self.setup.task.params.clone());
-        self.kept = None;
-        self.options.compare_mode = CompareMode::default();
         // The scenes are others, even where they have the same names.
         self.frames = Arc::default();
-        self.start_run(RunMode::Running);
-        self.navigation = Navigation::towards_record(cursor);
+        self.change_setup(setup, Navigation::towards_record(cursor));
+        self.results = self.first_results.clone();
     }
 
     /// Another setup whose scenes are partly those of this one; the cursor goes where `navigation` says.
@@ -432,7 +434,6 @@ impl AppState {
         self.results = Results::new();
         self.set_results_before(None);
         self.setup = setup;
-        self.params = Arc::new(self.setup.task.params.clone());
         self.kept = None;
         self.options.compare_mode = CompareMode::default();
         self.camera = None;
@@ -452,7 +453,6 @@ impl AppState {
         self.stop_queries();
         let is_alive = self.session.is_alive();
         let navigation = self.navigation.towards_same(self.run(), is_alive);
-        self.params = Arc::new(self.setup.task.params.clone());
         self.start_run(RunMode::Running);
         self.navigation = navigation;
     }

@@ -15,45 +15,22 @@ use crate::palette::{self, Rgb};
 /// The least contrast of a text with its ground: that of WCAG 2.2, criterion 1.4.3, for text of any size.
 pub const CONTRAST: f32 = 4.5;
 
-/// The sizes of text \[points\], from what stands beside a mark to a heading.
-mod size {
-    pub(super) const SMALL: f32 = 10.0;
-    pub(super) const CAPTION: f32 = 11.0;
-    pub(super) const LABEL: f32 = 12.0;
-    pub(super) const BODY: f32 = 13.0;
-    pub(super) const STRONG: f32 = 14.0;
-    pub(super) const HEADING: f32 = 18.0;
-}
-
 /// Between two things beside and below each other \[points\].
 const GAP: egui::Vec2 = egui::vec2(6.0, 4.0);
 /// Until a hint is shown \[s\].
 const HINT_DELAY: f32 = 0.3;
 
 /// Numbers of axes and names of stages.
-pub fn small() -> FontId {
-    FontId::proportional(size::SMALL)
-}
-
+pub const SMALL: FontId = FontId::proportional(10.0);
 /// Captions of pictures.
-pub fn caption() -> FontId {
-    FontId::proportional(size::CAPTION)
-}
-
+pub const CAPTION: FontId = FontId::proportional(11.0);
 /// Names of things in space.
-pub fn label() -> FontId {
-    FontId::proportional(size::LABEL)
-}
-
+pub const LABEL: FontId = FontId::proportional(12.0);
 /// Body text.
-pub fn body() -> FontId {
-    FontId::proportional(size::BODY)
-}
-
+pub const BODY: FontId = FontId::proportional(13.0);
 /// Names of methods in the verdict bar.
-pub fn strong() -> FontId {
-    FontId::proportional(size::STRONG)
-}
+pub const STRONG: FontId = FontId::proportional(14.0);
+const HEADING: FontId = FontId::proportional(18.0);
 
 /// The colour of what is selected or can be clicked; used for nothing else.
 pub fn accent(visuals: &Visuals) -> Color32 {
@@ -109,11 +86,6 @@ pub fn method(method: Method) -> Color32 {
 /// Viridis, for costs: 0 the worst, 1 the best.
 pub fn viridis(value: f64) -> Color32 {
     rgb(palette::viridis(value))
-}
-
-/// Turbo, for depths and heights: 0 the least, 1 the greatest.
-pub fn turbo(value: f64) -> Color32 {
-    rgb(palette::turbo(value))
 }
 
 /// What words of a theme stand on: panels, fields, rows of tables, buttons.
@@ -206,11 +178,11 @@ pub(super) fn install(ctx: &egui::Context) {
     }
     ctx.all_styles_mut(|style| {
         style.text_styles = [
-            (TextStyle::Small, small()),
-            (TextStyle::Body, FontId::proportional(size::BODY)),
-            (TextStyle::Button, FontId::proportional(size::BODY)),
-            (TextStyle::Heading, FontId::proportional(size::HEADING)),
-            (TextStyle::Monospace, FontId::monospace(size::BODY)),
+            (TextStyle::Small, SMALL),
+            (TextStyle::Body, BODY),
+            (TextStyle::Button, BODY),
+            (TextStyle::Heading, HEADING),
+            (TextStyle::Monospace, FontId::monospace(BODY.size)),
         ]
         .into();
         style.spacing.item_spacing = GAP;

@@ -1,13 +1,9 @@
-//! Small pictures of the stages of a run, made beside the window's thread.
+//! Small pictures of the stages of a run.
 
-use std::collections::HashMap;
-use std::ops::Range;
-
-use egui::{ColorImage, TextureHandle, TextureOptions};
+use egui::ColorImage;
 use image::{DynamicImage, Rgb, RgbImage, imageops::FilterType};
 
 use super::textures::color_image;
-use super::worker::Worker;
 use crate::event::{Event, FeaturesDetected, Side};
 use crate::features::{Keypoint, MatchVerdict};
 use crate::palette;
@@ -18,94 +14,34 @@ use crate::session::Run;
 /// Their largest size \[px\]: twice what they take on the screen.
 const SIZE: (u32, u32) = (236, 76);
 
-/// The thumbnails of the present run, by the record that each shows.
-pub(super) struct Thumbnails {
-    ctx: egui::Context,
-    worker: Worker<Question, (usize, ColorImage)>,
-    /// `None` while it is made.
-    made: HashMap<usize, Option<TextureHandle>>,
-    /// The record that shows a range of records best.
-    shows: HashMap<(usize, usize), Option<usize>>,
-}
-
-/// A picture to be made of one record.
-struct Question {
-    record: usize,
+/// What a small picture is made from: a record and what it is about.
+pub(super) struct Drawn {
     event: Event,
     keypoints: Option<FeaturesDetected>,
     problem: Problem,
 }
 
-impl Thumbnails {
-    pub(super) fn new(ctx: egui::Context) -> Self {
-        let worker = Worker::new("stages", ctx.clone(), |question: Question| {
-            let picture = picture_of(&question);
-            let small = picture.resize(SIZE.0, SIZE.1, FilterType::Triangle);
-            (question.record, color_image(&small))
+impl Drawn {
+    /// What there is to draw of a record, for a part of the run that begins at `start`.
+    pub(super) fn of(run: &Run, start: usize, record: usize) -> Option<Self> {
+        let problem = run.loaded.as_deref()?.problems.get(run.reference_at(record))?;
+        let records = run.records().get(start..=record)?;
+        let keypoints = records.iter().rev().find_map(|record| match &record.event {
+            Event::FeaturesDetected(event) if event.side == Side::Query => Some(event.clone()),
+            _ => None,
         });
-        Self { ctx, worker, made: HashMap::new(), shows: HashMap::new() }
+        let event = records.last()?.event.clone();
+        Some(Self { event, keypoints, problem: problem.clone() })
     }
 
-    /// Drops everything: the run is another one.
-    pub(super) fn forget(&mut self) {
-        self.worker.forget();
-        self.made.clear();
-        self.shows.clear();
-    }
-
-    /// Takes in the pictures that are ready.
-    pub(super) fn poll(&mut self) {
-        for (record, image) in self.worker.poll().into_iter().flatten() {
-            let options =
-                if image.size[0] < 64 { TextureOptions::NEAREST } else { TextureOptions::LINEAR };
-            let texture = self.ctx.load_texture("stage", image, options);
-            self.made.insert(record, Some(texture));
-        }
-    }
-
-    /// Whether pictures are still being made.
-    pub(super) fn is_busy(&self) -> bool {
-        self.worker.is_busy()
-    }
-
-    /// The picture of a stage: of the last record in it, or before it in its part, that can be drawn. Asking for it
-    /// has it made.
-    pub(super) fn of(
-        &mut self,
-        run: &Run,
-        part: Range<usize>,
-        stage: Range<usize>,
-    ) -> Option<TextureHandle> {
-        let key = (part.start, stage.end);
-        let shown = *self.shows.entry(key).or_insert_with(|| {
-            let records = &run.records()[part.start..stage.end];
-            let last = records.iter().rposition(|record| is_drawn(&record.event))?;
-            Some(part.start + last)
-        });
-        let record = shown?;
-        if let Some(made) = self.made.get(&record) {
-            return made.clone();
-        }
-        let loaded = run.loaded.as_deref()?;
-        let problem = loaded.problems.get(run.reference_at(record))?;
-        let keypoints = run.records()[part.start..=record].iter().rev().find_map(|record| {
-            match &record.event {
-                Event::FeaturesDetected(event) if event.side == Side::Query => Some(event.clone()),
-                _ => None,
-            }
-        });
-        self.made.insert(record, None);
-        self.worker.ask(Question {
-            record,
-            event: run.records()[record].event.clone(),
-            keypoints,
-            problem: problem.clone(),
-        });
-        None
+    /// The small picture.
+    pub(super) fn picture(&self) -> ColorImage {
+        color_image(&picture_of(self).resize(SIZE.0, SIZE.1, FilterType::Triangle))
     }
 }
 
-fn is_drawn(event: &Event) -> bool {
+/// Whether there is a picture of an event.
+pub(super) fn is_drawn(event: &Event) -> bool {
     matches!(
         event,
         Event::FeaturesDetected(FeaturesDetected { side: Side::Query, .. })
@@ -118,7 +54,7 @@ fn is_drawn(event: &Event) -> bool {
     )
 }
 
-fn picture_of(question: &Question) -> DynamicImage {
+fn picture_of(question: &Drawn) -> DynamicImage {
     let problem = &question.problem;
     let dots = |colors: Vec<Option<palette::Rgb>>| {
         let keypoints = question.keypoints.as_ref();

@@ -1,27 +1,19 @@
 //! What a view sees: a run at a cursor.
 
-use std::rc::Rc;
 use std::sync::Arc;
 
-use super::camera::NamedPose;
-use super::command::{Command, Queue};
-use super::lecture;
-use super::queries::Queries;
-use super::scoring::{CostAlong, DenseMap, Probe};
-use super::selection::{ResultRow, Results, Wanted};
+use super::App;
+use super::command::Queue;
 use super::setup::Setup;
 use super::shown::{ShownReason, ShownView};
 use super::state::AppState;
-use super::textures::Textures;
 use super::view_options::ViewOptions;
 use crate::estimator::{self, Entry};
-use crate::event::{DebugEvent, MinimumAssessed, ReferencesFused, Side, ViewRendered};
+use crate::event::{DebugEvent, MinimumAssessed, ReferencesFused, ViewRendered};
 use crate::geometry::Pose;
-use crate::localize::QueryResult;
-use crate::measure::{ConditionError, Migration};
 use crate::method::Method;
 use crate::problem::Problem;
-use crate::session::{Part, Run, RunState, Span};
+use crate::session::{Part, Run, Span};
 
 /// A run at a cursor, and what else of the application's state a view draws from.
 #[derive(Clone, Copy)]
@@ -34,34 +26,16 @@ pub struct ViewContext<'a> {
     pub setup: &'a Setup,
     /// What is switched on and selected.
     pub options: &'a ViewOptions,
-    /// Pictures on the graphics card.
-    pub textures: &'a Textures,
-    /// Thumbnails, and how far the run over all queries is.
-    pub queries: &'a Queries,
-    /// Results of the queries that were run, by query.
-    pub results: &'a Results,
-    state: &'a AppState,
+    /// All that is not of one run: queries, results, the camera in hand, what is worked out beside a run.
+    pub state: &'a AppState,
     commands: &'a Queue,
 }
 
 impl<'a> ViewContext<'a> {
-    fn new(run: &'a Run, cursor: usize, state: &'a AppState, commands: &'a Queue) -> Self {
-        Self {
-            run,
-            cursor,
-            setup: &state.setup,
-            options: &state.options,
-            textures: &state.textures,
-            queries: &state.queries,
-            results: &state.results,
-            state,
-            commands,
-        }
-    }
-
-    /// The present run at the cursor.
-    pub(super) fn present(state: &'a AppState, commands: &'a Queue) -> Self {
-        Self::new(state.run(), state.cursor(), state, commands)
+    /// The run that is shown, at the cursor in it.
+    pub(super) fn new(state: &'a AppState, commands: &'a Queue) -> Self {
+        let (run, cursor) = (state.shown_run(), state.shown_cursor());
+        Self { run, cursor, setup: &state.setup, options: &state.options, state, commands }
     }
 
     /// The same at another position among the records of the run.
@@ -69,136 +43,14 @@ impl<'a> ViewContext<'a> {
         Self { cursor, ..*self }
     }
 
-    /// What the part at the cursor told last, in words.
-    pub(super) fn told(&self) -> Option<String> {
-        lecture::latest(self.run, self.span()?, self.cursor)
-    }
-
-    /// The kept run at the place that corresponds to the cursor.
-    pub(super) fn kept(state: &'a AppState, commands: &'a Queue) -> Option<Self> {
-        let (kept, cursor) = (state.kept.as_ref()?, state.kept_cursor()?);
-        Some(Self::new(&kept.run, cursor, state, commands))
-    }
-
     /// Whether the run that is shown is the present one, whose parameters can be changed.
     pub fn is_present(&self) -> bool {
-        std::ptr::eq(self.run, self.state.run())
-    }
-
-    /// The run that this one is compared with: A beside the present one, and the other way round.
-    pub fn other_run(&self) -> Option<&'a Run> {
-        let kept = &self.state.kept.as_ref()?.run;
-        Some(if self.is_present() { kept } else { self.state.run() })
-    }
-
-    /// The colours of the theme.
-    pub(super) fn visuals(&self) -> egui::Visuals {
-        self.state.ctx.global_style().visuals.clone()
+        !self.state.is_showing_kept()
     }
 
     /// Asks for something to be done after this frame.
-    pub fn send(&self, command: Command) {
+    pub fn send(&self, command: impl FnOnce(&mut App) + 'static) {
         self.commands.send(command);
-    }
-
-    /// Whether a method is known to fail on a query.
-    pub fn has_failed(&self, query: usize) -> bool {
-        self.state.has_failed(query)
-    }
-
-    /// The camera in hand (`world_from_camera`).
-    pub fn camera(&self) -> Option<Pose> {
-        self.state.camera
-    }
-
-    /// The pose under the pointer (`world_from_camera`).
-    pub fn hovered(&self) -> Option<Pose> {
-        self.state.hovered
-    }
-
-    /// The results that are looked at, in the order of the queries: those that meet the condition that was
-    /// typed, whose verdict became what was asked for.
-    ///
-    /// # Errors
-    /// What is wrong with the condition.
-    pub fn selected(&self) -> Result<Rc<[ResultRow]>, ConditionError> {
-        let known = self.state.known();
-        let wanted = Wanted {
-            condition: self.options.results_filter.clone(),
-            change: self.options.verdict_change.clone(),
-            only_changed: self.options.only_differences && known.before.is_some(),
-        };
-        self.state.selection.rows(known, &wanted)
-    }
-
-    /// A result that is known.
-    pub fn result(&self, row: ResultRow) -> Option<&'a QueryResult> {
-        self.state.known().result(row)
-    }
-
-    /// Whether there are results A, which those of now are held against.
-    pub fn has_results_before(&self) -> bool {
-        self.state.known().before.is_some()
-    }
-
-    /// What the same method gave for the same query and setting in the results A.
-    pub fn result_before(&self, row: ResultRow) -> Option<&'a QueryResult> {
-        let known = self.state.known();
-        known.before(row.query, known.result(row)?)
-    }
-
-    /// What became of the verdicts since the results A, also of those that stayed what they were.
-    pub fn migrations(&self) -> Rc<[Migration]> {
-        self.state.selection.migrations(self.state.known())
-    }
-
-    /// Grows with every change of the known results.
-    pub fn results_version(&self) -> u64 {
-        self.state.known().version
-    }
-
-    /// A pose that the present run's search knows by name (`world_from_camera`).
-    pub fn named_pose(&self, name: NamedPose) -> Option<Pose> {
-        self.state.named_pose(name)
-    }
-
-    /// The query or the reference of a problem, with its scene where there are two.
-    pub fn frame_label(&self, side: Side, problem: &Problem) -> String {
-        let name = match side {
-            Side::Query => &problem.query.name,
-            Side::Reference => &problem.reference.name,
-        };
-        self.setup.label_of(side, name)
-    }
-
-    /// The pose that pictures and costs are wanted for, if it is not that of the cursor.
-    pub fn looking_at(&self) -> Option<(Pose, ShownReason)> {
-        self.state.looking_at()
-    }
-
-    /// What is known about the pose that was asked for last.
-    pub fn probe(&self) -> Option<&'a Probe> {
-        self.state.probe()
-    }
-
-    /// What the present run is doing.
-    pub fn run_state(&self) -> &'a RunState {
-        self.state.run_state()
-    }
-
-    /// Whether the answer for the pose that is looked at is still worked out.
-    pub fn is_probing(&self) -> bool {
-        self.state.is_probing()
-    }
-
-    /// What is known of a method's cost along the line that was asked for last, of the present run.
-    pub fn cost_along(&self, method: Method) -> Option<&'a CostAlong> {
-        self.state.cost_along(method)
-    }
-
-    /// The dense map of a method that was asked for last, of the present run.
-    pub fn dense_map(&self, method: Method) -> Option<&'a DenseMap> {
-        self.state.dense_map(method)
     }
 
     /// The part of the run that the cursor is in.
@@ -235,11 +87,6 @@ impl<'a> ViewContext<'a> {
         self.run.latest(self.cursor)
     }
 
-    /// All events of a type up to the cursor, told by the estimator there.
-    pub fn all<E: DebugEvent + 'static>(&self) -> impl DoubleEndedIterator<Item = (usize, &'a E)> {
-        self.run.all_until(self.cursor)
-    }
-
     /// The part of an estimator on the reference that is looked at, and the cursor for it: its last
     /// record, or the cursor itself where it is the estimator at the cursor.
     pub fn part_of(&self, method: Method) -> Option<(&'a Span, usize)> {
@@ -262,16 +109,10 @@ impl<'a> ViewContext<'a> {
         self.run.latest_in(span, cursor)
     }
 
-    /// The methods whose cost can be looked at: those of this run that search one, those of the paper
-    /// where there are none.
-    pub fn direct_methods(&self) -> Vec<Method> {
-        self.setup.direct_methods()
-    }
-
     /// The direct method whose pictures are shown: that at the cursor, for the others that inside a
     /// hybrid, MI if the run has it.
     pub fn direct_method(&self) -> Method {
-        let direct = self.direct_methods();
+        let direct = self.setup.direct_methods();
         let here = self.method();
         let inside = here.and_then(estimator::find).and_then(Entry::hybrid);
         [here, inside.map(|parts| parts.second), Some(Method::MI)]
@@ -280,14 +121,6 @@ impl<'a> ViewContext<'a> {
             .chain(direct.first().copied())
             .find(|method| direct.contains(method))
             .unwrap_or(Method::MI)
-    }
-
-    /// The method in whose part of the run the search of [`Self::direct_method`] is told: a hybrid,
-    /// if the cursor is in one.
-    pub fn searching_method(&self) -> Method {
-        self.method()
-            .filter(|&here| estimator::find(here).and_then(Entry::hybrid).is_some())
-            .unwrap_or_else(|| self.direct_method())
     }
 
     /// Whether the cursor is in a hybrid that runs this method inside itself.
@@ -300,8 +133,8 @@ impl<'a> ViewContext<'a> {
     /// The synthetic view to show for a direct method: under the pointer, of the camera in hand, or
     /// the latest that the estimator rendered.
     pub fn shown(&self, method: Method) -> Option<ShownView> {
-        if let Some((_, reason)) = self.looking_at()
-            && let Some(probe) = self.probe()
+        if let Some((_, reason)) = self.state.looking_at()
+            && let Some(probe) = self.state.probe()
             && let Some((_, comparison)) = probe.comparisons.iter().find(|(of, _)| *of == method)
         {
             // While the answer for this pose is worked out the last one stays, under its own pose.

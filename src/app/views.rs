@@ -12,11 +12,10 @@ mod fusion;
 mod histogram;
 mod images;
 mod in_sight;
-mod legend;
+pub(super) mod legend;
 mod lockstep;
 mod log;
-mod memo;
-mod mesh_painter;
+mod mark_shape;
 mod parameters;
 mod queries;
 mod ransac;
@@ -26,8 +25,6 @@ mod retrieval;
 mod space;
 mod surface;
 mod synthetic;
-
-use eframe::egui_wgpu::RenderState;
 
 use super::view_context::ViewContext;
 use crate::event::DebugEvent;
@@ -48,8 +45,8 @@ pub struct Entry {
     pub title: &'static str,
     /// What the view shows, in one phrase.
     pub about: &'static str,
-    /// Makes the view. The render state is for those that draw on the graphics card themselves.
-    pub new: fn(Option<&RenderState>) -> Box<dyn View>,
+    /// Makes the view.
+    pub new: fn() -> Box<dyn View>,
 }
 
 /// Name of the list of queries.
@@ -78,100 +75,80 @@ fn part_with<'a, E: DebugEvent + 'static>(
 
 /// Every view, in the order of the menu.
 pub const ALL: &[Entry] = &[
-    Entry {
-        name: QUERIES,
-        title: "Queries",
-        about: "all queries with what is known of them",
-        new: |_| Box::<queries::QueriesView>::default(),
-    },
-    Entry {
-        name: "batch",
-        title: "Batch",
-        about: "the results of all queries in a table: filter, sort, open",
-        new: |_| Box::<batch::BatchView>::default(),
-    },
-    Entry {
-        name: "references",
-        title: "References",
-        about: "which frames the query is localised against, and how their poses are fused",
-        new: |_| Box::<references::ReferencesView>::default(),
-    },
-    Entry {
-        name: PARAMETERS,
-        title: "Parameters",
-        about: "every parameter with unit, range and meaning",
-        new: |_| Box::<parameters::ParametersView>::default(),
-    },
-    Entry {
-        name: "breakpoints",
-        title: "Breakpoints",
-        about: "where a run is to stop",
-        new: |_| Box::<breakpoints::BreakpointsView>::default(),
-    },
-    Entry {
-        name: "images",
-        title: "Images",
-        about: "both photos, their matches, and where each feature ended",
-        new: |_| Box::<images::ImagesView>::default(),
-    },
-    Entry {
-        name: "retrieval",
-        title: "Retrieval",
-        about: "frames that resemble the query, and what in them lies alike",
-        new: |_| Box::<retrieval::RetrievalView>::default(),
-    },
-    Entry {
-        name: "synthetic",
-        title: "Synthetic",
-        about: "the synthetic view beside the query, and what the cost makes of them",
-        new: |_| Box::<synthetic::SynthesisView>::default(),
-    },
-    Entry {
-        name: "space",
-        title: "3-D",
-        about: "cloud, cameras, rays and costs in space",
-        new: |state| Box::new(space::SpaceView::new(state)),
-    },
-    Entry {
-        name: "ransac",
-        title: "RANSAC",
-        about: "likelihood and inliers of every hypothesis, the test of the best",
-        new: |_| Box::<ransac::RansacView>::default(),
-    },
-    Entry {
-        name: "surface",
-        title: "Cost surface",
-        about: "cost and coverage of every position tried, minima, slices",
-        new: |_| Box::<surface::SurfaceView>::default(),
-    },
-    Entry {
-        name: "histogram",
-        title: "Histogram",
-        about: "joint histogram and entropies of MI, residuals of PM",
-        new: |_| Box::<histogram::HistogramView>::default(),
-    },
-    Entry {
-        name: "fusion",
-        title: "Fusion",
-        about: "what each reference gives alone, its weight, and the fused pose",
-        new: |_| Box::<fusion::FusionView>::default(),
-    },
-    Entry {
-        name: "charts",
-        title: "Charts",
-        about: "the results of all queries: scatter of two measures, recall, verdicts",
-        new: |_| Box::<charts::ChartsView>::default(),
-    },
-    Entry {
-        name: "lockstep",
-        title: "Lock-step",
-        about: "all methods beside each other, each as many steps into its work",
-        new: |_| Box::<lockstep::LockstepView>::default(),
-    },
-    Entry {
-        name: "log",
-        title: "Log",
-        about: "every decision in words",
-        new: |_| Box::<log::LogView>::default(),
-    },
+    entry::<queries::QueriesView>(QUERIES, "Queries", "all queries with what is known of them"),
+    entry::<batch::BatchView>(
+        "batch",
+        "Batch",
+        "the results of all queries in a table: filter, sort, open",
+    ),
+    entry::<references::ReferencesView>(
+        "references",
+        "References",
+        "which frames the query is localised against, and how their poses are fused",
+    ),
+    entry::<parameters::ParametersView>(
+        PARAMETERS,
+        "Parameters",
+        "every parameter with unit, range and meaning",
+    ),
+    entry::<breakpoints::BreakpointsView>("breakpoints", "Breakpoints", "where a run is to stop"),
+    entry::<images::ImagesView>(
+        "images",
+        "Images",
+        "both photos, their matches, and where each feature ended",
+    ),
+    entry::<retrieval::RetrievalView>(
+        "retrieval",
+        "Retrieval",
+        "frames that resemble the query, and what in them lies alike",
+    ),
+    entry::<synthetic::SynthesisView>(
+        "synthetic",
+        "Synthetic",
+        "the synthetic view beside the query, and what the cost makes of them",
+    ),
+    entry::<space::SpaceView>(
+        "space",
+        "3-D",
+        "where reference, truth and estimates stand in the coloured cloud",
+    ),
+    entry::<ransac::RansacView>(
+        "ransac",
+        "RANSAC",
+        "likelihood and inliers of every hypothesis, the test of the best",
+    ),
+    entry::<surface::SurfaceView>(
+        "surface",
+        "Cost surface",
+        "cost and coverage of every position tried, minima, slices",
+    ),
+    entry::<histogram::HistogramView>(
+        "histogram",
+        "Histogram",
+        "joint histogram and entropies of MI, residuals of PM",
+    ),
+    entry::<fusion::FusionView>(
+        "fusion",
+        "Fusion",
+        "what each reference gives alone, its weight, and the fused pose",
+    ),
+    entry::<charts::ChartsView>(
+        "charts",
+        "Charts",
+        "the results of all queries: scatter of two measures, recall, verdicts",
+    ),
+    entry::<lockstep::LockstepView>(
+        "lockstep",
+        "Lock-step",
+        "all methods beside each other, each as many steps into its work",
+    ),
+    entry::<log::LogView>("log", "Log", "every decision in words"),
 ];
+
+const fn entry<V: View + Default + 'static>(
+    name: &'static str,
+    title: &'static str,
+    about: &'static str,
+) -> Entry {
+    Entry { name, title, about, new: || Box::<V>::default() }
+}

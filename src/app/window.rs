@@ -5,7 +5,6 @@ use egui::ViewportBuilder;
 use super::App;
 use super::adapter;
 use super::arrangement::Arrangement;
-use super::command::Command;
 use super::selection::KnownResults;
 use super::setup::Setup;
 use crate::lesson::Lesson;
@@ -67,7 +66,7 @@ pub fn open(setup: Setup, results: KnownResults) -> Result<(), WindowError> {
         let has_results = !results.now.is_empty();
         let mut app = app.with_results(results);
         if has_results {
-            app.send(Command::Arrange(Arrangement::Batch));
+            app.arrange(Arrangement::Batch);
         }
         app
     })

@@ -1,4 +1,4 @@
-//! A thread that answers questions one after the other.
+//! Threads that answer questions one after the other.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
@@ -103,6 +103,85 @@ impl<Q: Send + 'static, A: Send + 'static> Worker<Q, A> {
     /// Whether an answer is still to come.
     pub(super) fn is_busy(&self) -> bool {
         self.waiting > 0
+    }
+}
+
+impl<Q, A> Drop for Worker<Q, A> {
+    fn drop(&mut self) {
+        self.epoch.fetch_add(1, Ordering::Relaxed);
+    }
+}
+
+/// Answers to questions that are each asked once, by key.
+pub(super) struct Answers<K, Q, A> {
+    worker: Worker<(K, Q), (K, A)>,
+    /// What was asked; `None` until there is an answer.
+    known: Vec<(K, Option<A>)>,
+}
+
+impl<K: Clone + PartialEq + Send + 'static, Q: Send + 'static, A: Send + 'static> Answers<K, Q, A> {
+    /// Starts the thread that answers.
+    pub(super) fn new(
+        name: &str,
+        ctx: egui::Context,
+        answer: impl Fn(&K, Q) -> A + Send + 'static,
+    ) -> Self {
+        let worker = Worker::new(name, ctx, move |(key, question): (K, Q)| {
+            let answer = answer(&key, question);
+            (key, answer)
+        });
+        Self { worker, known: Vec::new() }
+    }
+
+    /// Asks a question, unless that was done before.
+    pub(super) fn ask(&mut self, key: K, question: impl FnOnce() -> Option<Q>) {
+        let is_asked = self.known.iter().any(|(known, _)| *known == key);
+        if let Some(question) = (!is_asked).then(question).flatten() {
+            self.known.push((key.clone(), None));
+            self.worker.ask((key, question));
+        }
+    }
+
+    /// The answer for a key, once it is there.
+    pub(super) fn get(&self, key: &K) -> Option<&A> {
+        self.find(|known| known == key)
+    }
+
+    /// The answer for the first key of which something is true.
+    pub(super) fn find(&self, is_meant: impl Fn(&K) -> bool) -> Option<&A> {
+        self.known.iter().find(|(key, _)| is_meant(key))?.1.as_ref()
+    }
+
+    /// Takes in answers. Whether none ended in a panic.
+    pub(super) fn poll(&mut self) -> bool {
+        let mut all_is_well = true;
+        for answer in self.worker.poll() {
+            let Some((key, answer)) = answer else {
+                all_is_well = false;
+                continue;
+            };
+            // Its key may be forgotten by now.
+            if let Some((_, known)) = self.known.iter_mut().find(|(known, _)| *known == key) {
+                *known = Some(answer);
+            }
+        }
+        all_is_well
+    }
+
+    /// Forgets some keys with their answers.
+    pub(super) fn forget_where(&mut self, is_meant: impl Fn(&K) -> bool) {
+        self.known.retain(|(key, _)| !is_meant(key));
+    }
+
+    /// Forgets everything: what the answers depend on has changed.
+    pub(super) fn forget(&mut self) {
+        self.worker.forget();
+        self.known.clear();
+    }
+
+    /// Whether an answer is still to come.
+    pub(super) fn is_busy(&self) -> bool {
+        self.worker.is_busy()
     }
 }
 

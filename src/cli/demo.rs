@@ -1,8 +1,6 @@
 //! The bare command: all four estimators on the built-in street.
 
-use clap::Parser as _;
-
-use super::args::{Arguments, Command};
+use super::args::RunArgs;
 use super::defaults::{FOLDER, QUERY, REFERENCE, SCENE};
 use super::failure::CliError;
 use super::run;
@@ -20,21 +18,10 @@ Next:
 pub fn demo(terminal: &Terminal) -> Result<(), CliError> {
     std::fs::create_dir_all(FOLDER).map_err(CliError::io(FOLDER))?;
     let recording = format!("{FOLDER}/demo.rrd");
-    let words = [
-        "posescope",
-        "run",
-        SCENE,
-        "--query",
-        QUERY,
-        "--reference",
-        REFERENCE,
-        "--save",
-        &recording,
-    ];
-    match Arguments::parse_from(words).command {
-        Some(Command::Run(args)) => run::run(&args, terminal)?,
-        _ => unreachable!("the words begin with `run`"),
-    }
+    let line =
+        format!("posescope run {SCENE} --query {QUERY} --reference {REFERENCE} --save {recording}");
+    let args = RunArgs::parse(line.split(' ').map(str::to_owned))?;
+    run::run(&args, terminal)?;
     terminal.say(|| NEXT.to_owned());
     view_where_there_is_a_display(terminal)
 }
@@ -44,6 +31,10 @@ fn view_where_there_is_a_display(terminal: &Terminal) -> Result<(), CliError> {
     if !posescope::app::has_display() {
         return Ok(());
     }
+    use clap::Parser as _;
+
+    use super::args::{Arguments, Command};
+
     match Arguments::parse_from(["posescope", "view", SCENE]).command {
         Some(Command::View(args)) => super::view::view(&args, terminal),
         _ => unreachable!("the words begin with `view`"),

@@ -21,16 +21,13 @@ pub fn doctor(args: &DoctorArgs, terminal: &Terminal) -> Result<(), CliError> {
     }
     let mut broken = None;
     for (index, argument) in args.scenes.iter().enumerate() {
-        if index > 0 && !terminal.is_quiet() {
+        if index > 0 && !terminal.is_quiet {
             output::print(&"")?;
         }
         let verdict = examine_scene(args, argument, terminal)?;
         broken = broken.or(verdict);
     }
-    match broken {
-        Some(verdict) => Err(CliError::Unhealthy(verdict)),
-        None => Ok(()),
-    }
+    broken.map_or(Ok(()), |verdict| Err(CliError::Unusable(verdict)))
 }
 
 /// Prints the findings on a scene, and returns why it is unusable.
@@ -50,7 +47,7 @@ fn examine_scene(
         let frames = frames.collect::<Result<Vec<_>, _>>()?;
         record_checkup(&Targets::file(path), scene.name(), &frames)?;
     }
-    if !terminal.is_quiet() {
+    if !terminal.is_quiet {
         let text = report(scene.as_ref(), &found, terminal.width());
         output::print(&text.trim_end())?;
     }

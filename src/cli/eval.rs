@@ -32,10 +32,14 @@ use super::output;
 use super::table;
 use super::terminal::Terminal;
 
+/// Recorded failures by default.
+const KEPT_FAILURES: usize = 20;
+
 pub fn eval(args: &EvalArgs, terminal: &Terminal) -> Result<(), CliError> {
     if let Some(EvalCommand::Merge(args)) = &args.command {
         let run = merge(&args.parts, &args.out)?;
-        failures::merge(&args.parts, &args.out, args.judging.kept_failures(), &run)?;
+        let kept = args.judging.keep_failures.unwrap_or(KEPT_FAILURES);
+        failures::merge(&args.parts, &args.out, kept, &run)?;
         return finish(&args.judging, None, &args.out, &run, terminal);
     }
     let protocol = args.protocol.over(Protocol::default())?;
@@ -117,10 +121,8 @@ fn execute(
     let bar = terminal.bar(run.items().count() as u64);
     bar.set_position(run_folder.done() as u64);
     let interrupt = Interrupt::listen();
-    let kept = match &args.sweep {
-        Some(_) => args.judging.keep_failures.unwrap_or(0),
-        None => args.judging.kept_failures(),
-    };
+    let kept = if args.sweep.is_some() { 0 } else { KEPT_FAILURES };
+    let kept = args.judging.keep_failures.unwrap_or(kept);
     let mut observer = FailureRecordings::new(
         kept,
         &run_folder,
@@ -172,7 +174,8 @@ fn plan(args: &EvalArgs, swept: Option<(&Sweep, &str)>) -> Result<PlannedRun, Cl
         protocol.fusions = Fusion::all().filter(|f| f.name == "r-wavg").collect();
     }
     if let Some((sweep, value)) = swept {
-        sweep.apply(value, &mut protocol.degrade, &mut params);
+        let applied = sweep.apply(value, &mut protocol.degrade, &mut params);
+        applied.map_err(|error| CliError::Usage(error.to_string()))?;
     }
     let draw = Draw { limit: protocol.limit, only: &args.query, seed: protocol.seed };
     let pairs = pairs(&draw, &scenes)?;
@@ -244,10 +247,8 @@ fn pairs(draw: &Draw<'_>, scenes: &Scenes) -> Result<Vec<ScenePair>, CliError> {
 }
 
 fn known_failures(args: &JudgingArgs) -> Result<KnownFailures, CliError> {
-    match &args.known_failures {
-        Some(path) => Ok(KnownFailures::read(path)?),
-        None => Ok(KnownFailures::default()),
-    }
+    let read = args.known_failures.as_deref().map(KnownFailures::read);
+    Ok(read.transpose()?.unwrap_or_default())
 }
 
 /// The report of a run, and why it fails.
@@ -289,14 +290,14 @@ fn finish(
     terminal: &Terminal,
 ) -> Result<(), CliError> {
     let Judged { report, known, mut failures } = Judged::of(args, again, folder, run)?;
-    if !terminal.is_quiet() {
+    if !terminal.is_quiet {
         show(&report, run, terminal.width())?;
         eprintln!("Run: {}", folder.display());
     }
     let mut compared = None;
     if let Some(before) = args.baseline.as_deref().or(again) {
         let comparison = against(before, folder, again.is_some())?;
-        if !terminal.is_quiet() {
+        if !terminal.is_quiet {
             output::print(&compare::shown(&comparison, terminal.width()).trim_end())?;
         }
         let changes = comparison.differences.iter();

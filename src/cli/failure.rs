@@ -50,8 +50,6 @@ pub enum CliError {
     Config { path: PathBuf, source: ParamError },
     #[error("{}: {source}", .path.display())]
     Io { path: PathBuf, source: io::Error },
-    #[error("{0}")]
-    NoReference(String),
     #[error(transparent)]
     Index(#[from] NoIndex),
     #[error(transparent)]
@@ -76,16 +74,12 @@ pub enum CliError {
         "--compute gpu needs a posescope that is built with the feature `gpu`; use --compute cpu"
     )]
     NoGpu,
-    /// There is no adapter to draw with, or the picture cannot be saved.
-    #[cfg(feature = "app")]
-    #[error("{0}")]
-    Picture(String),
     /// A gate or a comparison failed.
     #[error("{0}")]
     NotGoodEnough(String),
-    /// A scene is unusable or contains a mistake.
+    /// A scene is unusable or has no reference, or a picture cannot be drawn or saved.
     #[error("{0}")]
-    Unhealthy(String),
+    Unusable(String),
     /// The user pressed Ctrl-C; finished work is kept.
     #[error("stopped by Ctrl-C; {0}")]
     Interrupted(String),
@@ -124,9 +118,7 @@ impl CliError {
             | Self::Choice(ChoiceError::UnknownPosition { .. } | ChoiceError::NoIndex)
             | Self::Draw(DrawError::NotDrawn { .. })
             | Self::Folder(
-                FolderError::NotEmpty { .. }
-                | FolderError::OtherRun { .. }
-                | FolderError::InUse { .. },
+                FolderError::NotEmpty { .. } | FolderError::OtherRun { .. } | FolderError::InUse(_),
             )
             | Self::Lesson(LessonError::Unknown { .. })
             | Self::Scene(SceneError::UnknownFormat { .. }) => USAGE,

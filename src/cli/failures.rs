@@ -50,7 +50,7 @@ impl<'a> FailureRecordings<'a> {
         let path = folder.path().join(FAILURES);
         fs::create_dir_all(&path).map_err(FolderError::io(&path))?;
         let failures = failures(folder.path(), run)?;
-        let mut observer = CliObserver::new(indicatif::ProgressBar::hidden(), None, interrupt);
+        let mut observer = CliObserver::new(indicatif::ProgressBar::hidden(), interrupt);
         observer.events = events;
         Ok(Self {
             folder: path,

@@ -22,7 +22,7 @@ pub fn index(args: &IndexArgs, terminal: &Terminal) -> Result<(), CliError> {
     let options =
         IndexOptions { words: params.index.words, every: args.every.get(), seed: args.seed };
     let without = left_out(scene.as_ref(), &args.without)?;
-    let request = Retriever::request_without(scene.as_ref(), &options, &without, &params);
+    let request = Retriever::request(scene.as_ref(), &options, &without, &params);
     if !args.force {
         let there = Index::open(&path, params.retrieval.checks);
         match there.and_then(|index| index.check_request(&request)) {

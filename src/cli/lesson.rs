@@ -5,9 +5,10 @@ use std::path::Path;
 use std::sync::Arc;
 
 use posescope::estimator;
-use posescope::lesson::{Lesson, OpenSetting, PageTurner};
+use posescope::lesson::{Lesson, PageTurner, named_scenes};
 use posescope::method::Method;
 use posescope::scene::Scene;
+use posescope::session::Job;
 use posescope::sink::rerun::{Identity, Recorder, Targets};
 use posescope::table::Table;
 
@@ -78,20 +79,20 @@ fn save(lesson: &Lesson, path: &Path, terminal: &Terminal) -> Result<(), CliErro
     let interrupt = Interrupt::listen();
     let groups = lesson.groups();
     let mut scenes: BTreeMap<String, Arc<dyn Scene>> = BTreeMap::new();
-    let mut settings: Vec<OpenSetting> = Vec::new();
+    let mut jobs: Vec<Job> = Vec::new();
     for (variant, _) in &groups {
-        let open = lesson.setting(variant).open(&|name| scenes.get(name).cloned())?;
-        scenes.extend(open.named_scenes());
-        settings.push(open);
+        let job = lesson.setting(variant).open(&|name| scenes.get(name).cloned())?;
+        scenes.extend(named_scenes(&job.task, &job.references, &job.queries));
+        jobs.push(job);
     }
-    let recorder = recorder(lesson, &settings, path)?;
-    let bar = terminal.bar(settings.iter().map(estimates).sum());
-    let mut observer = CliObserver::new(bar.clone(), Some(recorder), interrupt.clone());
+    let recorder = recorder(lesson, &jobs, path)?;
+    let bar = terminal.bar(jobs.iter().map(estimates).sum());
+    let mut observer = CliObserver::new(bar.clone(), interrupt.clone());
+    observer.recorder = Some(recorder);
     let mut outcome = Ok(());
-    for (number, ((_, pages), setting)) in groups.iter().zip(settings).enumerate() {
+    for (number, ((_, pages), job)) in groups.iter().zip(jobs).enumerate() {
         observer.pages = Some(PageTurner::new(lesson, pages.clone()));
-        let frames = Arc::default();
-        let worked = setting.job(&frames).work(number, &mut observer, |_| {});
+        let worked = job.work(number, &mut observer, |_| {});
         observer.turn_last_pages();
         if let Err(error) = worked {
             outcome = Err(CliError::from(error));
@@ -112,21 +113,21 @@ fn save(lesson: &Lesson, path: &Path, terminal: &Terminal) -> Result<(), CliErro
 }
 
 /// The expected number of results.
-fn estimates(setting: &OpenSetting) -> u64 {
-    let references = setting.references.len().max(1);
-    (references * setting.task.protocol.methods.len()) as u64
+fn estimates(job: &Job) -> u64 {
+    let references = job.chosen.frames.len().max(1);
+    (references * job.task.protocol.methods.len()) as u64
 }
 
-fn recorder(lesson: &Lesson, settings: &[OpenSetting], path: &Path) -> Result<Recorder, CliError> {
-    let first = &settings[0];
-    let (scenes, protocol) = (&first.scenes, &first.task.protocol);
-    let (references, queries) = (scenes.references.as_ref(), scenes.queries.as_ref());
+fn recorder(lesson: &Lesson, jobs: &[Job], path: &Path) -> Result<Recorder, CliError> {
+    let first = &jobs[0];
+    let protocol = &first.task.protocol;
+    let (references, queries) = (first.references.as_ref(), first.queries.as_ref());
     let identity = Identity {
         queries: vec![format!("lesson {}", lesson.name)],
         references: protocol.named_references().map(str::to_owned).collect(),
         ..Identity::of(references, queries, &first.task.params, protocol)
     };
-    let requested = settings.iter().flat_map(|setting| &setting.task.protocol.methods);
+    let requested = jobs.iter().flat_map(|job| &job.task.protocol.methods);
     // In the order in which the methods run.
     let methods: Vec<Method> =
         estimator::methods().filter(|method| requested.clone().any(|one| one == method)).collect();

@@ -11,13 +11,15 @@ use posescope::localize::{LocalizeObserver, QueryResult, StageTimes};
 use posescope::method::Method;
 use posescope::problem::Problem;
 use posescope::session::{Explaining, StopAtBreakpoint};
-use posescope::sink::Progress;
 use posescope::sink::rerun::Recorder;
 use posescope::trace::{Cancelled, Record, Sink};
 
 use super::event_export::EventExport;
 use super::interrupt::Interrupt;
 use super::match_export::MatchExport;
+
+/// From this number of candidates, an index is worth building.
+const MANY: usize = 100;
 
 /// Advances a progress bar with every finished method, and feeds recorder and exports.
 pub struct CliObserver {
@@ -30,11 +32,12 @@ pub struct CliObserver {
     pub events: Option<EventExport>,
     /// Ends the run at a breakpoint, if one is set.
     pub stop: Option<StopAtBreakpoint>,
+    /// The scene whose photos are compared one by one, if an index should be recommended for it.
+    pub index_for: Option<String>,
+    pub bar: indicatif::ProgressBar,
     interrupt: Interrupt,
-    bar: indicatif::ProgressBar,
-    progress: Option<Progress>,
-    /// Query and reference of each problem.
-    tasks: Vec<String>,
+    /// The open stages of the current method.
+    stages: Vec<&'static str>,
     /// The start of the current explanation.
     explaining_since: Instant,
     problems: Vec<Problem>,
@@ -45,25 +48,27 @@ pub struct CliObserver {
 }
 
 impl CliObserver {
-    pub fn new(
-        bar: indicatif::ProgressBar,
-        recorder: Option<Recorder>,
-        interrupt: Interrupt,
-    ) -> Self {
+    pub fn new(bar: indicatif::ProgressBar, interrupt: Interrupt) -> Self {
         Self {
-            recorder,
+            recorder: None,
             export: None,
             pages: None,
             events: None,
             stop: None,
+            index_for: None,
             interrupt,
             bar,
-            progress: None,
-            tasks: Vec::new(),
+            stages: Vec::new(),
             explaining_since: Instant::now(),
             problems: Vec::new(),
             problem: 0,
             method: None,
+        }
+    }
+
+    fn record(&mut self, record: impl FnOnce(&mut Recorder)) {
+        if let Some(recorder) = &mut self.recorder {
+            record(recorder);
         }
     }
 
@@ -91,9 +96,18 @@ impl Sink for CliObserver {
     }
 
     fn accept(&mut self, record: &Record) -> Result<(), Cancelled> {
+        let problem = self.problems.get(self.problem);
         let is_stage = matches!(record.event, Event::StageStarted(_) | Event::StageEnded(_));
-        if is_stage && let Some(progress) = &mut self.progress {
-            progress.accept(record)?;
+        match &record.event {
+            Event::StageStarted(started) => {
+                self.stages.push(started.stage.name());
+                let names = problem.map(|problem| (&problem.query.name, &problem.reference.name));
+                let task = names.map(|(query, reference)| format!("{query} ← {reference}"));
+                let path = self.stages.join(" › ");
+                self.bar.set_message(format!("{} {path}", task.unwrap_or_default()));
+            }
+            Event::StageEnded(_) => drop(self.stages.pop()),
+            _ => {}
         }
         match &mut self.recorder {
             Some(recorder) if is_stage || recorder.wanted().contains(record.event.kind()) => {
@@ -106,10 +120,9 @@ impl Sink for CliObserver {
                 recorder.show_page(&page);
             }
         }
-        if let (Some(export), Some(problem)) = (&mut self.export, self.problems.get(self.problem)) {
+        if let (Some(export), Some(problem)) = (&mut self.export, problem) {
             export.accept(record, problem);
         }
-        let problem = self.problems.get(self.problem);
         if let (Some(events), Some(problem), Some(method)) =
             (&mut self.events, problem, self.method)
         {
@@ -128,33 +141,35 @@ impl Sink for CliObserver {
 
 impl LocalizeObserver for CliObserver {
     fn begin_query(&mut self, index: usize, problems: &[Problem], truth: Option<&Pose>) {
-        let name =
-            |problem: &Problem| format!("{} ← {}", problem.query.name, problem.reference.name);
-        self.tasks = problems.iter().map(name).collect();
-        if self.export.is_some() || self.events.is_some() {
-            self.problems = problems.to_vec();
+        self.problems = problems.to_vec();
+        self.stages.clear();
+        self.record(|recorder| recorder.begin_query(index, problems, truth));
+    }
+
+    fn choosing(&mut self, looked_at: usize, candidates: usize) {
+        if candidates >= MANY
+            && let Some(scene) = self.index_for.take()
+        {
+            eprintln!(
+                "Comparing the query with {candidates} photos. An index is faster: run `posescope index {scene}`, then use \
+                 --reference retrieve:1"
+            );
         }
-        self.progress = None;
-        if let Some(recorder) = &mut self.recorder {
-            recorder.begin_query(index, problems, truth);
-        }
+        self.bar.set_message("choosing references");
+        self.bar.set_length(candidates as u64);
+        self.bar.set_position(looked_at as u64);
     }
 
     fn begin_method(&mut self, problem: usize, method: Method) {
-        let task = self.tasks.get(problem).cloned().unwrap_or_default();
-        self.progress = Some(Progress::new(self.bar.clone(), task));
+        self.stages.clear();
         self.problem = problem;
         self.method = Some(method);
-        if let Some(recorder) = &mut self.recorder {
-            recorder.begin_method(problem, method);
-        }
+        self.record(|recorder| recorder.begin_method(problem, method));
     }
 
     fn end_method(&mut self, result: &QueryResult, times: &StageTimes) {
         self.bar.inc(1);
-        if let Some(recorder) = &mut self.recorder {
-            recorder.end_method(result, times);
-        }
+        self.record(|recorder| recorder.end_method(result, times));
     }
 
     fn explaining(&mut self, result: &QueryResult, tried: usize, remedies: usize) {
@@ -167,17 +182,13 @@ impl LocalizeObserver for CliObserver {
     }
 
     fn explained(&mut self, result: &QueryResult) {
-        if let Some(recorder) = &mut self.recorder {
-            recorder.explained(result);
-        }
+        self.record(|recorder| recorder.explained(result));
     }
 
     fn begin_fusion(&mut self, method: Method) {
         self.problem = 0;
         self.method = Some(method);
-        if let Some(recorder) = &mut self.recorder {
-            recorder.begin_fusion(method);
-        }
+        self.record(|recorder| recorder.begin_fusion(method));
     }
 
     fn attention(&self) -> Option<Arc<AtomicBool>> {
@@ -185,8 +196,6 @@ impl LocalizeObserver for CliObserver {
     }
 
     fn end_fusion(&mut self, result: &QueryResult) {
-        if let Some(recorder) = &mut self.recorder {
-            recorder.end_fusion(result);
-        }
+        self.record(|recorder| recorder.end_fusion(result));
     }
 }

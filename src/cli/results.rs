@@ -53,7 +53,7 @@ pub fn results(args: &ResultsArgs, terminal: &Terminal) -> Result<(), CliError> 
     } else {
         let results = shown.iter().map(|&index| &results[index]);
         let tables = match args.table {
-            TableName::Rows => vec![row_table(args, form, results)?],
+            TableName::Rows => vec![row_table(args, form, results)],
             table => table.of(&RunResults::of(results.cloned().collect(), run.failure_radius_m())),
         };
         if tables.is_empty() {
@@ -89,19 +89,15 @@ fn row_table<'a>(
     args: &ResultsArgs,
     form: Form,
     results: impl Iterator<Item = &'a QueryResult>,
-) -> Result<Table, CliError> {
+) -> Table {
     let is_text = form == Form::Text;
     let columns: Vec<&Field> = match args.columns.as_slice() {
-        [] if is_text => COLUMNS
-            .into_iter()
-            .map(Field::find)
-            .collect::<Result<_, _>>()
-            .map_err(|error| CliError::Usage(error.to_string()))?,
+        [] if is_text => COLUMNS.into_iter().filter_map(|name| Field::find(name).ok()).collect(),
         [] => Field::ALL.iter().chain(Field::POSE).collect(),
         named => named.to_vec(),
     };
     let text = if is_text { Field::text } else { Field::whole };
-    Ok(rows(results, columns, text))
+    rows(results, columns, text)
 }
 
 /// Writes a figure of the run as SVG.
@@ -133,9 +129,9 @@ fn poses(
         error => CliError::Usage(error.to_string()),
     })?;
     match (files.as_slice(), &args.out) {
-        ([only], out) => write(&only.text, out.as_deref())?,
+        ([(_, only)], out) => write(only, out.as_deref())?,
         (_, None) => {
-            let names: Vec<&str> = files.iter().map(|file| file.name).collect();
+            let names: Vec<&str> = files.iter().map(|(name, _)| *name).collect();
             return Err(CliError::Usage(format!(
                 "this format has several files ({}); name a folder with --out",
                 names.join(", ")
@@ -143,8 +139,8 @@ fn poses(
         }
         (files, Some(folder)) => {
             std::fs::create_dir_all(folder).map_err(FolderError::io(folder))?;
-            for file in files {
-                write(&file.text, Some(&folder.join(file.name)))?;
+            for (name, text) in files {
+                write(text, Some(&folder.join(name)))?;
             }
         }
     }

@@ -14,7 +14,6 @@ use posescope::sink::SceneNames;
 use posescope::sink::rerun::{Identity, Recorder, Targets};
 
 use super::args::RunArgs;
-use super::choice::ChoiceProgress;
 use super::event_export::EventExport;
 use super::failure::CliError;
 use super::interrupt::Interrupt;
@@ -34,10 +33,7 @@ struct Plan<'a> {
 }
 
 /// One query, as its position in its scene, with its references.
-struct PlannedQuery {
-    query: usize,
-    references: References,
-}
+type PlannedQuery = (usize, References);
 
 pub fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), CliError> {
     let OpenedTask { task, scenes, queries: wanted } =
@@ -50,29 +46,22 @@ pub fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), CliError> {
             frame_range(queries)
         )));
     }
-    let localizer = task.protocol.configured(Localizer::new(
-        scenes.references.as_ref(),
-        queries,
-        &task.params,
-        task.protocol.seed,
-    ));
-    let plan = Plan {
-        args,
-        task: &task,
-        localizer: localizer.with_foreign(task.protocol.foreign(queries)?),
-    };
+    let references = scenes.references.as_ref();
+    let localizer = Localizer::new(references, queries, &task.params, task.protocol.seed);
+    let plan = Plan { args, task: &task, localizer: task.protocol.configured(localizer)? };
     let wanted = if args.all { (0..queries.frames().len()).collect() } else { wanted };
     let interrupt = Interrupt::listen();
     let has_index = matches!(task.protocol.selection(), Selection::Retrieved(_));
-    let index_for = (!has_index).then_some(args.scene.as_str());
-    let mut progress = ChoiceProgress::new(terminal, &interrupt, index_for);
-    let tasks = match plan.queries(wanted, &mut progress) {
+    let mut observer = CliObserver::new(terminal.bar(0), interrupt.clone());
+    observer.index_for = Some(args.scene.clone()).filter(|_| !has_index && !terminal.is_quiet);
+    let tasks = plan.queries(wanted, &mut observer);
+    observer.bar.finish_and_clear();
+    let tasks = match tasks {
         Err(CliError::Choice(ChoiceError::Cancelled(_))) if interrupt.is_raised() => {
             return Err(CliError::Interrupted("no query is finished".to_owned()));
         }
         tasks => tasks?,
     };
-    drop(progress);
     if !args.task.protocol.has("references")
         && matches!(task.protocol.selection(), Selection::Random(_))
     {
@@ -85,10 +74,10 @@ pub fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), CliError> {
     let mut json = args.json.as_deref().map(JsonLines::create).transpose()?;
     let mut results = Vec::new();
     let methods = &task.protocol.methods;
-    let estimates = tasks.iter().map(|task| task.references.frames.len());
+    let estimates = tasks.iter().map(|(_, references)| references.frames.len());
     let estimates_planned = estimates.sum::<usize>() * methods.len();
-    let bar = terminal.bar(estimates_planned as u64);
-    let mut observer = CliObserver::new(bar.clone(), plan.recorder(&tasks)?, interrupt.clone());
+    observer.bar = terminal.bar(estimates_planned as u64);
+    observer.recorder = plan.recorder(&tasks)?;
     if let Some(folder) = &args.export_matches {
         plan.check_features()?;
         observer.export = Some(MatchExport::to(folder)?);
@@ -96,7 +85,7 @@ pub fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), CliError> {
     if let Some(path) = &args.events {
         let mut events = EventExport::to(path)?;
         let name = |scene: &dyn Scene| scene.name().to_owned();
-        let references = name(scenes.references.as_ref());
+        let references = name(references);
         events.name_scenes(SceneNames {
             query: Some(name(queries)).filter(|query| *query != references),
             references,
@@ -107,16 +96,16 @@ pub fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), CliError> {
         let breakpoints = Breakpoints::new(task.breakpoints.iter().cloned());
         observer.stop = Some(StopAtBreakpoint::new(breakpoints));
     }
-    let outcome = tasks.iter().enumerate().try_for_each(|(index, query)| {
+    let outcome = tasks.iter().enumerate().try_for_each(|(index, (query, references))| {
         let request = Request {
             radius_m: task.radius_m(),
-            references: query.references.clone(),
+            references: references.clone(),
             fusions: task.protocol.fusions.clone(),
             setting: None,
         };
         let localized = plan.localizer.localize(
             index,
-            query.query,
+            *query,
             &[request],
             methods,
             &mut observer,
@@ -132,7 +121,7 @@ pub fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), CliError> {
         }
         localized
     });
-    bar.finish_and_clear();
+    observer.bar.finish_and_clear();
 
     // After an error, finished results are still shown and the recording is closed.
     let shown = plan.show(&results, terminal);
@@ -172,9 +161,9 @@ impl Plan<'_> {
     /// A photo that is one of the scene's own would be localised against itself.
     fn warn_of_copies(&self, tasks: &[PlannedQuery]) -> Result<(), CliError> {
         let (from, of) = (self.localizer.references(), self.localizer.queries());
-        for task in tasks {
-            let query = of.query(task.query)?;
-            for &reference in &task.references.frames {
+        for (query, references) in tasks {
+            let query = of.query(*query)?;
+            for &reference in &references.frames {
                 let reference = from.query(reference)?;
                 if reference.photo.gray == query.photo.gray {
                     log::warn!(
@@ -210,7 +199,7 @@ impl Plan<'_> {
         results: &[(QueryResult, Duration)],
         terminal: &Terminal,
     ) -> Result<(), CliError> {
-        if terminal.is_quiet() || results.is_empty() {
+        if terminal.is_quiet || results.is_empty() {
             return Ok(());
         }
         let width = terminal.width();
@@ -226,7 +215,7 @@ impl Plan<'_> {
     fn queries(
         &self,
         wanted: Vec<usize>,
-        progress: &mut ChoiceProgress<'_>,
+        observer: &mut CliObserver,
     ) -> Result<Vec<PlannedQuery>, CliError> {
         let (task, protocol) = (self.task, &self.task.protocol);
         let references = self.localizer.references();
@@ -243,23 +232,17 @@ impl Plan<'_> {
             )?),
             _ => None,
         };
-        let chooser = Chooser {
-            localizer: &self.localizer,
-            params: &task.params,
-            selection: protocol.selection(),
-            radius_m: task.reach_m(),
-            seed: protocol.seed,
-            index: index.as_ref().map(|index| index as &dyn Ranking),
-        };
+        let index = index.as_ref().map(|index| index as &dyn Ranking);
+        let chooser = protocol.chooser(&self.localizer, task.reach_m(), index);
         wanted
             .into_iter()
             .map(|query| {
                 let references = if named.is_empty() {
-                    self.chosen(&chooser, query, progress)?
+                    self.chosen(&chooser, query, observer)?
                 } else {
                     named.clone().into()
                 };
-                Ok(PlannedQuery { query, references })
+                Ok((query, references))
             })
             .collect()
     }
@@ -268,12 +251,12 @@ impl Plan<'_> {
         &self,
         chooser: &Chooser<'_>,
         query: usize,
-        progress: &mut ChoiceProgress<'_>,
+        observer: &mut CliObserver,
     ) -> Result<References, CliError> {
-        let chosen = chooser.choose(query, &|_| false, progress)?;
+        let chosen = chooser.choose(query, &|_| false, observer)?;
         if chosen.frames.is_empty() {
             let name = &self.localizer.queries().frames()[query];
-            return Err(CliError::NoReference(format!(
+            return Err(CliError::Unusable(format!(
                 "{}: no frame with a pose and a cloud within {} m of query {name}; \
                  raise --radius or --prior, or name a frame with --reference",
                 self.localizer.references().name(),
@@ -296,10 +279,10 @@ impl Plan<'_> {
         let names = |scene: &dyn Scene, frames: &mut dyn Iterator<Item = usize>| {
             frames.map(|frame| scene.frames()[frame].clone()).collect()
         };
-        let references = tasks.iter().flat_map(|task| task.references.frames.iter());
+        let references = tasks.iter().flat_map(|(_, references)| &references.frames);
         let (from, of) = (self.localizer.references(), self.localizer.queries());
         let identity = Identity {
-            queries: names(of, &mut tasks.iter().map(|task| task.query)),
+            queries: names(of, &mut tasks.iter().map(|(query, _)| *query)),
             references: names(from, &mut references.copied()),
             ..Identity::of(from, of, &self.task.params, &self.task.protocol)
         };

@@ -20,13 +20,13 @@ pub fn screenshot(args: &ViewArgs, out: &Path, terminal: &Terminal) -> Result<()
     };
     let picture = app::shoot(setup, results, &shot).map_err(|error| match error {
         ShotError::Unknown(why) => CliError::Usage(why),
-        other => CliError::Picture(other.to_string()),
+        other => CliError::Unusable(other.to_string()),
     })?;
     if let Some(folder) = out.parent() {
         std::fs::create_dir_all(folder).map_err(CliError::io(folder))?;
     }
     let saved = picture.save(out);
-    saved.map_err(|error| CliError::Picture(format!("{}: {error}", out.display())))?;
+    saved.map_err(|error| CliError::Unusable(format!("{}: {error}", out.display())))?;
     terminal.say(|| format!("Picture: {}", out.display()));
     Ok(())
 }

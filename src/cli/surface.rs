@@ -25,7 +25,7 @@ use super::terminal::Terminal;
 const CELL_PX: u32 = 3;
 
 pub fn surface(args: &RunArgs, out: &Path, terminal: &Terminal) -> Result<(), CliError> {
-    let writer = writer(out)?;
+    let is_table = is_table(out)?;
     let OpenedTask { task, scenes, queries } = opened::open(&args.task, &args.scene, &args.query)?;
     let method = method(args.task.protocol.has("methods"), &task.protocol.methods)?;
     let (references, queried) = (scenes.references.as_ref(), scenes.queries.as_ref());
@@ -52,8 +52,9 @@ pub fn surface(args: &RunArgs, out: &Path, terminal: &Terminal) -> Result<(), Cl
     let scorer = estimator.scorer(&problem).ok_or_else(|| no_cost(method))?;
     let surface = fill(&scorer, task.radius_m(), &grid, terminal)?;
     let seconds = start.elapsed().as_secs_f64();
-    writer(&surface, out)?;
-    if !terminal.is_quiet() {
+    let write = if is_table { write_csv } else { write_png };
+    write(&surface, out)?;
+    if !terminal.is_quiet {
         let truth = queried.pose(query);
         output::print(&described(&surface, &problem, truth.as_ref()))?;
     }
@@ -127,13 +128,11 @@ fn fill(
     Ok(surface)
 }
 
-type Writer = fn(&DenseSurface, &Path) -> Result<(), CliError>;
-
-/// The writer for a file name.
-fn writer(out: &Path) -> Result<Writer, CliError> {
+/// Whether a file is a table, and no picture, by its name.
+fn is_table(out: &Path) -> Result<bool, CliError> {
     match out.extension().and_then(|ending| ending.to_str()) {
-        Some("csv") => Ok(write_csv),
-        Some("png") => Ok(write_png),
+        Some("csv") => Ok(true),
+        Some("png") => Ok(false),
         _ => Err(CliError::Usage(format!(
             "--surface {}: a file name that ends in .csv or .png expected",
             out.display()

@@ -82,7 +82,7 @@ fn write(
     all.into_par_iter().step_by(every).try_for_each(|index| {
         let scan = traversal.cloud(index).into_iter();
         let scan: Vec<_> = scan.map(|point| (point.position, point.reflectance)).collect();
-        writer.frame(&Shot {
+        (writer.frame)(&Shot {
             index,
             photo: &traversal.image(index),
             scan: &scan,
@@ -91,5 +91,5 @@ fn write(
         tick();
         Ok::<(), CliError>(())
     })?;
-    Ok(writer.finish()?)
+    Ok((writer.finish)()?)
 }

@@ -10,7 +10,8 @@ use super::args::Everywhere;
 
 pub struct Terminal {
     bars: MultiProgress,
-    quiet: bool,
+    /// Whether only errors and requested results are printed.
+    pub is_quiet: bool,
 }
 
 impl Terminal {
@@ -40,19 +41,14 @@ impl Terminal {
         if LogWrapper::new(bars.clone(), logger).try_init().is_ok() {
             log::set_max_level(level);
         }
-        Self { bars, quiet: everywhere.quiet }
+        Self { bars, is_quiet: everywhere.quiet }
     }
 
     /// Prints a message on stderr unless `--quiet` is given.
     pub fn say(&self, message: impl FnOnce() -> String) {
-        if !self.is_quiet() {
+        if !self.is_quiet {
             eprintln!("{}", message());
         }
-    }
-
-    /// Whether only errors and requested results are printed.
-    pub fn is_quiet(&self) -> bool {
-        self.quiet
     }
 
     /// The width of a line of results in characters: `COLUMNS`, or that of the terminal; `None` in a pipe.
@@ -68,7 +64,7 @@ impl Terminal {
 
     /// A progress bar over `steps` steps, hidden if stderr is not a terminal.
     pub fn bar(&self, steps: u64) -> ProgressBar {
-        if self.quiet {
+        if self.is_quiet {
             return ProgressBar::hidden();
         }
         let template = "{bar:30} {pos}/{len} {elapsed} {wide_msg}";

@@ -3,14 +3,13 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use clap::Parser as _;
 use posescope::app::{self, KnownResults, Results, Setup, WindowError};
 use posescope::localize::QueryResult;
 use posescope::run::{ScenePair, read_run};
 use posescope::scene::{self, Scene};
 use posescope::session::{IndexFile, RunMode, Task, TaskScenes};
 
-use super::args::{Arguments, Command, ViewArgs};
+use super::args::{RunArgs, ViewArgs};
 use super::defaults;
 use super::failure::CliError;
 use super::opened::{self, OpenedTask};
@@ -38,12 +37,8 @@ fn record_instead(setup: &Setup, why: &WindowError, terminal: &Terminal) -> Resu
     let mut arguments = vec!["posescope".to_owned()];
     arguments.extend(setup.arguments());
     arguments.extend(["--save".to_owned(), recording.display().to_string()]);
-    let parsed = Arguments::try_parse_from(arguments);
-    match parsed.map(|parsed| parsed.command) {
-        Ok(Some(Command::Run(args))) => run::run(&args, terminal),
-        Ok(_) => unreachable!("a task's arguments begin with `run`"),
-        Err(error) => Err(CliError::Usage(error.to_string())),
-    }
+    let args = RunArgs::parse(arguments)?;
+    run::run(&args, terminal)
 }
 
 /// The setup of the window, and the results that are known already.
@@ -126,7 +121,7 @@ fn begin_at(args: &ViewArgs, named: Option<usize>, setup: &mut Setup) -> Result<
     if has_reference(setup, setup.query) {
         return Ok(());
     }
-    Err(CliError::NoReference(format!(
+    Err(CliError::Unusable(format!(
         "{}: no frame with a pose and a cloud within {} m of query {}; raise --radius or --prior, or \
          name a frame with --reference",
         args.scene,
@@ -154,72 +149,56 @@ fn refuse_other_queries(args: &ViewArgs) -> Result<(), CliError> {
 fn of_a_run(args: &ViewArgs, folder: &Path) -> Result<(Setup, KnownResults), CliError> {
     let file = read_run(folder)?;
     let Some(pair) = file.pairs.first() else {
-        return Err(CliError::NoReference(format!("{}: the run has no scenes", folder.display())));
+        return Err(CliError::Unusable(format!("{}: the run has no scenes", folder.display())));
     };
     let scene_argument = file.scenes[pair.scene_index].clone();
     refuse_other_queries(args)?;
     let mut protocol = args.task.protocol.over(file.protocol.clone())?;
     let format = protocol.format.as_deref();
-    let references: Arc<dyn Scene> = scene::open(&scene_argument, format)?.into();
-    let other = protocol
-        .query_scene
-        .iter()
-        .find(|argument| {
-            let scene = scene::open(argument, format);
-            scene.is_ok_and(|scene| scene.name() == pair.query_scene)
-        })
-        .filter(|_| pair.query_scene != pair.scene)
-        .cloned();
-    let queries: Arc<dyn Scene> = match &other {
-        Some(argument) => scene::open(argument, format)?.into(),
-        None => Arc::clone(&references),
+    let is_its = |argument: &&String| {
+        let scene = scene::open(argument, format);
+        scene.is_ok_and(|scene| scene.name() == pair.query_scene)
     };
-    let queries = protocol.prepared_queries(queries, references.as_ref())?;
+    let other = protocol.query_scene.iter().find(is_its);
+    let other = other.filter(|_| pair.query_scene != pair.scene).cloned();
+    protocol.query_scene = other.into_iter().collect();
+    protocol.limit = None;
+    protocol.preset = None;
+    protocol.failure_radius_m = None;
+    protocol.radii_m.truncate(1);
+    let mut task =
+        Task { protocol, breakpoints: args.task.breakpoints.clone(), ..Task::of(scene_argument) };
+    let scenes = task.open(&|_| None)?;
+    let (references, queries) = (scenes.references.as_ref(), scenes.queries.as_ref());
     let params = file
         .params()
         .map_err(|source| CliError::Config { path: folder.join("run.toml"), source })?;
-    let params = args.task.config.over(params)?;
+    task.params = args.task.config.over(params)?;
     let results_of = |folder: &Path| -> Result<Results, CliError> {
-        let mut results = results_of(folder, pair, queries.as_ref())?;
+        let mut results = results_of(folder, pair, queries)?;
         for result in results.values_mut().flatten() {
-            *result = result.clone().graded(protocol.right);
+            *result = result.clone().graded(task.protocol.right);
         }
         Ok(results)
     };
     let results = results_of(folder)?;
     let before = args.before.as_deref().map(results_of).transpose()?;
-    let is_failure = |results: &[QueryResult]| {
-        let mut results = results.iter();
-        results.any(|result| result.grade.is_failure())
+    let has_failed = |(_, results): &(&usize, &Vec<QueryResult>)| {
+        results.iter().any(|result| result.grade.is_failure())
     };
-    let first = results
-        .iter()
-        .find(|(_, results)| is_failure(results.as_slice()))
-        .or_else(|| results.iter().next());
+    let first = results.iter().find(has_failed).or_else(|| results.iter().next());
     let query = match (&args.query, first) {
         (Some(name), _) => queries.find(name)?,
         (None, Some((query, _))) => *query,
         (None, None) => 0,
     };
     let of_run = results.get(&query).and_then(|results| results.first());
-    let named: Vec<&str> = protocol.named_references().collect();
+    let named: Vec<&str> = task.protocol.named_references().collect();
     let of_run = of_run.iter().flat_map(|result| &result.references);
     let of_run = of_run.map(String::as_str).filter(|_| named.is_empty());
     let chosen = named.iter().copied().chain(of_run);
     let chosen = chosen.map(|name| references.find(name));
     let chosen = chosen.collect::<Result<Vec<_>, _>>()?;
-    protocol.query_scene = other.into_iter().collect();
-    protocol.limit = None;
-    protocol.preset = None;
-    protocol.failure_radius_m = None;
-    protocol.radii_m.truncate(1);
-    let task = Task {
-        protocol,
-        params,
-        breakpoints: args.task.breakpoints.clone(),
-        ..Task::of(scene_argument)
-    };
-    let scenes = TaskScenes { references, queries };
     let setup =
         Setup { query, ..setup_of(task, scenes, results.keys().copied().collect(), chosen) };
     let known = KnownResults { now: results, before };
@@ -228,6 +207,9 @@ fn of_a_run(args: &ViewArgs, folder: &Path) -> Result<(Setup, KnownResults), Cli
 
 #[cfg(test)]
 mod tests {
+    use clap::Parser as _;
+
+    use super::super::args::{Arguments, Command};
     use super::*;
 
     /// The window opens at the cause, so the run goes on by itself.

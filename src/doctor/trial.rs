@@ -41,7 +41,7 @@ pub(super) struct Sample {
     poses: Vec<Option<Pose>>,
     sights: BTreeMap<usize, Sight>,
     clouds: BTreeMap<usize, Vec<Point3<f64>>>,
-    anchors: Vec<usize>,
+    pub(super) anchors: Vec<usize>,
 }
 
 /// A reading that fits better than the scene as stated.
@@ -118,15 +118,6 @@ impl Sample {
             }
         }
         Ok(sample)
-    }
-
-    /// Whether there is nothing to compare.
-    pub(super) fn is_empty(&self) -> bool {
-        self.anchors.is_empty()
-    }
-
-    pub(super) fn anchors(&self) -> &[usize] {
-        &self.anchors
     }
 
     /// A frame's photo, and the points of its cloud in the photo.

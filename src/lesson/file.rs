@@ -259,10 +259,7 @@ impl Source<'_> {
         });
         let moment = header.at.or_else(|| left.cloned());
         let moment = moment.unwrap_or(Moment::Start);
-        let question = match header.question {
-            Some(question) => Some(self.question(question, &moment, line)?),
-            None => None,
-        };
+        let question = header.question.map(|question| self.question(question, &moment, line));
         let shown = header.show.or_else(|| Some(before?.show.clone()));
         Ok(Page {
             title: section.title,
@@ -271,7 +268,7 @@ impl Source<'_> {
             at: moment,
             show: shown.unwrap_or_else(|| SHOWN.map(str::to_owned).to_vec()),
             lockstep: header.lockstep,
-            question,
+            question: question.transpose()?,
         })
     }
 

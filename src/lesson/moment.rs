@@ -5,7 +5,7 @@ use std::str::FromStr;
 
 use crate::event::Event;
 use crate::method::Method;
-use crate::session::{BreakAt, Breakpoint, Breakpoints, Run};
+use crate::session::{Breakpoint, Breakpoints, Run};
 use crate::trace::Record;
 
 /// A moment of a run: `start`, `end`, `after fb.match`, or a breakpoint, which is the start of a stage
@@ -51,10 +51,10 @@ impl FromStr for Moment {
         };
         // The parser of breakpoints knows the stages.
         let breakpoint: Breakpoint = stage.parse().map_err(|why| refused(&why))?;
-        match breakpoint.at() {
-            BreakAt::Stage(name) => Ok(Self::After { method: breakpoint.method(), stage: name }),
-            BreakAt::Crossing(_) => Err(refused(&"`after` needs a stage, not a comparison")),
-        }
+        let Some(stage) = breakpoint.stage() else {
+            return Err(refused(&"`after` needs a stage, not a comparison"));
+        };
+        Ok(Self::After { method: breakpoint.method(), stage })
     }
 }
 

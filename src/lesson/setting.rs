@@ -9,7 +9,7 @@ use toml::Spanned;
 use crate::describe::ParamError;
 use crate::params::Params;
 use crate::run::Protocol;
-use crate::scene::{FrameStore, Scene, SceneError};
+use crate::scene::{Scene, SceneError};
 use crate::session::{IndexFile, Job, Task, TaskScenes};
 
 /// The run of a lesson or of a variant: the options of the command line by name, with `scene`, `query` and `set`.
@@ -38,39 +38,6 @@ pub enum SettingError {
     /// A scene or a frame that cannot be opened.
     #[error(transparent)]
     Scene(#[from] SceneError),
-}
-
-/// A setting with its scenes opened.
-#[derive(Clone)]
-pub struct OpenSetting {
-    /// The task.
-    pub task: Task,
-    /// The scenes.
-    pub scenes: TaskScenes,
-    /// The query's position in its scene.
-    pub query: usize,
-    /// The references' positions in their scene; empty if they are chosen for the query.
-    pub references: Vec<usize>,
-}
-
-impl OpenSetting {
-    /// The scenes by their names in the setting.
-    pub fn named_scenes(&self) -> Vec<(String, Arc<dyn Scene>)> {
-        named_scenes(&self.task, &self.scenes.references, &self.scenes.queries)
-    }
-
-    /// The job that localises it, with this cache of frames.
-    pub fn job(&self, frames: &Arc<FrameStore>) -> Job {
-        Job {
-            references: Arc::clone(&self.scenes.references),
-            queries: Arc::clone(&self.scenes.queries),
-            query: self.query,
-            chosen: self.references.clone().into(),
-            task: self.task.clone(),
-            index: Arc::new(IndexFile::of(&self.task)),
-            frames: Arc::clone(frames),
-        }
-    }
 }
 
 /// The scenes of a task by their names in it. Queries without their own scene use that of the references, perhaps
@@ -135,25 +102,28 @@ impl Setting {
         }
     }
 
-    /// Opens the scenes and finds the frames. `opened` returns a scene that is open already.
+    /// The job of the setting, with its scenes opened and a cache of frames of its own. `opened` returns a scene that
+    /// is open already.
     ///
     /// # Errors
     /// [`SettingError`].
     pub fn open(
         &self,
         opened: &dyn Fn(&str) -> Option<Arc<dyn Scene>>,
-    ) -> Result<OpenSetting, SettingError> {
+    ) -> Result<Job, SettingError> {
         let task = self.task()?;
         let query = self.text("query")?.ok_or(SettingError::Missing("query"))?;
-        let scenes = task.open(opened)?;
-        let references = task.protocol.named_references();
-        Ok(OpenSetting {
-            query: scenes.queries.find(query)?,
-            references: references
-                .map(|name| scenes.references.find(name))
-                .collect::<Result<_, _>>()?,
+        let TaskScenes { references, queries } = task.open(opened)?;
+        let query = queries.find(query)?;
+        let named = task.protocol.named_references().map(|name| references.find(name));
+        Ok(Job {
+            query,
+            chosen: named.collect::<Result<Vec<_>, _>>()?.into(),
+            index: Arc::new(IndexFile::of(&task)),
+            frames: Arc::default(),
+            references,
+            queries,
             task,
-            scenes,
         })
     }
 }

@@ -1,11 +1,12 @@
 //! Compares two runs, query by query.
 
+use std::cmp::Reverse;
 use std::collections::BTreeMap;
 
 use super::metrics::Group;
-use super::migration::{Migration, migrations};
-use crate::diagnosis::{Code, Grade, Tolerance};
+use crate::diagnosis::{Code, Tolerance};
 use crate::localize::QueryResult;
+use crate::method::Method;
 use crate::table::Table;
 
 /// What happened to a query from one run to the next.
@@ -42,8 +43,6 @@ pub struct Difference {
     pub before: QueryResult,
     /// The result in the second run.
     pub after: QueryResult,
-    /// The grades in the first and in the second run.
-    pub grades: [Grade; 2],
 }
 
 /// All differences of two runs.
@@ -79,15 +78,9 @@ impl RunComparison {
             };
             comparison.common += 1;
             pairs.push((row.method, [row, other].map(primary)));
-            let grades = [row.grade, other.grade];
-            let [was, is] = grades.map(|grade| !grade.is_failure());
-            if let Some(change) = change(was, is, row, other, tolerance) {
-                comparison.differences.push(Difference {
-                    change,
-                    before: row.clone(),
-                    after: other.clone(),
-                    grades,
-                });
+            if let Some(change) = change(row, other, tolerance) {
+                let (before, after) = (row.clone(), other.clone());
+                comparison.differences.push(Difference { change, before, after });
             }
         }
         comparison.only_after = others.len();
@@ -135,8 +128,8 @@ impl RunComparison {
                 one.change.name().to_owned(),
                 one.before.query.clone(),
                 one.before.method.to_string(),
-                one.grades[0].words(one.before.error.as_ref()),
-                one.grades[1].words(one.after.error.as_ref()),
+                one.before.grade.words(one.before.error.as_ref()),
+                one.after.grade.words(one.after.error.as_ref()),
                 Group::of(&one.before).to_string(),
             ]);
         }
@@ -154,18 +147,12 @@ fn primary(row: &QueryResult) -> Option<Code> {
     Some(row.diagnosis.first()?.code)
 }
 
-fn change(
-    was: bool,
-    is: bool,
-    before: &QueryResult,
-    after: &QueryResult,
-    tolerance: &Tolerance,
-) -> Option<Change> {
-    match (was, is) {
-        (true, false) => return Some(Change::Broken),
-        (false, true) => return Some(Change::Fixed),
-        (false, false) => return None,
-        (true, true) => {}
+fn change(before: &QueryResult, after: &QueryResult, tolerance: &Tolerance) -> Option<Change> {
+    match (before.grade.is_failure(), after.grade.is_failure()) {
+        (false, true) => return Some(Change::Broken),
+        (true, false) => return Some(Change::Fixed),
+        (true, true) => return None,
+        (false, false) => {}
     }
     let (before, after) = (before.error?, after.error?);
     let metres = after.translation_m - before.translation_m;
@@ -178,6 +165,54 @@ fn change(
     } else {
         None
     }
+}
+
+/// The name for results without a verdict.
+const NOTHING_FOUND: &str = "ok";
+
+/// The number of a method's results that changed from one primary verdict to another, or kept it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Migration {
+    /// The method.
+    pub method: Method,
+    /// The code in the first run, `ok` without a verdict.
+    pub before: String,
+    /// The code in the second run.
+    pub after: String,
+    /// The number of results.
+    pub count: usize,
+}
+
+impl Migration {
+    /// Whether the verdict changed.
+    pub fn is_change(&self) -> bool {
+        self.before != self.after
+    }
+}
+
+/// The name of a primary verdict: its code, or `ok` without one.
+pub fn verdict_name(primary: Option<Code>) -> &'static str {
+    primary.map_or(NOTHING_FOUND, Code::name)
+}
+
+/// Counts the changes of common results by method and primary verdicts, the most frequent first.
+pub fn migrations(common: impl IntoIterator<Item = (Method, [Option<Code>; 2])>) -> Vec<Migration> {
+    let mut counts: BTreeMap<(Method, &str, &str), usize> = BTreeMap::new();
+    for (method, [before, after]) in common {
+        let key = (method, verdict_name(before), verdict_name(after));
+        *counts.entry(key).or_default() += 1;
+    }
+    let counts = counts.into_iter();
+    let mut migrations: Vec<Migration> = counts
+        .map(|((method, before, after), count)| Migration {
+            method,
+            before: before.to_owned(),
+            after: after.to_owned(),
+            count,
+        })
+        .collect();
+    migrations.sort_by_key(|migration| Reverse(migration.count));
+    migrations
 }
 
 #[cfg(test)]
@@ -262,5 +297,32 @@ mod tests {
         let counts = (comparison.common, comparison.only_before, comparison.only_after);
         assert_eq!(counts, (6, 1, 2));
         assert!(comparison.is_regression());
+    }
+
+    #[test]
+    fn what_stayed_is_counted_beside_what_changed() {
+        let (d2, d3) = (Some(Code::D2), Some(Code::D3));
+        let common = [
+            (Method::MI, [None, None]),
+            (Method::MI, [None, d2]),
+            (Method::MI, [None, d2]),
+            (Method::FB, [d3, d3]),
+        ];
+        let told: Vec<_> = migrations(common)
+            .into_iter()
+            .map(|one| {
+                let is_change = one.is_change();
+                (one.method, one.before, one.after, one.count, is_change)
+            })
+            .collect();
+        let expected = [
+            (Method::MI, "ok", "D2", 2, true),
+            (Method::FB, "D3", "D3", 1, false),
+            (Method::MI, "ok", "ok", 1, false),
+        ];
+        let expected = expected.map(|(method, before, after, count, is_change)| {
+            (method, before.to_owned(), after.to_owned(), count, is_change)
+        });
+        assert_eq!(told, expected);
     }
 }

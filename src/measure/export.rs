@@ -10,8 +10,7 @@ use nalgebra::{Quaternion, Translation3, UnitQuaternion};
 use crate::geometry::Pose;
 use crate::localize::QueryResult;
 use crate::method::Method;
-use crate::run::{FolderError, read_results};
-use crate::run::{QueryCamera, RunFile, RunItem};
+use crate::run::{FolderError, QueryCamera, RunFile, RunItem, read_results};
 
 /// A format to export to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -49,31 +48,19 @@ pub enum ExportError {
     Nothing,
     /// The format cannot hold a missing pose.
     #[error(
-        "kitti has one line per frame and cannot leave out a pose: {missing}; use --as vloc or colmap"
+        "kitti has one line per frame and cannot leave out a pose: {0}; use --as vloc or colmap"
     )]
-    Gap {
-        /// What is missing.
-        missing: String,
-    },
+    Gap(String),
     /// The format needs times, and the scene has none.
-    #[error("tum needs times, and the frames of {scene} have none; use --as vloc or colmap")]
-    NoTime {
-        /// The scene of the queries.
-        scene: String,
-    },
+    #[error("tum needs times, and the frames of {0} have none; use --as vloc or colmap")]
+    NoTime(String),
 }
 
 /// Chooses the results to export.
 type Choice<'a> = &'a dyn Fn(&QueryResult) -> bool;
 
-/// A file of an export.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct ExportedFile {
-    /// Its name, if an export has several files.
-    pub name: &'static str,
-    /// Its content.
-    pub text: String,
-}
+/// A file of an export: its name, if there are several, and its content.
+pub type ExportedFile = (&'static str, String);
 
 /// The files of an export.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -106,16 +93,12 @@ pub fn export(
     }
     let left_out = localized.iter().filter(|one| one.pose.is_none()).count();
     let files = match format {
-        Format::Tum => vec![plain(tum(&localized)?)],
-        Format::Kitti => vec![plain(kitti(&localized)?)],
-        Format::Vloc => vec![plain(vloc(&localized))],
+        Format::Tum => vec![("", tum(&localized)?)],
+        Format::Kitti => vec![("", kitti(&localized)?)],
+        Format::Vloc => vec![("", vloc(&localized))],
         Format::Colmap => colmap(&localized),
     };
     Ok(Export { files, left_out })
-}
-
-fn plain(text: String) -> ExportedFile {
-    ExportedFile { name: "", text }
 }
 
 /// One result per query, in the order of the run.
@@ -160,9 +143,8 @@ fn tum(localized: &[Localized<'_>]) -> Result<String, ExportError> {
     let mut text = "# time x y z qx qy qz qw\n".to_owned();
     for Localized { item, pose } in localized {
         let Some(pose) = pose else { continue };
-        let time = item
-            .time_s
-            .ok_or_else(|| ExportError::NoTime { scene: item.pair.query_scene.clone() })?;
+        let scene = &item.pair.query_scene;
+        let time = item.time_s.ok_or_else(|| ExportError::NoTime(scene.clone()))?;
         let (t, q) = (pose.translation.vector, pose.rotation.coords);
         text += &format!("{time} {} {} {} {} {} {} {}\n", t.x, t.y, t.z, q.x, q.y, q.z, q.w);
     }
@@ -172,12 +154,11 @@ fn tum(localized: &[Localized<'_>]) -> Result<String, ExportError> {
 fn kitti(localized: &[Localized<'_>]) -> Result<String, ExportError> {
     let mut text = String::new();
     for (line, Localized { item, pose }) in localized.iter().enumerate() {
-        let gap = |missing: String| ExportError::Gap { missing };
         if item.query.parse() != Ok(line) {
-            return Err(gap(format!("frame {line} is not a query")));
+            return Err(ExportError::Gap(format!("frame {line} is not a query")));
         }
         let Some(pose) = pose else {
-            return Err(gap(format!("query {} has no pose", item.query)));
+            return Err(ExportError::Gap(format!("query {} has no pose", item.query)));
         };
         let matrix = crate::geometry::matrix_from_pose(pose);
         let rows = (0..3).flat_map(|row| (0..4).map(move |column| (row, column)));
@@ -235,10 +216,9 @@ fn colmap(localized: &[Localized<'_>]) -> Vec<ExportedFile> {
             camera.cy + 0.5
         );
     }
-    let file = |name, text| ExportedFile { name, text };
     vec![
-        file("cameras.txt", text),
-        file("images.txt", images),
-        file("points3D.txt", "# no points\n".to_owned()),
+        ("cameras.txt", text),
+        ("images.txt", images),
+        ("points3D.txt", "# no points\n".to_owned()),
     ]
 }

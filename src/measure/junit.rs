@@ -3,6 +3,7 @@
 use quick_junit::{NonSuccessKind, Report, TestCase, TestCaseStatus, TestSuite};
 
 use super::gate::GateResult;
+use super::groups::grouped;
 use super::known::KnownFailures;
 use super::metrics::Group;
 use crate::fusion::Fusion;
@@ -19,9 +20,8 @@ pub fn junit(
 ) -> Result<String, quick_junit::SerializeError> {
     let mut report = Report::new("posescope");
     // Results are ordered by query; a suite has those of one method.
-    let mut suites: Vec<TestSuite> = Vec::new();
-    for row in results {
-        let name = format!("{} {}", Group::of(row).scenes(), row.method);
+    let cases = results.iter().map(|row| {
+        let suite = format!("{} {}", Group::of(row).scenes(), row.method);
         let words = row.grade.words(row.error.as_ref());
         let status = match (row.diagnosis.first(), &row.reason) {
             _ if !row.grade.is_failure() => TestCaseStatus::success(),
@@ -30,15 +30,12 @@ pub fn junit(
             (None, Some(reason)) => failure(reason.code.name(), &reason.text),
             (None, None) => failure(row.grade.word(), &words),
         };
-        let case = TestCase::new(case_name(&row.query, row.setting, row.fusion), status);
-        match suites.iter_mut().find(|suite| suite.name.as_str() == name) {
-            Some(suite) => drop(suite.add_test_case(case)),
-            None => {
-                let mut suite = TestSuite::new(name);
-                suite.add_test_case(case);
-                suites.push(suite);
-            }
-        }
+        (suite, TestCase::new(case_name(&row.query, row.setting, row.fusion), status))
+    });
+    for (name, cases) in grouped(cases) {
+        let mut suite = TestSuite::new(name);
+        suite.add_test_cases(cases);
+        report.add_test_suite(suite);
     }
     if !gate_results.is_empty() {
         let mut suite = TestSuite::new("gates");
@@ -50,9 +47,8 @@ pub fn junit(
             };
             suite.add_test_case(TestCase::new(gate_result.gate.as_str(), status));
         }
-        suites.push(suite);
+        report.add_test_suite(suite);
     }
-    report.add_test_suites(suites);
     report.to_string()
 }
 

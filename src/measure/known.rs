@@ -80,10 +80,10 @@ impl KnownFailures {
                 number: index + 1,
                 query: query.to_owned(),
                 method: Method::called(method).map_err(|why| error(why.to_string()))?,
-                code: match code {
-                    Some(code) => Some(code.parse().map_err(|why| error(format!("{why}")))?),
-                    None => None,
-                },
+                code: code
+                    .map(str::parse::<Code>)
+                    .transpose()
+                    .map_err(|why| error(why.to_string()))?,
             });
         }
         Ok(Self { path: path.to_owned(), lines })
@@ -91,7 +91,7 @@ impl KnownFailures {
 
     /// Whether the result is a known failure.
     pub fn has(&self, row: &QueryResult) -> bool {
-        is_wrong(row) && self.of(row).any(|line| line.allows(row))
+        is_wrong(row) && self.lines.iter().any(|line| line.is_about(row) && line.allows(row))
     }
 
     /// The report on the list for a run.
@@ -121,10 +121,6 @@ impl KnownFailures {
             }
         }
         report
-    }
-
-    fn of(&self, row: &QueryResult) -> impl Iterator<Item = &KnownFailure> {
-        self.lines.iter().filter(|line| line.is_about(row))
     }
 }
 

@@ -10,6 +10,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use serde::{Deserialize, Serialize};
 
 use super::chance::Chance;
+use super::groups::grouped;
 use crate::diagnosis::{Code, Grade};
 use crate::fusion::Fusion;
 use crate::geometry::PoseError;
@@ -228,38 +229,21 @@ pub fn measure<'a>(
     results: impl IntoIterator<Item = &'a QueryResult>,
     failure_radius_m: f64,
 ) -> Vec<Measures> {
-    let mut groups: Vec<(Group, Vec<&QueryResult>)> = Vec::new();
-    let mut places: BTreeMap<String, usize> = BTreeMap::new();
-    for result in results {
-        let group = Group::of(result);
-        let place = *places.entry(format!("{group:?}")).or_insert_with(|| {
-            groups.push((group, Vec::new()));
-            groups.len() - 1
-        });
-        groups[place].1.push(result);
-    }
-    groups
+    grouped(results.into_iter().map(|result| (Group::of(result), result)))
         .into_iter()
         .flat_map(|(group, results)| measure_group(&group, &results, failure_radius_m))
         .collect()
 }
 
 fn measure_group(group: &Group, rows: &[&QueryResult], failure_radius_m: f64) -> Vec<Measures> {
-    let mut methods: Vec<Method> = Vec::new();
-    let mut solved: BTreeMap<Method, BTreeSet<&str>> = BTreeMap::new();
-    for row in rows {
-        if !methods.contains(&row.method) {
-            methods.push(row.method);
-        }
-        let of_method = solved.entry(row.method).or_default();
-        if row.status == Status::Ok {
-            of_method.insert(&row.query);
-        }
-    }
-    let is_common = |query: &str| solved.values().all(|queries| queries.contains(query));
-    let measure = |method: Method| {
-        let of_method = rows.iter().copied().filter(|row| row.method == method);
-        let rows: Vec<&QueryResult> = of_method.collect();
+    let methods = grouped(rows.iter().map(|row| (row.method, *row)));
+    let solved = methods.iter().map(|(_, rows)| {
+        let solved = rows.iter().filter(|row| row.status == Status::Ok);
+        solved.map(|row| row.query.as_str()).collect::<BTreeSet<_>>()
+    });
+    let solved: Vec<BTreeSet<&str>> = solved.collect();
+    let is_common = |query: &str| solved.iter().all(|queries| queries.contains(query));
+    let measure = |(method, rows): &(Method, Vec<&QueryResult>)| {
         let errors_of = |wanted: &dyn Fn(&QueryResult) -> bool| {
             let errors = rows.iter().filter(|row| wanted(row));
             Spread::of(&errors.filter_map(|row| row.error).collect::<Vec<_>>())
@@ -278,7 +262,7 @@ fn measure_group(group: &Group, rows: &[&QueryResult], failure_radius_m: f64) ->
         };
         let mut measures = Measures {
             group: group.clone(),
-            method,
+            method: *method,
             queries: rows.len(),
             poses: count(&|row| row.status == Status::Ok),
             off_rim: count(&|row| row.status == Status::Ok && !is_on_rim(row)),
@@ -308,7 +292,7 @@ fn measure_group(group: &Group, rows: &[&QueryResult], failure_radius_m: f64) ->
             .then(|| RECALL_LIMITS.map(|(m, deg)| measures.recall_within(m, deg).unwrap_or(0.0)));
         measures
     };
-    methods.into_iter().map(measure).collect()
+    methods.iter().map(measure).collect()
 }
 
 #[cfg(test)]

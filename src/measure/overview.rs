@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use super::groups::grouped;
 use crate::diagnosis::{Code, Grade};
 use crate::localize::QueryResult;
 
@@ -41,21 +42,13 @@ impl Bar {
 impl Overview {
     /// Of the results of a run.
     pub fn of(results: &[&QueryResult]) -> Self {
-        let mut bars: Vec<Bar> = Vec::new();
-        let mut causes: Vec<(Code, usize)> = Vec::new();
-        for result in results {
-            let name = label(result);
-            let known = bars.iter().position(|bar| bar.name == name);
-            let at = known.unwrap_or_else(|| {
-                bars.push(Bar { name, counts: [0; Grade::ALL.len()] });
-                bars.len() - 1
-            });
-            let place = Grade::ALL.iter().position(|grade| *grade == result.grade);
-            bars[at].counts[place.unwrap_or(0)] += 1;
-            if result.grade.is_failure() {
-                count(&mut causes, result);
-            }
-        }
+        let bars = grouped(results.iter().map(|result| (label(result), result.grade)));
+        let bars = bars.into_iter().map(|(name, grades)| {
+            let of = |grade| grades.iter().filter(|one| **one == grade).count();
+            Bar { name, counts: Grade::ALL.map(of) }
+        });
+        let bars: Vec<Bar> = bars.collect();
+        let mut causes = causes(results.iter().filter(|result| result.grade.is_failure()));
         // A stable sort: causes that are as frequent stay in the order in which they occur.
         causes.sort_by_key(|(_, times)| std::cmp::Reverse(*times));
         Self { headline: headline(results, &bars), bars, causes }
@@ -68,14 +61,11 @@ fn label(result: &QueryResult) -> String {
     format!("{}{}", result.method.label(), fusion.unwrap_or_default())
 }
 
-fn count(causes: &mut Vec<(Code, usize)>, result: &QueryResult) {
-    let Some(primary) = result.diagnosis.first() else {
-        return;
-    };
-    match causes.iter_mut().find(|(code, _)| *code == primary.code) {
-        Some((_, times)) => *times += 1,
-        None => causes.push((primary.code, 1)),
-    }
+/// How many results have each primary cause.
+fn causes<'a>(results: impl Iterator<Item = &'a &'a QueryResult>) -> Vec<(Code, usize)> {
+    let primary = results.filter_map(|result| Some((result.diagnosis.first()?.code, ())));
+    let causes = grouped(primary).into_iter();
+    causes.map(|(code, results)| (code, results.len())).collect()
 }
 
 fn headline(results: &[&QueryResult], bars: &[Bar]) -> String {
@@ -105,8 +95,7 @@ fn headline(results: &[&QueryResult], bars: &[Bar]) -> String {
     let whose = if good == 0 { "the" } else { "its" };
     let failed: Vec<&&QueryResult> =
         results.iter().filter(|result| is_counted(result) && result.grade.is_failure()).collect();
-    let mut causes = Vec::new();
-    failed.iter().for_each(|result| count(&mut causes, result));
+    let causes = causes(failed.iter().copied());
     if let Some((code, times)) = causes.iter().rev().max_by_key(|(_, times)| *times) {
         words += &format!(
             " Most frequent cause of {whose} failures: {} ({times} of {}).",

@@ -11,15 +11,12 @@ use crate::table::Table;
 
 /// A line of `table,scene,query_scene,method,radius_m,references,fusion,measure,value`. An empty query scene means
 /// that of the references. Other empty fields match any value.
-struct Figure {
-    fields: Vec<&'static str>,
-}
+type Figure = Vec<&'static str>;
 
 static ALL: LazyLock<Vec<Figure>> = LazyLock::new(|| {
     let lines = include_str!("../../assets/paper.csv").lines().skip(1);
-    let fields = lines.map(|line| line.split(',').collect::<Vec<_>>());
-    let whole = fields.filter(|fields| fields.len() == 9);
-    whole.map(|fields| Figure { fields }).collect()
+    let figures = lines.map(|line| line.split(',').collect::<Figure>());
+    figures.filter(|figure| figure.len() == 9).collect()
 });
 
 /// The paper's figure for a group and method, from the first of these tables that has it. `measure` is `median_m`,
@@ -43,8 +40,8 @@ pub fn figure(tables: &[u8], group: &Group, method: &str, measure: &str) -> Opti
     };
     tables.iter().find_map(|number| {
         let number = number.to_string();
-        let mut figures = ALL.iter().filter(|figure| figure.fields[0] == number);
-        figures.find(|figure| is_its(&figure.fields)).map(|figure| figure.fields[8])
+        let mut figures = ALL.iter().filter(|figure| figure[0] == number);
+        figures.find(|figure| is_its(figure)).map(|figure| figure[8])
     })
 }
 
@@ -52,9 +49,9 @@ pub fn figure(tables: &[u8], group: &Group, method: &str, measure: &str) -> Opti
 /// \[m\].
 pub fn scene(name: &str) -> Option<[&'static str; 3]> {
     let find = |measure| {
-        let of_scene = |figure: &&Figure| figure.fields[0] <= "2" && figure.fields[1] == name;
+        let of_scene = |figure: &&Figure| figure[0] <= "2" && figure[1] == name;
         let mut figures = ALL.iter().filter(of_scene);
-        figures.find(|figure| figure.fields[7] == measure).map(|figure| figure.fields[8])
+        figures.find(|figure| figure[7] == measure).map(|figure| figure[8])
     };
     Some([find("images")?, find("length_km")?, find("spacing_m")?])
 }
@@ -64,9 +61,9 @@ pub fn scenes(number: u8) -> Table {
     let header = ["scene", "images", "length (km)", "mean distance between images (m)"];
     let mut table = Table::new(format!("scenes-{number}"), "Scenes of the paper", header);
     let number = number.to_string();
-    let of_table = ALL.iter().filter(|figure| figure.fields[0] == number);
-    let names = of_table.filter(|figure| figure.fields[7] == "images");
-    for name in names.map(|figure| figure.fields[1]) {
+    let of_table = ALL.iter().filter(|figure| figure[0] == number);
+    let names = of_table.filter(|figure| figure[7] == "images");
+    for name in names.map(|figure| figure[1]) {
         let figures = scene(name).unwrap_or_default();
         table.push([name].into_iter().chain(figures));
     }
@@ -106,7 +103,7 @@ mod tests {
     #[test]
     fn every_figure_of_the_file_is_a_number() {
         assert_eq!(ALL.len(), 616 + 3 * (11 + 5));
-        let mut values = ALL.iter().map(|figure| figure.fields[8]);
+        let mut values = ALL.iter().map(|figure| figure[8]);
         assert!(values.all(|value| value.parse::<f64>().is_ok()));
     }
 }

@@ -1,9 +1,10 @@
 //! The plots of a run.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use clap::ValueEnum;
 
+use super::groups::grouped;
 use super::metrics::{Group, Measures};
 use super::results::RunResults;
 use crate::chart::{self, Axis, Chart, Mark, Shape, round_up};
@@ -57,24 +58,22 @@ impl Plot {
                 let chart = success("Success rate".to_owned(), "scenes", &all, brief_scenes);
                 chart.into_iter().collect()
             }
-            _ => pairs(&run.results).iter().flat_map(|pair| self.of_pair(run, pair)).collect(),
+            _ => {
+                let results = run.results.iter().map(|one| (Group::of(one).scenes(), one));
+                let pairs = grouped(results).into_iter();
+                pairs.flat_map(|(pair, results)| self.of_pair(run, &pair, &results)).collect()
+            }
         }
     }
 
-    fn of_pair(self, run: &RunResults, pair: &str) -> Vec<Chart> {
+    fn of_pair(self, run: &RunResults, pair: &str, results: &[&QueryResult]) -> Vec<Chart> {
         let measures = run.measures.iter().filter(|one| one.group.scenes() == pair);
         let measures: Vec<&Measures> = measures.collect();
-        let results = run.results.iter().filter(|one| Group::of(one).scenes() == pair);
-        let results: Vec<&QueryResult> = results.collect();
-        let mut methods: Vec<Method> = Vec::new();
-        for one in &measures {
-            if !methods.contains(&one.method) {
-                methods.push(one.method);
-            }
-        }
+        let methods = grouped(measures.iter().map(|one| (one.method, ())));
+        let methods: Vec<Method> = methods.into_iter().map(|(method, _)| method).collect();
         let titled = |what: &str| format!("{what}: {pair}");
         let of_costs = |what, axis, value: fn(&CostReport) -> Option<f64>| {
-            lines(titled(what), axis, &methods, |method| at_least(costs(&results, method, value)))
+            lines(titled(what), axis, &methods, |method| at_least(costs(results, method, value)))
         };
         match self {
             Self::Errors | Self::Verdicts => Vec::new(),
@@ -91,7 +90,7 @@ impl Plot {
             Self::Causes => {
                 let of_method = methods.iter().filter_map(|&method| {
                     let title = format!("{} over the distance of the reference", method.label());
-                    causes(titled(&format!("Causes of failures of {title}")), method, &results)
+                    causes(titled(&format!("Causes of failures of {title}")), method, results)
                 });
                 of_method.collect()
             }
@@ -107,16 +106,6 @@ impl Plot {
             ),
         }
     }
-}
-
-fn pairs(results: &[QueryResult]) -> Vec<String> {
-    let mut pairs: Vec<String> = Vec::new();
-    for pair in results.iter().map(|result| Group::of(result).scenes()) {
-        if !pairs.contains(&pair) {
-            pairs.push(pair);
-        }
-    }
-    pairs
 }
 
 fn legend(methods: impl IntoIterator<Item = Method>) -> Vec<(String, palette::Rgb)> {
@@ -237,17 +226,8 @@ fn success(
     name: fn(&Measures) -> String,
 ) -> Option<Chart> {
     let is_shown = |one: &&&Measures| one.group.fusion.is_none_or(|fusion| fusion.name == "r-wavg");
-    let mut groups: Vec<(String, Vec<&Measures>)> = Vec::new();
-    for one in measures.iter().filter(is_shown) {
-        let name = name(one);
-        match groups.iter_mut().find(|group| group.0 == name) {
-            Some(group) => group.1.push(one),
-            None => groups.push((name, vec![one])),
-        }
-    }
-    let mut methods: Vec<Method> = measures.iter().map(|one| one.method).collect();
-    methods.sort_unstable();
-    methods.dedup();
+    let groups = grouped(measures.iter().filter(is_shown).map(|one| (name(one), *one)));
+    let methods: BTreeSet<Method> = measures.iter().map(|one| one.method).collect();
     let mut marks = Vec::new();
     for (at, (name, of_group)) in groups.iter().enumerate() {
         let width = 0.84 / of_group.len().max(1) as f64;
@@ -284,32 +264,15 @@ struct Bin {
 /// is known or there is no failure.
 fn causes(title: String, method: Method, results: &[&QueryResult]) -> Option<Chart> {
     let (width_m, bins) = binned(method, results)?;
-    let mut codes: Vec<Code> = bins.iter().flat_map(|bin| bin.verdicts.keys().copied()).collect();
-    codes.sort_unstable();
-    codes.dedup();
+    let codes: BTreeSet<Code> = bins.iter().flat_map(|bin| bin.verdicts.keys().copied()).collect();
     let mut marks = Vec::new();
     for (at, bin) in bins.iter().enumerate().filter(|(_, bin)| bin.queries > 0) {
-        let ends = [0.08, 0.92].map(|share| width_m * (at as f64 + share));
-        let middle = width_m * (at as f64 + 0.5);
-        let mut bottom = 0.0;
-        for (rank, code) in codes.iter().enumerate() {
-            let count = bin.verdicts.get(code).copied().unwrap_or_default();
-            let top = bottom + 100.0 * count as f64 / bin.queries as f64;
-            marks.extend(verdict(
-                rank,
-                *code,
-                (ends[0], bottom),
-                (ends[1], top),
-                count,
-                bin.queries,
-            ));
-            if top - bottom >= LABELLED_FROM {
-                marks.push(Mark::words(code.name(), (middle, (bottom + top) / 2.0), (0.0, 4.0)));
-            }
-            bottom = top;
-        }
+        let across = [0.08, 0.5, 0.92].map(|share| width_m * (at as f64 + share));
+        let top = stacked(&mut marks, &codes, &bin.verdicts, bin.queries, |along, at| {
+            (across[at], along)
+        });
         let words = format!("{} queries", bin.queries);
-        marks.push(Mark::words(words, (middle, bottom), (0.0, -3.0)));
+        marks.push(Mark::words(words, (across[1], top), (0.0, -3.0)));
     }
     (!codes.is_empty()).then(|| Chart {
         title,
@@ -324,19 +287,33 @@ fn causes(title: String, method: Method, results: &[&QueryResult]) -> Option<Cha
     })
 }
 
-/// The part of a bar for one verdict.
-fn verdict(
-    rank: usize,
-    code: Code,
-    from: (f64, f64),
-    to: (f64, f64),
-    count: usize,
+/// Adds a bar of the shares of queries by verdict. `place` has the place of a share \[%\] at the near side (0), the
+/// middle (1) and the far side (2) of the bar. Returns the share at its end.
+fn stacked(
+    marks: &mut Vec<Mark>,
+    codes: &BTreeSet<Code>,
+    verdicts: &BTreeMap<Code, usize>,
     queries: usize,
-) -> Option<Mark> {
-    let share = 100.0 * count as f64 / queries.max(1) as f64;
-    let title = format!("{code} {}: {count} of {queries} queries ({share:.0} %)", code.title());
-    let bar = Mark::new(Shape::Bar { from, to }, palette::verdict(rank));
-    (count > 0).then(|| bar.titled(title))
+    place: impl Fn(f64, usize) -> (f64, f64),
+) -> f64 {
+    let mut from = 0.0;
+    for (rank, code) in codes.iter().enumerate() {
+        let count = verdicts.get(code).copied().unwrap_or_default();
+        let share = 100.0 * count as f64 / queries.max(1) as f64;
+        let to = from + share;
+        if count > 0 {
+            let bar = Shape::Bar { from: place(from, 0), to: place(to, 2) };
+            let about = format!("{count} of {queries} queries ({share:.0} %)");
+            let title = format!("{code} {}: {about}", code.title());
+            marks.push(Mark::new(bar, palette::verdict(rank)).titled(title));
+        }
+        if to - from >= LABELLED_FROM {
+            let middle = place((from + to) / 2.0, 1);
+            marks.push(Mark::words(code.name(), middle, (0.0, 4.0)));
+        }
+        from = to;
+    }
+    from
 }
 
 /// The width of a bin \[m\], and the bins starting at 0.
@@ -379,9 +356,7 @@ fn errors(results: &[QueryResult]) -> Option<Chart> {
     let least = errors().reduce(f64::min)?;
     let top = ABOVE * errors().fold(0.0, f64::max);
     let farthest = known.iter().map(|one| one.0).fold(0.0, f64::max);
-    let mut methods: Vec<Method> = known.iter().map(|one| one.3.method).collect();
-    methods.sort_unstable();
-    methods.dedup();
+    let methods: BTreeSet<Method> = known.iter().map(|one| one.3.method).collect();
     let marks = known.iter().map(|(start, error, number, result)| {
         let dot = Shape::Dot { at: (*start, error.unwrap_or(top)), filled: error.is_some() };
         Mark {
@@ -401,24 +376,15 @@ fn errors(results: &[QueryResult]) -> Option<Chart> {
 /// One stacked bar per method and condition: the shares of its queries by primary verdict.
 fn verdicts(measures: &[Measures]) -> Option<Chart> {
     let codes = measures.iter().flat_map(|one| one.verdicts.keys());
-    let codes: std::collections::BTreeSet<Code> = codes.copied().collect();
+    let codes: BTreeSet<Code> = codes.copied().collect();
     let bars = measures.len() as f64;
     let mut marks = Vec::new();
     for (at, one) in measures.iter().enumerate() {
         let low = bars - 1.0 - at as f64;
         let name = format!("{} {}", one.method.label(), one.group);
         marks.push(Mark::words(name, (50.0, low + 0.7), (0.0, 0.0)));
-        let mut from = 0.0;
-        for (rank, &code) in codes.iter().enumerate() {
-            let count = one.verdicts.get(&code).copied().unwrap_or_default();
-            let to = from + 100.0 * one.share(count);
-            let ends = ((from, low + 0.08), (to, low + 0.58));
-            marks.extend(verdict(rank, code, ends.0, ends.1, count, one.queries));
-            if to - from >= LABELLED_FROM {
-                marks.push(Mark::words(code.name(), ((from + to) / 2.0, low + 0.33), (0.0, 4.0)));
-            }
-            from = to;
-        }
+        let across = [0.08, 0.33, 0.58].map(|share| low + share);
+        stacked(&mut marks, &codes, &one.verdicts, one.queries, |along, at| (along, across[at]));
     }
     (!codes.is_empty()).then(|| Chart {
         title: "Primary verdicts by method and condition".to_owned(),

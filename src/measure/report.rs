@@ -58,8 +58,8 @@ impl Report {
         let differences = since.iter().flat_map(|since| &since.differences);
         let broken = differences.filter(|one| one.change == Change::Broken);
         lines.extend(broken.map(|one| {
-            let worth = |at: usize, row: &QueryResult| one.grades[at].words(row.error.as_ref());
-            let (before, after) = (worth(0, &one.before), worth(1, &one.after));
+            let worth = |row: &QueryResult| row.grade.words(row.error.as_ref());
+            let (before, after) = (worth(&one.before), worth(&one.after));
             let query = &one.before.query;
             format!("broken: {query} {}, {before} → {after}", one.before.method)
         }));

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use super::groups::grouped;
 use super::metrics::{Group, Measures};
 use super::plots;
 use super::report::write;
@@ -32,9 +33,9 @@ pub fn write_sweep(folder: &Path, sweep: &Sweep, runs: &[SweptRun]) -> Result<Ta
         unit => format!("{} ({unit})", sweep.key()),
     };
     for (what, label, figure) in CURVES {
-        let charts = groups(runs).into_iter().filter_map(|group| {
+        let charts = groups(runs).into_iter().filter_map(|(group, measures)| {
             let title = format!("{label} over {axis}: {group}");
-            plots::curves(title, &axis, label, curves(runs, group, &figure))
+            plots::curves(title, &axis, label, curves(measures, figure))
         });
         let charts: Vec<_> = charts.collect();
         let path = folder.join(format!("{what}.svg"));
@@ -51,37 +52,24 @@ const CURVES: [Curve; 2] = [
     ("median", "median error of successes (m)", |one| one.of_successes.median_m),
 ];
 
-/// The groups of all runs, in the order of their first figures.
-fn groups(runs: &[SweptRun]) -> Vec<&Group> {
-    let mut groups: Vec<&Group> = Vec::new();
-    for one in runs.iter().flat_map(|run| &run.measures) {
-        if !groups.contains(&&one.group) {
-            groups.push(&one.group);
-        }
-    }
-    groups
+/// The groups of all runs, each with its figures and their values.
+fn groups(runs: &[SweptRun]) -> Vec<(&Group, Vec<(&str, &Measures)>)> {
+    grouped(runs.iter().flat_map(|run| {
+        let measures = run.measures.iter();
+        measures.map(|one| (&one.group, (run.value.as_str(), one)))
+    }))
 }
 
 /// One line per method. Missing figures have no point.
 fn curves(
-    runs: &[SweptRun],
-    group: &Group,
-    figure: &dyn Fn(&Measures) -> Option<f64>,
+    measures: Vec<(&str, &Measures)>,
+    figure: fn(&Measures) -> Option<f64>,
 ) -> Vec<(Method, Vec<(f64, f64)>)> {
-    let mut lines: Vec<(Method, Vec<(f64, f64)>)> = Vec::new();
-    for run in runs {
-        let Ok(x) = run.value.parse::<f64>() else {
-            continue;
-        };
-        for one in run.measures.iter().filter(|one| one.group == *group) {
-            let Some(y) = figure(one) else { continue };
-            match lines.iter_mut().find(|line| line.0 == one.method) {
-                Some(line) => line.1.push((x, y)),
-                None => lines.push((one.method, vec![(x, y)])),
-            }
-        }
-    }
-    lines
+    grouped(
+        measures
+            .into_iter()
+            .filter_map(|(value, one)| Some((one.method, (value.parse().ok()?, figure(one)?)))),
+    )
 }
 
 fn table(sweep: &Sweep, runs: &[SweptRun]) -> Table {
@@ -138,11 +126,11 @@ mod tests {
     #[test]
     fn a_line_has_a_point_for_each_value_with_a_figure() {
         let runs = runs();
-        let group = groups(&runs)[0];
-        let medians = curves(&runs, group, &|one| one.of_successes.median_m);
+        let measures = || groups(&runs).remove(0).1;
+        let medians = curves(measures(), |one| one.of_successes.median_m);
         assert_eq!(medians[0].1, [(0.5, 0.25)]);
         assert_eq!(medians[1].1, [(0.5, 0.5), (1.0, 0.5)]);
-        let successes = curves(&runs, group, &|one| Some(one.success_rate));
+        let successes = curves(measures(), |one| Some(one.success_rate));
         assert_eq!(successes[0].1, [(0.5, 1.0), (1.0, 0.0)]);
     }
 

@@ -2,7 +2,7 @@
 //!
 //! Their shapes are data (`assets/tables.toml`), which [`Filling`] fills.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::LazyLock;
 
 use clap::ValueEnum;
@@ -401,7 +401,7 @@ impl<'a> Filling<'a> {
 /// The causes of failures: one line per group and method, one column per primary verdict.
 fn verdicts(measures: &[Measures]) -> Option<Table> {
     let codes = measures.iter().flat_map(|one| one.verdicts.keys());
-    let codes: std::collections::BTreeSet<_> = codes.copied().collect();
+    let codes: BTreeSet<_> = codes.copied().collect();
     if codes.is_empty() {
         return None;
     }
@@ -430,9 +430,7 @@ fn advantage(measures: &[Measures]) -> Option<Table> {
     let caption = "The hybrid's lead in success rate, in percentage points, averaged over the pairs of scenes";
     let mut table = Table::new("advantage", caption, header);
     let hybrids: Vec<&Measures> = measures.iter().filter(|one| one.method == Method::HY).collect();
-    let mut others: Vec<Method> = measures.iter().map(|one| one.method).collect();
-    others.sort_unstable();
-    others.dedup();
+    let others: BTreeSet<Method> = measures.iter().map(|one| one.method).collect();
     for method in others.into_iter().filter(|&method| method != Method::HY) {
         let ours = hybrids.iter().filter_map(|hybrid| {
             let mut others = measures.iter().filter(|one| one.method == method);

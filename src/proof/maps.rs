@@ -445,8 +445,16 @@ fn number(cost: f64) -> String {
 }
 
 /// The pose at a share of the way; below 0 and above 1 it goes on in the same direction.
-fn between(from: &Pose, to: &Pose, share: f64) -> Pose {
+pub(crate) fn between(from: &Pose, to: &Pose, share: f64) -> Pose {
+    /// Below this sine of the angle between two rotations they are taken for equal.
     const PARALLEL: f64 = 1e-12;
+    // To the last bit, so that the costs there are those of the poses themselves.
+    if share == 0.0 {
+        return *from;
+    }
+    if share == 1.0 {
+        return *to;
+    }
     let translation = from.translation.vector.lerp(&to.translation.vector, share);
     let rotation = from.rotation.try_slerp(&to.rotation, share, PARALLEL);
     Pose::from_parts(translation.into(), rotation.unwrap_or(from.rotation))

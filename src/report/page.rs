@@ -37,7 +37,7 @@ pub(super) fn page(report: &RunReport) -> String {
             body {
                 header {
                     h1 { (title) }
-                    (glance::headline(&overview))
+                    p.headline { (with_code(&overview.headline)) }
                     nav aria-label="Parts of the report" {
                         @if !report.gates.is_empty() { a href="#gates" { "Gates" } " " }
                         @if report.baseline.is_some() { a href="#changes" { "Changes" } " " }
@@ -170,7 +170,7 @@ fn plots(report: &RunReport) -> Markup {
             @if report.charts.is_empty() { p { "There are no plots, because the ground truth is unknown." } }
             div.plots {
                 @for chart in &report.charts {
-                    figure.plot { (chart.markup()) figcaption { (chart.title) } }
+                    figure.plot { (chart.svg(None)) figcaption { (chart.title) } }
                 }
             }
         }

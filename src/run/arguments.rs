@@ -23,10 +23,7 @@ pub fn method(name: &str) -> Result<Method, String> {
 /// # Errors
 /// Any other text.
 pub fn positive(text: &str) -> Result<f64, String> {
-    text.parse()
-        .ok()
-        .filter(|number: &f64| *number > 0.0 && number.is_finite())
-        .ok_or_else(|| "a positive number expected".to_owned())
+    number_up_to(text, f64::MAX).ok_or_else(|| "a positive number expected".to_owned())
 }
 
 /// A probability above 0.
@@ -34,10 +31,11 @@ pub fn positive(text: &str) -> Result<f64, String> {
 /// # Errors
 /// Any other text.
 pub fn probability(text: &str) -> Result<f64, String> {
-    text.parse()
-        .ok()
-        .filter(|share: &f64| *share > 0.0 && *share <= 1.0)
-        .ok_or_else(|| "a number above 0 and up to 1 expected".to_owned())
+    number_up_to(text, 1.0).ok_or_else(|| "a number above 0 and up to 1 expected".to_owned())
+}
+
+fn number_up_to(text: &str, most: f64) -> Option<f64> {
+    text.parse().ok().filter(|number| *number > 0.0 && *number <= most)
 }
 
 /// The help of `--degrade`: every step with its range.

@@ -26,12 +26,9 @@ pub struct Draw<'a> {
 pub enum DrawError {
     /// Without poses, errors cannot be measured and references cannot be found.
     #[error(
-        "{scene}: no frame has a known pose, so there are no queries; `posescope doctor` says what is missing"
+        "{0}: no frame has a known pose, so there are no queries; `posescope doctor` says what is missing"
     )]
-    NoPose {
-        /// The scene.
-        scene: String,
-    },
+    NoPose(String),
     /// The frame exists but was not drawn.
     #[error(
         "{scene}: frame {frame} is not among the {drawn} drawn queries; raise --limit or change --seed"
@@ -61,26 +58,20 @@ impl Draw<'_> {
         queries: &dyn Scene,
     ) -> Result<ScenePair, DrawError> {
         let drawn = self.frames(queries)?;
-        let wanted: BTreeSet<usize> = self
-            .only
-            .iter()
-            .map(|name| {
-                let frame = queries.find(name)?;
-                if drawn.contains(&frame) {
-                    return Ok(frame);
-                }
-                Err(DrawError::NotDrawn {
+        let mut wanted = BTreeSet::new();
+        for name in self.only {
+            let frame = queries.find(name)?;
+            wanted.insert(frame);
+            if !drawn.contains(&frame) {
+                return Err(DrawError::NotDrawn {
                     scene: queries.name().to_owned(),
                     frame: queries.frames()[frame].clone(),
                     drawn: drawn.len(),
-                })
-            })
-            .collect::<Result<_, DrawError>>()?;
-        let chosen: Vec<usize> = drawn
-            .iter()
-            .copied()
-            .filter(|frame| wanted.is_empty() || wanted.contains(frame))
-            .collect();
+                });
+            }
+        }
+        let mut chosen = drawn.clone();
+        chosen.retain(|frame| wanted.is_empty() || wanted.contains(frame));
         let names = |frames: &[usize]| {
             let frames = frames.iter();
             let names = frames.map(|&frame| queries.frames()[frame].clone());
@@ -109,7 +100,7 @@ impl Draw<'_> {
         let mut frames: Vec<usize> =
             (0..scene.frames().len()).filter(|&frame| scene.pose(frame).is_some()).collect();
         if frames.is_empty() {
-            return Err(DrawError::NoPose { scene: scene.name().to_owned() });
+            return Err(DrawError::NoPose(scene.name().to_owned()));
         }
         let count = match self.limit {
             None => frames.len(),

@@ -11,8 +11,8 @@ use super::scene_pair::ScenePair;
 use crate::estimator::Failure;
 use crate::fusion::Fusion;
 use crate::localize::{
-    ChoiceError, Chooser, LocalizeObserver, Localizer, NoObserver, QueryResult, Ranking,
-    References, Request, StageTimes,
+    ChoiceError, LocalizeObserver, Localizer, NoObserver, QueryResult, Ranking, References,
+    Request, StageTimes,
 };
 use crate::method::Method;
 use crate::params::Params;
@@ -110,9 +110,7 @@ pub struct FailedQuery<'a> {
 /// An observer of a run over many queries.
 pub trait RunObserver {
     /// A query is about to be localised.
-    fn begin(&mut self, item: &RunItem<'_>) {
-        let _ = item;
-    }
+    fn begin(&mut self, _item: &RunItem<'_>) {}
 
     /// The observer of the next query.
     fn query_observer(&mut self) -> &mut dyn LocalizeObserver;
@@ -121,15 +119,12 @@ pub trait RunObserver {
     ///
     /// # Errors
     /// What stops the run.
-    fn failed(&mut self, query: &FailedQuery<'_>) -> Result<(), RunError> {
-        let _ = query;
+    fn failed(&mut self, _query: &FailedQuery<'_>) -> Result<(), RunError> {
         Ok(())
     }
 
     /// A query is done.
-    fn done(&mut self, item: &RunItem<'_>) {
-        let _ = item;
-    }
+    fn done(&mut self, _item: &RunItem<'_>) {}
 }
 
 /// A run with its opened scenes and indexes.
@@ -166,8 +161,7 @@ impl Execution<'_> {
             let queries = self.scenes.of_queries(first.pair);
             let protocol = &self.run.protocol;
             let localizer = Localizer::new(references, queries, self.params, protocol.seed);
-            let localizer = protocol.configured(localizer);
-            let localizer = localizer.with_foreign(protocol.foreign(queries)?);
+            let localizer = protocol.configured(localizer)?;
             let left_out = self.left_out(first.pair, references)?;
             for item in now {
                 observer.begin(item);
@@ -219,7 +213,25 @@ impl Execution<'_> {
         match localized {
             Ok(requests) => {
                 let requests = requests?;
-                self.report_failures(item, localizer, frame, &requests, &results, observer)?;
+                // One call per method that failed in any of the requests.
+                for &method in &self.run.protocol.methods {
+                    let mut results = results.iter().map(|(result, _)| result);
+                    let request = results
+                        .find(|result| result.method == method && result.grade.is_failure())
+                        .and_then(|failed| {
+                            requests.iter().find(|one| one.setting == failed.setting)
+                        });
+                    if let Some(request) = request {
+                        let item = *item;
+                        observer.failed(&FailedQuery {
+                            localizer,
+                            item,
+                            frame,
+                            method,
+                            request,
+                        })?;
+                    }
+                }
             }
             Err(panic) => results = self.broken(item, &crate::localize::words_of(panic.as_ref())),
         }
@@ -239,14 +251,7 @@ impl Execution<'_> {
             .and_then(|at| self.indices.get(at))
             .map(|index| index.as_ref());
         let choose = |radius_m: f64| {
-            let chooser = Chooser {
-                localizer,
-                params: self.params,
-                selection: protocol.selection(),
-                radius_m,
-                seed: protocol.seed,
-                index,
-            };
+            let chooser = protocol.chooser(localizer, radius_m, index);
             chooser.choose(frame, &|frame| left_out.contains(&frame), &mut NoObserver)
         };
         let mut requests = Vec::new();
@@ -261,29 +266,6 @@ impl Execution<'_> {
             last = Some((radius, chosen));
         }
         Ok(requests)
-    }
-
-    /// One call per method that failed in any of the requests.
-    fn report_failures(
-        &self,
-        item: &RunItem<'_>,
-        localizer: &Localizer<'_>,
-        frame: usize,
-        requests: &[Request],
-        results: &[(QueryResult, StageTimes)],
-        observer: &mut dyn RunObserver,
-    ) -> Result<(), RunError> {
-        for &method in &self.run.protocol.methods {
-            let mut results = results.iter().map(|(result, _)| result);
-            let failed = results
-                .find(|result| result.method == method && result.grade.is_failure())
-                .and_then(|failed| requests.iter().find(|one| one.setting == failed.setting));
-            let Some(request) = failed else {
-                continue;
-            };
-            observer.failed(&FailedQuery { localizer, item: *item, frame, method, request })?;
-        }
-        Ok(())
     }
 
     /// The results of a query whose localisation panicked.

@@ -14,7 +14,7 @@ use crate::estimator;
 use crate::foreign::Foreign;
 use crate::fusion::Fusion;
 use crate::image::Degradation;
-use crate::localize::{Localizer, Selection};
+use crate::localize::{Chooser, Localizer, Ranking, Selection};
 use crate::method::Method;
 use crate::scene::{MatchFolder, Scene, SceneError, degraded, located, read_estimates};
 use crate::text::UnknownWord;
@@ -365,27 +365,36 @@ impl Protocol {
             .collect()
     }
 
-    /// The localizer with this protocol's tolerance, least confidence and explanations.
-    pub fn configured<'a>(&self, localizer: Localizer<'a>) -> Localizer<'a> {
-        localizer
-            .with_tolerance(self.right)
-            .accepting_from(self.min_confidence)
-            .explaining(self.explain)
-    }
-
-    /// The poses and matches of other systems for the queries' scene.
+    /// The localizer with this protocol's tolerance, least confidence and explanations, and with the poses and
+    /// matches of other systems.
     ///
     /// # Errors
-    /// A file that cannot be read or belongs to another scene.
-    pub fn foreign(&self, queries: &dyn Scene) -> Result<Foreign, SceneError> {
+    /// A file of another system that cannot be read or belongs to another scene.
+    pub fn configured<'a>(&self, localizer: Localizer<'a>) -> Result<Localizer<'a>, SceneError> {
         let mut foreign = Foreign::default();
         for EstimatesFile { method, path } in &self.estimates {
-            foreign = foreign.with_estimates(*method, read_estimates(path, queries)?);
+            let estimates = read_estimates(path, localizer.queries())?;
+            foreign = foreign.with_estimates(*method, estimates);
         }
         if let Some(folder) = &self.matches {
             foreign = foreign.with_matches(Arc::new(MatchFolder::open(folder)?));
         }
-        Ok(foreign)
+        Ok(localizer
+            .with_foreign(foreign)
+            .with_tolerance(self.right)
+            .accepting_from(self.min_confidence)
+            .explaining(self.explain))
+    }
+
+    /// What chooses references within this distance of a query \[m\], by this index if one is needed.
+    pub fn chooser<'a>(
+        &self,
+        localizer: &'a Localizer<'a>,
+        radius_m: f64,
+        index: Option<&'a dyn Ranking>,
+    ) -> Chooser<'a> {
+        let (params, selection, seed) = (localizer.params(), self.selection(), self.seed);
+        Chooser { localizer, params, selection, radius_m, seed, index }
     }
 
     /// The scene of the queries with the given rough positions and degraded photos.

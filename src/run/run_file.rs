@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
-use toml::Spanned;
+use toml::de::{DeTable, DeValue};
 
 use super::preset::{Preset, default_failure_radius_m};
 use super::protocol::{Protocol, known};
@@ -87,55 +87,48 @@ pub(super) struct RunFileError {
     pub message: String,
 }
 
-/// The positions of the values that are checked after reading.
-#[derive(Deserialize)]
-struct Places {
-    schema: Spanned<String>,
-    protocol: ProtocolPlaces,
-    pair: Vec<ScenePairPlaces>,
-}
-
-#[derive(Deserialize)]
-struct ProtocolPlaces {
-    method: Option<Spanned<Vec<Method>>>,
-    radius: Option<Spanned<Vec<f64>>>,
-}
-
-#[derive(Deserialize)]
-struct ScenePairPlaces {
-    scene_index: Spanned<usize>,
-}
-
-impl Places {
-    /// The first invalid value: its position \[bytes\] and a message.
-    fn error(&self, run: &RunFile) -> Option<(usize, String)> {
-        if run.schema != RUN_SCHEMA {
-            let message = format!("schema {RUN_SCHEMA} expected, {} found", run.schema);
-            return Some((self.schema.span().start, message));
-        }
-        let protocol = &run.protocol;
-        let at_methods = self.protocol.method.as_ref().map_or(0, |at| at.span().start);
-        if protocol.methods.is_empty() {
-            return Some((at_methods, "at least one method expected".to_owned()));
-        }
-        let others: Vec<Method> = protocol.estimates.iter().map(|file| file.method).collect();
-        if let Err(error) = known(&protocol.methods, &others) {
-            return Some((at_methods, error.to_string()));
-        }
-        let is_length = |radius: &f64| *radius > 0.0 && radius.is_finite();
-        if protocol.radii_m.is_empty() || !protocol.radii_m.iter().all(is_length) {
-            let at = self.protocol.radius.as_ref().map_or(0, |at| at.span().start);
-            return Some((at, "at least one radius above 0 expected".to_owned()));
-        }
-        let scenes = run.scenes.len();
-        let mut pairs = self.pair.iter().map(|pair| &pair.scene_index);
-        let outside = pairs.find(|index| *index.get_ref() >= scenes)?;
-        let message = format!(
-            "a scene_index below {scenes} expected, the number of scenes; {} found",
-            outside.get_ref()
-        );
-        Some((outside.span().start, message))
+/// The first invalid value: the keys that lead to it, and a message.
+fn invalid(run: &RunFile) -> Option<(String, String)> {
+    if run.schema != RUN_SCHEMA {
+        let message = format!("schema {RUN_SCHEMA} expected, {} found", run.schema);
+        return Some(("schema".to_owned(), message));
     }
+    let protocol = &run.protocol;
+    let at_methods = |message: String| Some(("protocol.method".to_owned(), message));
+    if protocol.methods.is_empty() {
+        return at_methods("at least one method expected".to_owned());
+    }
+    let others: Vec<Method> = protocol.estimates.iter().map(|file| file.method).collect();
+    if let Err(error) = known(&protocol.methods, &others) {
+        return at_methods(error.to_string());
+    }
+    let is_length = |radius: &f64| *radius > 0.0 && radius.is_finite();
+    if protocol.radii_m.is_empty() || !protocol.radii_m.iter().all(is_length) {
+        let message = "at least one radius above 0 expected".to_owned();
+        return Some(("protocol.radius".to_owned(), message));
+    }
+    let scenes = run.scenes.len();
+    let pair = run.pairs.iter().position(|pair| pair.scene_index >= scenes)?;
+    let message = format!(
+        "a scene_index below {scenes} expected, the number of scenes; {} found",
+        run.pairs[pair].scene_index
+    );
+    Some((format!("pair.{pair}.scene_index"), message))
+}
+
+/// Where the value of these keys begins in a text \[bytes\]. A number is a position in a list.
+fn place(text: &str, keys: &str) -> Option<usize> {
+    let mut value = DeValue::Table(DeTable::parse(text).ok()?.into_inner());
+    let mut start = 0;
+    for key in keys.split('.') {
+        let inner = match key.parse::<usize>() {
+            Ok(at) => value.get(at),
+            Err(_) => value.get(key),
+        };
+        start = inner?.span().start;
+        value = inner?.get_ref().clone();
+    }
+    Some(start)
 }
 
 /// One query of a pair: the unit of work, of writing and of sharding.
@@ -238,9 +231,8 @@ impl RunFile {
             error_at(at, error.message().to_owned())
         };
         let run: Self = toml::from_str(text).map_err(syntax)?;
-        let places: Places = toml::from_str(text).map_err(syntax)?;
-        match places.error(&run) {
-            Some((at, message)) => Err(error_at(at, message)),
+        match invalid(&run) {
+            Some((keys, message)) => Err(error_at(place(text, &keys).unwrap_or(0), message)),
             None => Ok(run),
         }
     }

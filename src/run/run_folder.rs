@@ -90,17 +90,11 @@ pub enum FolderError {
         message: String,
     },
     /// There is no run.
-    #[error("{}: not a run folder, {RUN} is missing; `posescope eval` writes run folders", path.display())]
-    NoRun {
-        /// The folder.
-        path: PathBuf,
-    },
+    #[error("{}: not a run folder, {RUN} is missing; `posescope eval` writes run folders", .0.display())]
+    NoRun(PathBuf),
     /// Another process writes to the folder.
-    #[error("{}: another process is writing to this run; wait until it ends", path.display())]
-    InUse {
-        /// The folder.
-        path: PathBuf,
-    },
+    #[error("{}: another process is writing to this run; wait until it ends", .0.display())]
+    InUse(PathBuf),
     /// Not all queries are done.
     #[error("{}: {done} of {items} queries are done; finish the run with --resume first", path.display())]
     Incomplete {
@@ -198,7 +192,7 @@ impl RunFolder {
         let results = open(RESULTS)?;
         // A file system without locks returns another error, which is ignored.
         if matches!(results.try_lock(), Err(TryLockError::WouldBlock)) {
-            return Err(FolderError::InUse { path: path.to_owned() });
+            return Err(FolderError::InUse(path.to_owned()));
         }
         Ok(Self { path: path.to_owned(), results, timings: open(TIMINGS)?, done: 0 })
     }
@@ -345,7 +339,7 @@ pub fn read_run(folder: &Path) -> Result<RunFile, FolderError> {
     let path = folder.join(RUN);
     let text = match fs::read_to_string(&path) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => {
-            return Err(FolderError::NoRun { path: folder.to_owned() });
+            return Err(FolderError::NoRun(folder.to_owned()));
         }
         read => read.map_err(FolderError::io(&path))?,
     };
@@ -373,10 +367,8 @@ pub fn read_results<T: DeserializeOwned>(
     folder: &Path,
 ) -> Result<impl Iterator<Item = Result<T, FolderError>>, FolderError> {
     let path = folder.join(RESULTS);
-    let lines = lines_of(folder, RESULTS)?;
-    Ok(lines.enumerate().map(move |(index, line)| {
-        let line = line.map_err(FolderError::io(&path))?;
-        serde_json::from_str(&line).map_err(|error| FolderError::Damaged {
+    Ok(result_lines(folder)?.enumerate().map(move |(index, line)| {
+        serde_json::from_str(&line?).map_err(|error| FolderError::Damaged {
             path: path.clone(),
             line: index + 1,
             message: json_message(&error),
@@ -415,7 +407,7 @@ pub fn merge(shards: &[PathBuf], target: &Path) -> Result<RunFile, FolderError> 
         runs.push((path, read_run(path)?));
     }
     let Some((first_path, first)) = runs.first() else {
-        return Err(FolderError::NoRun { path: target.to_owned() });
+        return Err(FolderError::NoRun(target.to_owned()));
     };
     let whole = first.whole();
     for (path, run) in &runs {

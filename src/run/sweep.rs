@@ -1,6 +1,5 @@
 //! The argument of `--sweep`: one setting at several values, such as `fb.ratio=0.5:0.9:0.05`.
 
-use std::fmt;
 use std::str::FromStr;
 
 use crate::describe::ParamError;
@@ -55,43 +54,22 @@ impl Sweep {
         row.map_or("", |row| row.about.unit)
     }
 
-    /// Whether it is a step of the degradation instead of a parameter.
-    pub fn is_degradation(&self) -> bool {
-        !self.key.contains('.')
-    }
-
-    /// Sets the swept setting to one of its values, which were checked on parsing.
-    pub fn apply(&self, value: &str, degradation: &mut Degradation, params: &mut Params) {
-        if let Err(error) = self.try_apply(value, degradation, params) {
-            unreachable!("the sweep was checked: {error}");
-        }
-    }
-
-    fn try_apply(
+    /// Sets the swept setting to one of its values.
+    ///
+    /// # Errors
+    /// An unknown setting, or a value out of its range; parsing has checked them all.
+    pub fn apply(
         &self,
         value: &str,
         degradation: &mut Degradation,
         params: &mut Params,
     ) -> Result<(), SweepError> {
-        if self.is_degradation() {
-            degradation.set(&self.key, value)?;
-        } else {
+        if self.key.contains('.') {
             params.set(&self.key, value)?;
+        } else {
+            degradation.set(&self.key, value)?;
         }
         Ok(())
-    }
-
-    /// Checks that all values are in the range of the setting.
-    fn check(&self) -> Result<(), SweepError> {
-        self.values.iter().try_for_each(|value| {
-            self.try_apply(value, &mut Degradation::default(), &mut Params::default())
-        })
-    }
-}
-
-impl fmt::Display for Sweep {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}={}", self.key, self.values.join(","))
     }
 }
 
@@ -120,7 +98,9 @@ impl FromStr for Sweep {
         let value = |at: usize| format!("{:.digits$}", first + at as f64 * width);
         let sweep =
             Self { key: key.trim().to_owned(), values: (0..=steps as usize).map(value).collect() };
-        sweep.check()?;
+        for value in &sweep.values {
+            sweep.apply(value, &mut Degradation::default(), &mut Params::default())?;
+        }
         Ok(sweep)
     }
 }

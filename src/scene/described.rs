@@ -225,25 +225,29 @@ fn clouds(
     description: &Description,
     photos: &[PathBuf],
 ) -> Result<DescribedClouds, SceneError> {
-    let (place, clouds) = match (&description.cloud, &description.clouds) {
+    let mut clouds = DescribedClouds { place: source.path.clone(), ..DescribedClouds::default() };
+    match (&description.cloud, &description.clouds) {
         (Some(name), None) => {
-            let path = source.file(name)?;
-            (path, Place::Map(OnceLock::new()))
+            clouds.place = source.file(name)?;
+            clouds.map = Some(OnceLock::new());
         }
-        (None, Some(clouds)) => (source.path.clone(), per_frame(source, clouds, photos)?),
-        (None, None) => (source.path.clone(), Place::PerFrame(Vec::new(), None)),
+        (None, Some(described)) => {
+            (clouds.files, clouds.camera_from_cloud) = per_frame(source, described, photos)?;
+        }
+        (None, None) => {}
         (Some(name), Some(_)) => {
             return Err(source.error(name, "either `cloud` or `clouds` expected, both found"));
         }
-    };
-    Ok(DescribedClouds { place, clouds })
+    }
+    Ok(clouds)
 }
 
+/// The cloud of each photo, and the transform to the camera's frame; `None` if they are in the world's frame.
 fn per_frame(
     source: &Source,
     described: &CloudsDescription,
     photos: &[PathBuf],
-) -> Result<Place, SceneError> {
+) -> Result<(Vec<Option<PathBuf>>, Option<Pose>), SceneError> {
     let files = source.files(&described.files)?;
     let of_photo = |photo: &PathBuf| files.iter().find(|file| stem(file) == stem(photo)).cloned();
     let clouds: Vec<_> = photos.iter().map(of_photo).collect();
@@ -269,36 +273,29 @@ fn per_frame(
             Some(pose.map_err(|error| source.error(matrix, &error.to_string()))?)
         }
     };
-    Ok(Place::PerFrame(clouds, camera_from_cloud))
+    Ok((clouds, camera_from_cloud))
 }
 
-enum Place {
-    /// One file for all frames, read on first use.
-    Map(OnceLock<MapBlocks>),
-    /// One file per frame, and the transform to the camera's frame; `None` if they are in the world's frame.
-    PerFrame(Vec<Option<PathBuf>>, Option<Pose>),
-}
-
+#[derive(Default)]
 struct DescribedClouds {
     /// The file of the map, or the one that lists the clouds.
     place: PathBuf,
-    clouds: Place,
+    /// One cloud for all frames, read on first use.
+    map: Option<OnceLock<MapBlocks>>,
+    /// One file per frame.
+    files: Vec<Option<PathBuf>>,
+    /// The transform of these files to the camera's frame; `None` if they are in the world's frame.
+    camera_from_cloud: Option<Pose>,
 }
 
 impl Clouds for DescribedClouds {
     fn has(&self, index: usize) -> bool {
-        match &self.clouds {
-            Place::Map(_) => true,
-            Place::PerFrame(files, _) => files.get(index).is_some_and(Option::is_some),
-        }
+        self.map.is_some() || self.files.get(index).is_some_and(Option::is_some)
     }
 
     fn place<'a>(&'a self, index: usize, _frame: &'a Frame) -> &'a Path {
-        match &self.clouds {
-            Place::PerFrame(files, _) => files.get(index).and_then(Option::as_deref),
-            Place::Map(_) => None,
-        }
-        .unwrap_or(&self.place)
+        let file = self.files.get(index).and_then(Option::as_deref);
+        file.unwrap_or(&self.place)
     }
 
     fn read(&self, index: usize, frame: &Frame) -> Result<Cloud, SceneError> {
@@ -312,27 +309,23 @@ impl Clouds for DescribedClouds {
                 SceneError::expected(path, expected)
             })
         };
-        match &self.clouds {
-            Place::Map(map) => {
-                let map = match map.get() {
-                    Some(map) => map,
-                    None => {
-                        let read = MapBlocks::new(cloud_file::read(path)?);
-                        map.get_or_init(|| read)
-                    }
-                };
-                let points = map.around_view(&world_from_camera()?, &frame.intrinsics);
-                Ok(view_crop::in_view(points, &frame.intrinsics))
+        let Some(map) = &self.map else {
+            let camera_from_cloud = match self.camera_from_cloud {
+                Some(camera_from_cloud) => camera_from_cloud,
+                None => world_from_camera()?.inverse(),
+            };
+            let cloud = cloud_file::read(path)?;
+            let in_camera = |point: Point3<f64>| (camera_from_cloud * point).cast();
+            return Ok(Cloud { points: cloud.positions().map(in_camera).collect() });
+        };
+        let map = match map.get() {
+            Some(map) => map,
+            None => {
+                let read = MapBlocks::new(cloud_file::read(path)?);
+                map.get_or_init(|| read)
             }
-            Place::PerFrame(_, camera_from_cloud) => {
-                let camera_from_cloud = match camera_from_cloud {
-                    Some(camera_from_cloud) => *camera_from_cloud,
-                    None => world_from_camera()?.inverse(),
-                };
-                let cloud = cloud_file::read(path)?;
-                let in_camera = |point: Point3<f64>| (camera_from_cloud * point).cast();
-                Ok(Cloud { points: cloud.positions().map(in_camera).collect() })
-            }
-        }
+        };
+        let points = map.around_view(&world_from_camera()?, &frame.intrinsics);
+        Ok(view_crop::in_view(points, &frame.intrinsics))
     }
 }

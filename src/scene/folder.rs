@@ -1,4 +1,4 @@
-//! The files of a scene's folder and their names.
+//! Scene arguments, such as `street:night`, and the files of a scene's folder with their names.
 
 use std::collections::BTreeMap;
 use std::path::{Component, Path, PathBuf};
@@ -63,6 +63,14 @@ pub(super) fn warn_without_poses(place: &Path, missing: &str) {
     );
 }
 
+/// Splits `PATH:WORD` if the word is one of these.
+pub(super) fn split_word<'a>(argument: &'a str, words: &[&str]) -> (&'a Path, Option<&'a str>) {
+    match argument.rsplit_once(':') {
+        Some((path, word)) if words.contains(&word) => (Path::new(path), Some(word)),
+        _ => (Path::new(argument), None),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -74,5 +82,13 @@ mod tests {
         for name in ["../other.png", "rgb/../../other.png", "/etc/passwd", ""] {
             assert!(within(folder, name).is_err(), "{name}");
         }
+    }
+
+    #[test]
+    fn only_known_words_are_split_off() {
+        let split = |argument| split_word(argument, &["test"]);
+        assert_eq!(split("a/b:test"), (Path::new("a/b"), Some("test")));
+        assert_eq!(split("a/b:c"), (Path::new("a/b:c"), None));
+        assert_eq!(split(r"c:\a"), (Path::new(r"c:\a"), None));
     }
 }

@@ -35,11 +35,9 @@ pub fn located(
     path: &Path,
 ) -> Result<Arc<dyn Scene>, SceneError> {
     let file = TextFile::read(path)?;
-    let (kind, rows) = read_rows(&file)?;
-    let world = match kind {
-        Kind::World => None,
-        Kind::Geographic => Some(Tie::fit(&file, &rows, &[queries.as_ref(), references])?),
-    };
+    let (is_geographic, rows) = read_rows(&file)?;
+    let scenes = [queries.as_ref(), references];
+    let world = is_geographic.then(|| Tie::fit(&file, &rows, &scenes)).transpose()?;
     let names = FrameNames::new(queries.as_ref());
     let mut positions = BTreeMap::new();
     for row in &rows {
@@ -65,22 +63,15 @@ pub fn located(
     Ok(Arc::new(Located { scene: queries, positions }))
 }
 
-/// The meaning of a line's numbers.
-#[derive(Clone, Copy, PartialEq)]
-enum Kind {
-    /// x, y, z in the frame of the scene's poses \[m\].
-    World,
-    /// Latitude and longitude \[°\], and altitude \[m\].
-    Geographic,
-}
-
 struct Row<'a> {
     line: Line<'a>,
     name: &'a str,
+    /// x, y, z in the frame of the scene's poses \[m\], or latitude and longitude \[°\], and altitude \[m\].
     place: [f64; 3],
 }
 
-fn read_rows(file: &TextFile) -> Result<(Kind, Vec<Row<'_>>), SceneError> {
+/// The rows, and whether they have latitudes and longitudes.
+fn read_rows(file: &TextFile) -> Result<(bool, Vec<Row<'_>>), SceneError> {
     let mut lines = file.lines();
     let Some(first) = lines.next() else {
         return Err(file.error("positions expected, none found"));
@@ -92,10 +83,10 @@ fn read_rows(file: &TextFile) -> Result<(Kind, Vec<Row<'_>>), SceneError> {
     let latitude = find(&["latitude", "lat"]);
     let longitude = find(&["longitude", "lon", "lng"]);
     let altitude = find(&["altitude", "alt", "height"]);
-    let (kind, name, columns) = match (name, world, [latitude, longitude]) {
-        (Some(name), [Some(_), Some(_), Some(_)], [None, None]) => (Kind::World, name, world),
+    let (is_geographic, name, columns) = match (name, world, [latitude, longitude]) {
+        (Some(name), [Some(_), Some(_), Some(_)], [None, None]) => (false, name, world),
         (Some(name), [None, None, None], [Some(_), Some(_)]) => {
-            (Kind::Geographic, name, [latitude, longitude, altitude])
+            (true, name, [latitude, longitude, altitude])
         }
         _ => {
             return Err(first.error(
@@ -118,7 +109,7 @@ fn read_rows(file: &TextFile) -> Result<(Kind, Vec<Row<'_>>), SceneError> {
             }
         }
         let [latitude, longitude, _] = place;
-        if kind == Kind::Geographic && (latitude.abs() > 89.0 || longitude.abs() > 360.0) {
+        if is_geographic && (latitude.abs() > 89.0 || longitude.abs() > 360.0) {
             return Err(line.error(format!(
                 "a latitude and a longitude in degrees expected, {latitude} {longitude} found"
             )));
@@ -129,7 +120,7 @@ fn read_rows(file: &TextFile) -> Result<(Kind, Vec<Row<'_>>), SceneError> {
     if rows.is_empty() {
         Err(file.error("one line per frame below the header expected, none found"))
     } else {
-        Ok((kind, rows))
+        Ok((is_geographic, rows))
     }
 }
 

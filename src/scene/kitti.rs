@@ -5,13 +5,12 @@ use std::path::{Path, PathBuf};
 
 use nalgebra::{Matrix3x4, Point3, Vector3};
 
-use super::file_scene::{Clouds, FileScene, Frame};
+use super::file_scene::{FileScene, Frame};
 use super::folder::{folder_name, numbered, warn_without_poses};
-use super::kitti_format::{Camera, labelled, optional, read_scan, split_projection};
+use super::kitti_format::{Camera, Scans, labelled, optional, split_projection};
 use super::lines::TextFile;
 use super::pose_text::{PoseLines, by_line};
 use super::{Entry, Scene, SceneError, photo_file};
-use crate::cloud::Cloud;
 use crate::geometry::{Pose, matrix_from_pose};
 
 pub(super) const ENTRY: Entry = Entry {
@@ -45,20 +44,22 @@ fn open(path: &Path) -> Result<Box<dyn Scene>, SceneError> {
     let label = images.replace("image_", "P");
     let projection = labelled(&calibration, &label)?;
     let (intrinsics, camera_from_camera0) = split_projection(&projection, size, &calibration)?;
-    let camera0_from_velodyne = optional::<12>(&calibration, "Tr")?;
+    let camera_from_velodyne = optional::<12>(&calibration, "Tr")?
+        .map(|matrix| moved(&Matrix3x4::from_row_slice(&matrix), &camera_from_camera0));
 
     let sequence = folder_name(folder);
     let poses = read_poses(folder, &sequence, last)?;
     let times_s = read_times(&folder.join("times.txt"), last)?;
-    let scans = folder.join("velodyne");
+    let scan = |photo: &PathBuf| match (camera_from_velodyne, photo.file_stem()) {
+        (Some(_), Some(stem)) => folder.join("velodyne").join(stem).with_extension("bin"),
+        _ => folder.join(CALIBRATION),
+    };
+    let none = "a line `Tr:` expected (camera 0 from Velodyne), none found";
+    let matrix = camera_from_velodyne.unwrap_or_else(Matrix3x4::zeros);
     let scans = Scans {
-        paths: photos
-            .values()
-            .filter_map(|photo| Some(scans.join(photo.with_extension("bin").file_name()?)))
-            .collect(),
-        calibration: folder.join(CALIBRATION),
-        camera_from_velodyne: camera0_from_velodyne
-            .map(|matrix| moved(&Matrix3x4::from_row_slice(&matrix), &camera_from_camera0)),
+        paths: photos.values().map(scan).collect(),
+        missing: camera_from_velodyne.is_none().then_some(none),
+        into_camera: Box::new(move |_, point| Point3::from(matrix * point.to_homogeneous())),
     };
     let frames = photos.into_iter().map(|(number, photo)| Frame {
         world_from_camera: poses
@@ -116,36 +117,4 @@ fn expect_rows(file: &TextFile, what: &str, found: usize, last: usize) -> Result
         "{what} up to frame {last} (line {}) expected, {found} lines found",
         last + 1
     )))
-}
-
-struct Scans {
-    /// The path of each frame's scan, whether it exists or not.
-    paths: Vec<PathBuf>,
-    calibration: PathBuf,
-    camera_from_velodyne: Option<Matrix3x4<f64>>,
-}
-
-impl Clouds for Scans {
-    fn has(&self, index: usize) -> bool {
-        self.camera_from_velodyne.is_some() && self.paths[index].is_file()
-    }
-
-    fn place<'a>(&'a self, index: usize, _frame: &'a Frame) -> &'a Path {
-        match self.camera_from_velodyne {
-            Some(_) => &self.paths[index],
-            None => &self.calibration,
-        }
-    }
-
-    fn missing(&self) -> Option<&str> {
-        match self.camera_from_velodyne {
-            Some(_) => None,
-            None => Some("a line `Tr:` expected (camera 0 from Velodyne), none found"),
-        }
-    }
-
-    fn read(&self, index: usize, _frame: &Frame) -> Result<Cloud, SceneError> {
-        let matrix = self.camera_from_velodyne.unwrap_or_else(Matrix3x4::zeros);
-        read_scan(&self.paths[index], |point| Point3::from(matrix * point.to_homogeneous()))
-    }
 }

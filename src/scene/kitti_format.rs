@@ -1,10 +1,11 @@
 //! The common parts of both KITTI layouts: cameras, labelled lines, projection matrices and scans.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use nalgebra::{Matrix3, Matrix3x4, Point3, Translation3, UnitQuaternion, Vector3};
 
 use super::SceneError;
+use super::file_scene::{Clouds, Frame};
 use super::lens::pinhole;
 use super::lines::TextFile;
 use crate::camera::Intrinsics;
@@ -89,10 +90,38 @@ pub(super) fn split_projection(
     Ok((intrinsics, camera_from_camera0))
 }
 
-/// Reads a scan (little-endian `f32` x, y, z, reflectance) and transforms its points to the camera's frame.
-pub(super) fn read_scan(
+/// The scans of a drive.
+pub(super) struct Scans {
+    /// The path of each frame's scan, whether it exists or not.
+    pub paths: Vec<PathBuf>,
+    /// What all frames lack.
+    pub missing: Option<&'static str>,
+    /// Moves a point of the scan of a frame, by the frame's position, to the camera's frame.
+    pub into_camera: Box<dyn Fn(usize, Point3<f64>) -> Point3<f64> + Send + Sync>,
+}
+
+impl Clouds for Scans {
+    fn has(&self, index: usize) -> bool {
+        self.missing.is_none() && self.paths[index].is_file()
+    }
+
+    fn place<'a>(&'a self, index: usize, _frame: &'a Frame) -> &'a Path {
+        &self.paths[index]
+    }
+
+    fn missing(&self) -> Option<&str> {
+        self.missing
+    }
+
+    fn read(&self, index: usize, _frame: &Frame) -> Result<Cloud, SceneError> {
+        read_scan(&self.paths[index], |point| (self.into_camera)(index, point))
+    }
+}
+
+/// Reads a scan (little-endian `f32` x, y, z, reflectance) and moves its points.
+fn read_scan(
     path: &Path,
-    camera_from_velodyne: impl Fn(Point3<f64>) -> Point3<f64>,
+    into_camera: impl Fn(Point3<f64>) -> Point3<f64>,
 ) -> Result<Cloud, SceneError> {
     const BYTES_PER_POINT: usize = 16;
     let bytes = std::fs::read(path).map_err(SceneError::io(path))?;
@@ -115,7 +144,7 @@ pub(super) fn read_scan(
                 index * BYTES_PER_POINT
             )));
         }
-        Ok(camera_from_velodyne(Point3::new(x, y, z)).cast())
+        Ok(into_camera(Point3::new(x, y, z)).cast())
     };
     let points = records.iter().enumerate().map(point);
     Ok(Cloud { points: points.collect::<Result<_, _>>()? })

@@ -17,13 +17,10 @@ use nalgebra::Point3;
 use self::calibration::Calibration;
 use self::oxts::Packet;
 use self::sweep::Sweep;
-use super::argument::split_word;
-use super::file_scene::{Clouds, FileScene, Frame};
-use super::folder::{folder_name, numbered, warn_without_poses};
-use super::kitti_format::{Camera, read_scan};
+use super::file_scene::{FileScene, Frame};
+use super::folder::{folder_name, numbered, split_word, warn_without_poses};
+use super::kitti_format::{Camera, Scans};
 use super::{Entry, Scene, SceneError, photo_file};
-use crate::cloud::Cloud;
-use crate::geometry::Pose;
 
 pub(super) const ENTRY: Entry = Entry {
     name: "kitti-raw",
@@ -85,20 +82,22 @@ fn open(path: &Path, correct: bool) -> Result<Box<dyn Scene>, SceneError> {
     let world_from_camera0 = oxts::world_from_camera0(&packets, &calibration.camera0_from_imu());
     let times = timestamps::read(&drive.join(images).join("timestamps.txt"))?;
     let folder = drive.join("velodyne_points");
-    let scans = Scans {
-        of_frames: scans(&folder, photos.keys(), &packets, correct)?,
-        folder,
-        camera_from_velodyne: calibration.camera_from_camera0 * calibration.camera0_from_velodyne,
-        velodyne_from_imu: calibration.velodyne_from_imu,
-    };
-    let mut found = scans.of_frames.iter().flatten();
-    if correct && found.any(|(_, sweep)| sweep.is_some()) {
+    let (paths, sweeps) = scans(&folder, photos.keys(), &packets, correct)?;
+    if sweeps.iter().any(Option::is_some) {
         log::info!(
             "{}: scans are corrected for the motion during the sweep; append `:{UNCORRECTED}` to the \
              path to turn this off",
             drive.display()
         );
     }
+    let camera_from_velodyne = calibration.camera_from_camera0 * calibration.camera0_from_velodyne;
+    let velodyne_from_imu = calibration.velodyne_from_imu;
+    let into_camera = move |index: usize, point: Point3<f64>| {
+        let sweep = sweeps[index].as_ref();
+        let corrected = sweep.map(|sweep| sweep.corrected(&point, &velodyne_from_imu));
+        camera_from_velodyne * corrected.unwrap_or(point)
+    };
+    let scans = Scans { paths, missing: None, into_camera: Box::new(into_camera) };
     let frames = photos.into_iter().map(|(number, photo)| Frame {
         world_from_camera: world_from_camera0
             .get(&number)
@@ -116,60 +115,29 @@ fn open(path: &Path, correct: bool) -> Result<Box<dyn Scene>, SceneError> {
     Ok(Box::new(FileScene::new(name, frames.collect(), scans)))
 }
 
-/// The scans of the frames, by position; `None` for frames without a scan.
+/// The scan of each frame, and the motion of the car during it if it must be corrected. The scan of a frame without
+/// one is the folder.
 fn scans<'a>(
     folder: &Path,
     frames: impl Iterator<Item = &'a usize>,
     packets: &BTreeMap<usize, Packet>,
     correct: bool,
-) -> Result<Vec<Option<Scan>>, SceneError> {
+) -> Result<(Vec<PathBuf>, Vec<Option<Sweep>>), SceneError> {
     let data = folder.join("data");
     let files: BTreeMap<usize, PathBuf> =
         if data.is_dir() { numbered(&data, "bin")? } else { BTreeMap::new() };
     let starts = timestamps::read(&folder.join("timestamps_start.txt"))?;
     let ends = timestamps::read(&folder.join("timestamps_end.txt"))?;
     let scan = |number: &usize| {
-        let path = files.get(number)?.clone();
+        let Some(path) = files.get(number) else {
+            return (folder.to_owned(), None);
+        };
         let duration_s = match (starts.get(*number), ends.get(*number)) {
             (Some(start), Some(end)) => end - start,
             _ => sweep::USUAL_S,
         };
         let packet = packets.get(number).filter(|_| correct);
-        Some((path, packet.map(|packet| Sweep::new(packet, duration_s))))
+        (path.clone(), packet.map(|packet| Sweep::new(packet, duration_s)))
     };
-    Ok(frames.map(scan).collect())
-}
-
-/// A scan, and the motion of the car during it if it must be corrected.
-type Scan = (PathBuf, Option<Sweep>);
-
-struct Scans {
-    folder: PathBuf,
-    of_frames: Vec<Option<Scan>>,
-    camera_from_velodyne: Pose,
-    velodyne_from_imu: Pose,
-}
-
-impl Clouds for Scans {
-    fn has(&self, index: usize) -> bool {
-        self.of_frames[index].is_some()
-    }
-
-    fn place<'a>(&'a self, index: usize, _frame: &'a Frame) -> &'a Path {
-        let scan = self.of_frames[index].as_ref();
-        scan.map_or(&self.folder, |(path, _)| path)
-    }
-
-    fn read(&self, index: usize, frame: &Frame) -> Result<Cloud, SceneError> {
-        let scan = self.of_frames[index].as_ref();
-        let sweep = scan.and_then(|(_, sweep)| sweep.as_ref());
-        let into_camera = |point: Point3<f64>| {
-            let point = match sweep {
-                Some(sweep) => sweep.corrected(&point, &self.velodyne_from_imu),
-                None => point,
-            };
-            self.camera_from_velodyne * point
-        };
-        read_scan(self.place(index, frame), into_camera)
-    }
+    Ok(frames.map(scan).unzip())
 }

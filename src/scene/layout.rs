@@ -47,26 +47,27 @@ pub struct Shot<'a> {
     pub depth: &'a (dyn Fn(Point2<f64>) -> Option<f64> + Sync),
 }
 
-/// Writes the frames of one drive. Files are written atomically and replace existing ones.
-pub trait DriveWriter: Send + Sync {
-    /// Writes a frame. Called in any order and concurrently.
-    ///
-    /// # Errors
-    /// [`SceneError::Io`] when the disk is full or a folder not writable, [`SceneError::Image`] when
-    /// an image cannot be encoded.
-    fn frame(&self, shot: &Shot<'_>) -> Result<(), SceneError>;
+/// Writes a frame.
+pub type WriteFrame = dyn Fn(&Shot<'_>) -> Result<(), SceneError> + Send + Sync;
 
+/// Writes the frames of one drive. Files are written atomically and replace existing ones. The errors are
+/// [`SceneError::Io`] when the disk is full or a folder not writable, [`SceneError::Image`] when an image cannot be
+/// encoded.
+pub struct DriveWriter {
+    /// Writes a frame. Called in any order and concurrently.
+    pub frame: Box<WriteFrame>,
     /// Writes the files that need all frames.
-    ///
-    /// # Errors
-    /// As for [`Self::frame`].
-    fn finish(&self) -> Result<(), SceneError> {
-        Ok(())
-    }
+    pub finish: Box<dyn FnOnce() -> Result<(), SceneError>>,
 }
 
-/// A writer, or why none can be created.
-pub type CreateResult = Result<Box<dyn DriveWriter>, SceneError>;
+impl DriveWriter {
+    /// A writer of frames, none of whose files needs all of them.
+    pub fn new(
+        frame: impl Fn(&Shot<'_>) -> Result<(), SceneError> + Send + Sync + 'static,
+    ) -> Self {
+        Self { frame: Box::new(frame), finish: Box::new(|| Ok(())) }
+    }
+}
 
 /// The entry of a layout in the registry.
 pub struct Layout {
@@ -75,7 +76,7 @@ pub struct Layout {
     /// The folder of a drive with this name, below the target folder.
     pub place: fn(&str) -> String,
     /// Creates the folders of a drive, and writes the data that are known in advance.
-    pub create: fn(&Path, &str, Drive) -> CreateResult,
+    pub create: fn(&Path, &str, Drive) -> Result<DriveWriter, SceneError>,
 }
 
 /// Every layout; the first is the default.

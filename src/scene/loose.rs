@@ -84,10 +84,8 @@ impl LoosePhotos {
             let middle = |side: u32| (f64::from(side) - 1.0) / 2.0;
             let camera = [focal_px, focal_px, middle(width), middle(height)];
             let intrinsics = pinhole(camera, (width, height)).map_err(error)?;
-            return Ok(Frame {
-                develop: Some(Arc::new(turn)),
-                ..Frame::new(path.to_owned(), intrinsics)
-            });
+            let develop: Option<Arc<dyn Develop>> = Some(Arc::new(turn));
+            return Ok(Frame { develop, ..Frame::new(path.to_owned(), intrinsics) });
         };
         // Cameras are calibrated on the stored pixels.
         if turned != Orientation::NoTransforms {

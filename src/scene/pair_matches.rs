@@ -125,8 +125,10 @@ impl MatchFolder {
         };
         Ok(Self { folder: folder.to_owned(), hloc })
     }
+}
 
-    fn of_pair(&self, query: &str, reference: &str) -> Result<Option<FoundMatches>, SceneError> {
+impl MatchSource for MatchFolder {
+    fn matches(&self, query: &str, reference: &str) -> Result<Option<PairMatches>, SceneError> {
         let orders =
             [(Order::QueryFirst, query, reference), (Order::ReferenceFirst, reference, query)];
         for (order, first, second) in orders {
@@ -141,17 +143,10 @@ impl MatchFolder {
                 found.transpose()?.flatten()
             };
             if let Some(found) = found {
-                return Ok(Some(found.of_query(order)));
+                return Ok(Some(PairMatches::Found(found.of_query(order))));
             }
         }
         Ok(None)
-    }
-}
-
-impl MatchSource for MatchFolder {
-    fn matches(&self, query: &str, reference: &str) -> Result<Option<PairMatches>, SceneError> {
-        let found = self.of_pair(query, reference)?;
-        Ok(found.map(PairMatches::Found))
     }
 }
 

@@ -70,14 +70,10 @@ impl Retriever {
         Some(folder.join(name).with_extension(EXTENSION))
     }
 
-    /// The request for an index of a scene.
-    pub fn request(scene: &dyn Scene, options: &IndexOptions, params: &Params) -> BuildRequest {
-        Self::request_without(scene, options, &BTreeSet::new(), params)
-    }
-
-    /// As [`Self::request`], without some frames: they are not found, and do not contribute to the vocabulary and
-    /// the word weights. Use this for queries from the scene itself, which would otherwise find their own photos.
-    pub fn request_without(
+    /// The request for an index of a scene `without` some frames: they are not found, and do not contribute to the
+    /// vocabulary and the word weights. Use this for queries from the scene itself, which would otherwise find their
+    /// own photos.
+    pub fn request(
         scene: &dyn Scene,
         options: &IndexOptions,
         without: &BTreeSet<usize>,
@@ -152,6 +148,11 @@ impl Retriever {
             let output = given.map_or(String::new(), |path| format!(" --out {}", path.display()));
             NoIndex::Unusable { source, command: format!("posescope index {argument}{output}") }
         })
+    }
+
+    /// Whether it was opened with these parameters.
+    pub(crate) fn is_for(&self, params: &Params) -> bool {
+        self.surf == params.surf && self.params == params.retrieval
     }
 
     /// Ranks the allowed frames by similarity to the query.

@@ -11,10 +11,9 @@ use std::path::{Path, PathBuf};
 
 use nalgebra::{Matrix3, Matrix4, Translation3, UnitQuaternion};
 
-use super::argument::split_word;
 use super::depth_image::DepthImages;
 use super::file_scene::{FileScene, Frame};
-use super::folder::{entries, folder_name};
+use super::folder::{entries, folder_name, split_word};
 use super::lens::pinhole;
 use super::lines::TextFile;
 use super::{Entry, Scene, SceneError, photo_file};

@@ -65,20 +65,11 @@ const QUANTITIES: &[Quantity] = &[
 
 /// The condition of a breakpoint.
 #[derive(Clone, Debug, PartialEq)]
-pub enum BreakAt {
+enum BreakAt {
     /// The start of a stage of this name.
     Stage(&'static str),
-    /// A comparison that becomes true.
-    Crossing(Crossing),
-}
-
-/// A watched number and its limit.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Crossing {
-    /// The position in the table of quantities.
-    quantity: usize,
-    relation: Relation,
-    bound: f64,
+    /// A comparison that becomes true, of the number at this position in the table of quantities.
+    Crossing { quantity: usize, relation: Relation, bound: f64 },
 }
 
 /// Why a text is not a breakpoint.
@@ -145,9 +136,12 @@ impl Breakpoint {
         self.method
     }
 
-    /// Its condition.
-    pub fn at(&self) -> &BreakAt {
-        &self.at
+    /// The stage at whose start it stops; `None` for a comparison.
+    pub fn stage(&self) -> Option<&'static str> {
+        match self.at {
+            BreakAt::Stage(name) => Some(name),
+            BreakAt::Crossing { .. } => None,
+        }
     }
 }
 
@@ -190,7 +184,7 @@ impl FromStr for Breakpoint {
                     .ok()
                     .filter(|bound: &f64| bound.is_finite())
                     .ok_or_else(|| refuse(format!("`{bound}` is not a number")))?;
-                BreakAt::Crossing(Crossing { quantity, relation, bound })
+                BreakAt::Crossing { quantity, relation, bound }
             }
             None if method.is_some() && Self::OUTSIDE.contains(&name) => {
                 return Err(refuse(format!("the stage `{name}` belongs to no method")));
@@ -251,15 +245,11 @@ impl Breakpoints {
                     record.event,
                     Event::StageStarted(StageStarted { stage }) if stage.name() == *name
                 ),
-                BreakAt::Crossing(crossing) => {
-                    match (QUANTITIES[crossing.quantity].of)(&record.event) {
-                        Some(value) => {
-                            let is_true = crossing.relation.holds(value, crossing.bound);
-                            let was_true = std::mem::replace(&mut watched.was_true, is_true);
-                            is_true && !was_true
-                        }
-                        None => false,
-                    }
+                BreakAt::Crossing { quantity, relation, bound } => {
+                    (QUANTITIES[*quantity].of)(&record.event).is_some_and(|value| {
+                        let is_true = relation.holds(value, *bound);
+                        !std::mem::replace(&mut watched.was_true, is_true) && is_true
+                    })
                 }
             };
             if fires && reached.is_none() {

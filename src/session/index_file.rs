@@ -4,30 +4,16 @@ use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use super::task::Task;
-use crate::features::SurfParams;
 use crate::params::Params;
-use crate::retrieval::RetrievalParams;
 use crate::scene::{NoIndex, Retriever, Scene};
 
 /// The index of a scene. Opening it checks every byte, so it is opened on first use, and again only if the
 /// parameters change.
-#[derive(Debug, Default)]
+#[derive(Default)]
 pub struct IndexFile {
     argument: String,
     file: Option<PathBuf>,
-    opened: Mutex<Option<Opened>>,
-}
-
-struct Opened {
-    surf: SurfParams,
-    retrieval: RetrievalParams,
-    retriever: Arc<Retriever>,
-}
-
-impl std::fmt::Debug for Opened {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Opened").finish_non_exhaustive()
-    }
+    opened: Mutex<Option<Arc<Retriever>>>,
 }
 
 impl IndexFile {
@@ -52,19 +38,12 @@ impl IndexFile {
     /// The errors of [`Retriever::find`].
     pub fn open(&self, scene: &dyn Scene, params: &Params) -> Result<Arc<Retriever>, NoIndex> {
         let mut opened = self.opened.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(known) = &*opened
-            && known.surf == params.surf
-            && known.retrieval == params.retrieval
-        {
-            return Ok(Arc::clone(&known.retriever));
+        if let Some(known) = opened.as_ref().filter(|known| known.is_for(params)) {
+            return Ok(Arc::clone(known));
         }
         let file = self.file.as_deref();
         let retriever = Arc::new(Retriever::find(file, scene, &self.argument, params)?);
-        *opened = Some(Opened {
-            surf: params.surf,
-            retrieval: params.retrieval,
-            retriever: Arc::clone(&retriever),
-        });
+        *opened = Some(Arc::clone(&retriever));
         Ok(retriever)
     }
 }

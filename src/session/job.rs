@@ -10,8 +10,8 @@ use super::pausing::PausingObserver;
 use super::run::RunState;
 use super::task::Task;
 use crate::localize::{
-    ChoiceError, Chooser, LocalizeError, LocalizeObserver, Localizer, QueryResult, Ranking,
-    References, Request, Selection, words_of,
+    ChoiceError, LocalizeError, LocalizeObserver, Localizer, QueryResult, Ranking, References,
+    Request, Selection, words_of,
 };
 use crate::scene::{FrameStore, NoIndex, Scene, SceneError};
 
@@ -51,12 +51,9 @@ pub enum JobError {
     Index(#[from] NoIndex),
     /// References must be named, and none is.
     #[error(
-        "no reference is chosen for query {query}; choose one, or random:K, nearest:K, matches:K or retrieve:K"
+        "no reference is chosen for query {0}; choose one, or random:K, nearest:K, matches:K or retrieve:K"
     )]
-    NoneNamed {
-        /// The query frame's name.
-        query: String,
-    },
+    NoneNamed(String),
     /// No frame is near enough to be a reference.
     #[error(
         "no frame with a pose and a cloud within {radius_m} m of query {query}; raise the radius \
@@ -125,9 +122,8 @@ impl Job {
     ) -> Result<Vec<QueryResult>, JobError> {
         let (task, protocol) = (&self.task, &self.task.protocol);
         let scenes = (self.frames.of(&self.references), self.frames.of(&self.queries));
-        let localizer =
-            protocol.configured(Localizer::with_cached_scenes(scenes, &task.params, protocol.seed));
-        let localizer = localizer.with_foreign(protocol.foreign(self.queries.as_ref())?);
+        let localizer = Localizer::with_cached_scenes(scenes, &task.params, protocol.seed);
+        let localizer = protocol.configured(localizer)?;
         let chosen = self.choose(&localizer, observer)?;
         on_choice(&chosen);
         let request = Request {
@@ -156,7 +152,7 @@ impl Job {
         let query = || self.queries.frames()[self.query].clone();
         let (task, protocol) = (&self.task, &self.task.protocol);
         if protocol.is_by_hand() {
-            return Err(JobError::NoneNamed { query: query() });
+            return Err(JobError::NoneNamed(query()));
         }
         let index = match protocol.selection() {
             Selection::Retrieved(_) => {
@@ -164,14 +160,8 @@ impl Job {
             }
             _ => None,
         };
-        let chooser = Chooser {
-            localizer,
-            params: &task.params,
-            selection: protocol.selection(),
-            radius_m: task.reach_m(),
-            seed: protocol.seed,
-            index: index.as_deref().map(|index| index as &dyn Ranking),
-        };
+        let index = index.as_deref().map(|index| index as &dyn Ranking);
+        let chooser = protocol.chooser(localizer, task.reach_m(), index);
         let chosen = chooser.choose(self.query, &|_| false, observer)?;
         if chosen.frames.is_empty() {
             return Err(JobError::NoneNear { query: query(), radius_m: task.reach_m() });

@@ -3,12 +3,10 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
-use std::time::{Duration, Instant};
 
 use super::breakpoint::Breakpoints;
-use super::loaded::Loaded;
 use super::message::Outbox;
-use super::run::{Part, Run, RunState};
+use super::run::{Loaded, Part, Run, RunState};
 use crate::event::Event;
 use crate::geometry::Pose;
 use crate::localize::{LocalizeObserver, QueryResult, StageTimes};
@@ -66,11 +64,8 @@ pub(super) struct PausingObserver {
     is_cancelled: bool,
     /// Where the run pauses next in the current mode.
     pause_at: PauseAt,
-    /// Where steps from the last event end; `None` before the first event.
-    steps: Option<Steps>,
-    begun: Instant,
-    /// The total time spent waiting for commands.
-    waited: Duration,
+    /// The last event, from which a step begins.
+    last: Option<Record>,
 }
 
 /// Where to pause next, apart from breakpoints.
@@ -82,32 +77,19 @@ enum PauseAt {
     Never,
 }
 
-/// Where steps from an event end.
-#[derive(Clone, Copy)]
-struct Steps {
-    over: PauseAt,
-    out: PauseAt,
-}
-
-impl Steps {
-    fn from(record: &Record) -> Self {
-        let depth = record.depth;
-        let (over, out) = match record.event {
-            Event::StageStarted(_) => (PauseAt::EndOfStage(depth), depth),
-            // At the end of a stage, "out" leaves the surrounding stage.
-            Event::StageEnded(_) => (PauseAt::NextEvent, depth.saturating_sub(1)),
-            _ => (PauseAt::NextEvent, depth),
-        };
-        Self { over, out: PauseAt::EndOfStage(out) }
-    }
-}
-
 impl PauseAt {
-    fn new(mode: RunMode, steps: Option<Steps>) -> Self {
-        match (mode, steps) {
+    /// In a mode that was set after the last event.
+    fn new(mode: RunMode, last: Option<&Record>) -> Self {
+        match (mode, last) {
             (RunMode::Running, _) => Self::Never,
-            (RunMode::StepOver, Some(steps)) => steps.over,
-            (RunMode::StepOut, Some(steps)) => steps.out,
+            (RunMode::StepOver, Some(Record { event: Event::StageStarted(_), depth, .. })) => {
+                Self::EndOfStage(*depth)
+            }
+            // At the end of a stage, "out" leaves the surrounding stage.
+            (RunMode::StepOut, Some(Record { event: Event::StageEnded(_), depth, .. })) => {
+                Self::EndOfStage(depth.saturating_sub(1))
+            }
+            (RunMode::StepOut, Some(record)) => Self::EndOfStage(record.depth),
             _ => Self::NextEvent,
         }
     }
@@ -137,9 +119,7 @@ impl PausingObserver {
             breakpoints,
             is_cancelled: false,
             pause_at: PauseAt::new(mode, None),
-            steps: None,
-            begun: Instant::now(),
-            waited: Duration::ZERO,
+            last: None,
         };
         (control, observer)
     }
@@ -153,7 +133,7 @@ impl PausingObserver {
         match command {
             Command::Go(mode) => {
                 self.mode = mode;
-                self.pause_at = PauseAt::new(mode, self.steps);
+                self.pause_at = PauseAt::new(mode, self.last.as_ref());
             }
             Command::Breakpoints(breakpoints) => self.breakpoints.replace(breakpoints),
             Command::Cancel => self.is_cancelled = true,
@@ -171,7 +151,6 @@ impl PausingObserver {
     /// Waits for a command to continue.
     fn wait(&mut self, breakpoint: Option<String>) -> Result<(), Cancelled> {
         self.outbox.state(RunState::Paused { breakpoint })?;
-        let since = Instant::now();
         let mut goes = false;
         while !goes {
             let command = self.commands.recv().map_err(|_| Cancelled)?;
@@ -181,7 +160,6 @@ impl PausingObserver {
                 return Err(Cancelled);
             }
         }
-        self.waited += since.elapsed();
         self.outbox.state(RunState::Running)
     }
 }
@@ -238,17 +216,15 @@ impl LocalizeObserver for PausingObserver {
 
 impl Sink for PausingObserver {
     fn accept(&mut self, record: &Record) -> Result<(), Cancelled> {
-        // Waiting does not count as work.
-        let worked = self.begun.elapsed().saturating_sub(self.waited);
         let record_copy = record.clone();
         self.outbox.change(move |run| {
-            run.push(record_copy, worked);
+            run.push(record_copy);
             // Either it was resumed, or it reports the pause next.
             run.state = RunState::Running;
         })?;
         // A mode set before this event refers to the previous event.
         self.obey_all()?;
-        self.steps = Some(Steps::from(record));
+        self.last = Some(record.clone());
         let breakpoint = self.breakpoints.reached(record);
         if breakpoint.is_some() || self.pause_at.is_reached(record) {
             self.wait(breakpoint)?;
@@ -259,7 +235,7 @@ impl Sink for PausingObserver {
     /// Pauses without waiting for the next event, except before the first one: there would be nothing to show.
     fn attend(&mut self) -> Result<(), Cancelled> {
         self.obey_all()?;
-        if self.mode == RunMode::Paused && self.steps.is_some() {
+        if self.mode == RunMode::Paused && self.last.is_some() {
             self.wait(None)?;
         }
         Ok(())

@@ -3,16 +3,17 @@
 use std::fmt;
 use std::ops::Range;
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
-use super::loaded::Loaded;
 use super::task::Task;
 use crate::event::{DebugEvent, Event, ReferencesFused, Stage};
+use crate::geometry::Pose;
 use crate::history::History;
 use crate::image::Degradation;
 use crate::localize::{QueryResult, References, StageTimes};
 use crate::method::Method;
 use crate::params::Params;
+use crate::problem::Problem;
 use crate::trace::Record;
 
 /// What a session is doing.
@@ -47,6 +48,15 @@ impl RunState {
     }
 }
 
+/// The photos and clouds of a run.
+#[derive(Clone, Debug)]
+pub struct Loaded {
+    /// The query and each of its references.
+    pub problems: Vec<Problem>,
+    /// The true pose of the query, if known. The estimators do not see it.
+    pub truth: Option<Pose>,
+}
+
 /// The records of all parts of a run, one after the other, and their results.
 ///
 /// A *cursor* is a position among the records. Queries at a cursor refer to the part of the record there.
@@ -66,8 +76,6 @@ pub struct Run {
     pub loaded: Option<Arc<Loaded>>,
     pub(super) state: RunState,
     history: History,
-    /// The working time of the run at each record.
-    worked: Vec<Duration>,
     spans: Vec<Span>,
     stages: Vec<StageBar>,
     /// While references are chosen by appearance: the number of compared candidates, and of all.
@@ -192,7 +200,7 @@ impl Run {
         self.spans.push(Span { part, records: start..start, result: None, times: None });
     }
 
-    pub(super) fn push(&mut self, record: Record, worked: Duration) {
+    pub(super) fn push(&mut self, record: Record) {
         let at = self.len();
         match &record.event {
             Event::StageStarted(started) => {
@@ -219,7 +227,6 @@ impl Run {
             self.stages[bar].records.end = at + 1;
         }
         self.history.push(record);
-        self.worked.push(worked);
         if let Some(span) = self.spans.last_mut() {
             span.records.end = at + 1;
         }
@@ -269,20 +276,6 @@ impl Run {
     /// All records.
     pub fn records(&self) -> &[Record] {
         self.history.records()
-    }
-
-    /// The working time of the run at a record, without pauses but including the cost of observation. A future record
-    /// has the time of the last one.
-    pub fn worked_until(&self, record: usize) -> Duration {
-        let last = self.worked.len().saturating_sub(1);
-        let time = self.worked.get(record.min(last));
-        time.copied().unwrap_or_default()
-    }
-
-    /// The last record up to this working time.
-    pub fn record_at(&self, worked: Duration) -> usize {
-        let after = self.worked.partition_point(|time| *time <= worked);
-        after.saturating_sub(1)
     }
 
     /// The parts of the run in order.

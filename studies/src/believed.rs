@@ -1,4 +1,4 @@
-use std::collections::BTreeMap;
+use std::collections::BTreeSet;
 
 use image::{Rgb, RgbImage, imageops};
 use posescope::diagnosis::{Confidence, Grade};
@@ -26,71 +26,66 @@ pub struct Options {
     chosen: Chosen,
 }
 
-/// Results that should not be, all results, and the greatest probability, by what was done and method.
-#[derive(Default)]
-struct Counts(BTreeMap<(&'static str, &'static str), (usize, usize, f64)>);
+/// What was counted of one result.
+struct Counted {
+    table: usize,
+    /// What was done, or what the pose is.
+    kind: &'static str,
+    method: Method,
+    /// Whether it should not be.
+    is_bad: bool,
+    probability: f64,
+}
 
-impl Counts {
-    fn add(&mut self, kind: &'static str, result: &QueryResult, is_bad: bool) {
-        let tally = (usize::from(is_bad), 1, probability(result));
-        self.add_tally((kind, result.method.name()), tally);
+impl Counted {
+    fn new(table: usize, kind: &'static str, result: &QueryResult, is_bad: bool) -> Self {
+        Self { table, kind, method: result.method, is_bad, probability: probability(result) }
     }
+}
 
-    fn add_tally(
-        &mut self,
-        key: (&'static str, &'static str),
-        (bad, all, most): (usize, usize, f64),
-    ) {
-        let tally = self.0.entry(key).or_default();
-        *tally = (tally.0 + bad, tally.1 + all, tally.2.max(most));
-    }
+/// The tables, in the order of [`Counted::table`].
+const TABLES: [&str; 3] = [
+    "Queries that show nothing of their place: trusted poses",
+    "Query and reference of one condition",
+    "Query and reference of any two conditions",
+];
 
-    fn print(&self, title: &str) {
-        let mut kinds: Vec<&str> = self.0.keys().map(|(kind, _)| *kind).collect();
-        kinds.dedup();
+pub fn run(options: &Options) -> Result<(), Failure> {
+    let conditions = all_conditions();
+    let counted = options.chosen.each(|place| {
+        let mut counted = unknowable(place)?;
+        match place.street() {
+            None => counted.extend(graded(&place.case(), 1)?),
+            Some(street) => {
+                let (query, reference) = (place.number % 5, (place.number / 5) % 5);
+                for (table, reference) in [(1, query), (2, reference)] {
+                    let drives = [query, reference].map(|condition| &conditions[condition]);
+                    counted.extend(graded(&between(place, street, drives), table)?);
+                }
+            }
+        }
+        Ok(counted)
+    })?;
+    for (table, title) in TABLES.into_iter().enumerate() {
+        let own = counted.iter().flatten().filter(|one| one.table == table);
+        let own: Vec<&Counted> = own.collect();
+        let kinds: BTreeSet<&str> = own.iter().map(|one| one.kind).collect();
         let rows = kinds.into_iter().map(|kind| {
             let cells = METHODS.map(|method| {
-                let tally = self.0.get(&(kind, method.name())).copied();
-                let (bad, all, most) = tally.unwrap_or_default();
-                format!("{bad} of {all}, at most {most:.2}")
+                let own = || own.iter().filter(|one| one.kind == kind && one.method == method);
+                let bad = own().filter(|one| one.is_bad).count();
+                let most = own().map(|one| one.probability).fold(0.0, f64::max);
+                format!("{bad} of {}, at most {most:.2}", own().count())
             });
             [vec![kind.to_owned()], cells.to_vec()].concat()
         });
         println!("\n## {title}\n");
         print_table(",fb,pm,mi,hy", &rows.collect::<Vec<_>>());
     }
-}
-
-pub fn run(options: &Options) -> Result<(), Failure> {
-    let conditions = all_conditions();
-    let counted = options.chosen.each(|place| {
-        let [mut one, mut two] = [Counts::default(), Counts::default()];
-        match place.street() {
-            None => grade(&place.case(), &mut one)?,
-            Some(street) => {
-                let (query, reference) = (place.number % 5, (place.number / 5) % 5);
-                for (counts, reference) in [(&mut one, query), (&mut two, reference)] {
-                    let drives = [query, reference].map(|condition| &conditions[condition]);
-                    grade(&between(place, street, drives), counts)?;
-                }
-            }
-        }
-        Ok([unknowable(place)?, one, two])
-    })?;
-    let mut sums = [const { Counts(BTreeMap::new()) }; 3];
-    for of_place in counted {
-        for (sum, counts) in sums.iter_mut().zip(of_place) {
-            counts.0.into_iter().for_each(|(key, tally)| sum.add_tally(key, tally));
-        }
-    }
-    let [unknowable, one, two] = &sums;
-    unknowable.print("Queries that show nothing of their place: trusted poses");
-    one.print("Query and reference of one condition");
-    two.print("Query and reference of any two conditions");
     Ok(())
 }
 
-fn unknowable(place: &Place<'_>) -> Result<Counts, Failure> {
+fn unknowable(place: &Place<'_>) -> Result<Vec<Counted>, Failure> {
     let mut case = place.case();
     let own = case.query.photo.clone();
     let mut rng = Pcg64::seed_from_u64(place.number as u64);
@@ -104,15 +99,16 @@ fn unknowable(place: &Place<'_>) -> Result<Counts, Failure> {
         ("upside down", imageops::rotate180(&own)),
         ("another town", place.foreign_photo()),
     ];
-    let mut counts = Counts::default();
+    let mut counted = Vec::new();
     for (kind, photo) in photos {
         case.query.photo = photo;
         for result in case.results(&METHODS, false)? {
             let is_trusted = result.confidence_word() == Some(Confidence::Trusted);
-            counts.add(kind, &result, result.status == Status::Ok && is_trusted);
+            let is_bad = result.status == Status::Ok && is_trusted;
+            counted.push(Counted::new(0, kind, &result, is_bad));
         }
     }
-    Ok(counts)
+    Ok(counted)
 }
 
 fn probability(result: &QueryResult) -> f64 {
@@ -131,14 +127,15 @@ fn between(place: &Place<'_>, street: &StreetPlace<'_>, drives: [&Traversal; 2])
     }
 }
 
-/// Counts the verdicts and the confidence of a right pose, and of a wrong one.
-fn grade(case: &Case, counts: &mut Counts) -> Result<(), Failure> {
+/// The verdicts and the confidence of right poses, and of wrong ones.
+fn graded(case: &Case, table: usize) -> Result<Vec<Counted>, Failure> {
     let is_alarm = |result: &QueryResult| result.diagnosis.iter().any(|d| d.code.is_failure());
     let (known, withheld) = (case.results(&METHODS, true)?, case.results(&METHODS, false)?);
+    let mut counted = Vec::new();
     for (known, withheld) in known.iter().zip(&withheld) {
         let p = probability(withheld);
         let word = withheld.confidence_word();
-        let verdicts: &[(&str, bool)] = match known.grade {
+        let verdicts: &[(&'static str, bool)] = match known.grade {
             Grade::Wrong => {
                 &[("wrong, from 0.95 on", p >= 0.95), ("wrong, from 0.98 on", p >= 0.98)]
             }
@@ -150,7 +147,8 @@ fn grade(case: &Case, counts: &mut Counts) -> Result<(), Failure> {
             ],
             _ => &[],
         };
-        verdicts.iter().for_each(|&(kind, is_bad)| counts.add(kind, withheld, is_bad));
+        let of_verdict = |&(kind, is_bad)| Counted::new(table, kind, withheld, is_bad);
+        counted.extend(verdicts.iter().map(of_verdict));
     }
-    Ok(())
+    Ok(counted)
 }

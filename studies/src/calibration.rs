@@ -1,3 +1,4 @@
+use std::cmp::Ordering;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -10,6 +11,7 @@ use posescope::image::Photo;
 use posescope::method::Method;
 use posescope::params::Params;
 use posescope::problem::{Problem, Query, ReferenceTuple};
+use posescope::scene::Scene as _;
 use posescope::scene::street::{Condition, Size, Traversal, WORLD_SEED};
 use posescope::trace::Trace;
 use rand::{RngExt as _, SeedableRng as _};
@@ -158,8 +160,8 @@ fn collect(options: &Options) -> Result<Vec<Sample>, Failure> {
         at_places(pairs.len(), |number| {
             let pair = &pairs[number];
             let trial = Trial {
-                query: pair.query.query("query")?,
-                reference: pair.reference.reference("reference")?,
+                query: pair.query.clone().named("query").query(0)?,
+                reference: pair.reference.clone().named("reference").reference(0)?,
                 truth: pair.query.pose,
                 conditions: ["real"; 2],
             };
@@ -168,10 +170,11 @@ fn collect(options: &Options) -> Result<Vec<Sample>, Failure> {
     } else {
         let drives = all_conditions();
         at_places(options.places, |place| {
-            let trials = at(&drives, place, options.seed)?;
-            let samples: Result<Vec<_>, _> =
-                trials.iter().map(|trial| trial.samples(&options.methods)).collect();
-            Ok(samples?.concat())
+            let mut samples = Vec::new();
+            for trial in at(&drives, place, options.seed)? {
+                samples.extend(trial.samples(&options.methods)?);
+            }
+            Ok(samples)
         })?
     };
     Ok(samples.concat())
@@ -199,36 +202,28 @@ fn at(drives: &[Traversal; 5], place: usize, seed: u64) -> Result<Vec<Trial>, Fa
         // What is drawn at random depends on the name.
         let name = format!("{reference:06}");
         let (query, reference) = (Frame::of(drive, query), Frame::of(drive, reference));
-        sides.push((query.query("query")?, truth, reference.reference(&name)?));
+        sides.push((query.named("query").query(0)?, truth, reference.named(&name).reference(0)?));
     }
+    let trial = |query: &Arc<Query>, reference: &Arc<ReferenceTuple>, truth, conditions| {
+        let (query, reference) = (Arc::clone(query), Arc::clone(reference));
+        Trial { query, reference, truth, conditions }
+    };
     let mut trials = Vec::new();
     for (of_query, (query, truth, _)) in Condition::ALL.iter().zip(&sides) {
         for (of_reference, (_, _, reference)) in Condition::ALL.iter().zip(&sides) {
-            trials.push(Trial {
-                query: Arc::clone(query),
-                reference: Arc::clone(reference),
-                truth: Some(*truth),
-                conditions: [of_reference.name(), of_query.name()],
-            });
+            let conditions = [of_reference.name(), of_query.name()];
+            trials.push(trial(query, reference, Some(*truth), conditions));
         }
     }
     let (query, truth, reference) = &sides[0];
     // Every other place of queries that do not show it is for fitting.
     let kind = if place.is_multiple_of(2) { UNKNOWABLE } else { "unknowable, set aside" };
-    let mut unknowable = |query: &Arc<Query>, reference: &Arc<ReferenceTuple>| {
-        trials.push(Trial {
-            query: Arc::clone(query),
-            reference: Arc::clone(reference),
-            truth: None,
-            conditions: [kind; 2],
-        });
-    };
     let color = query.photo.color.as_ref().ok_or("a photo in colour expected")?;
     let elsewhere = Traversal::new(WORLD_SEED + 1, Condition::Overcast, Size::Full);
     let of_another_town = elsewhere.image(7 * place % elsewhere.frame_count());
     for photo in [image::imageops::flip_horizontal(color), of_another_town] {
         let query = Query::new("unknowable", Photo::from_color(photo), query.intrinsics)?;
-        unknowable(&Arc::new(query), reference);
+        trials.push(trial(&Arc::new(query), reference, None, [kind; 2]));
     }
     let is_other_street = |frame: &usize| {
         let between = PoseError::between(truth, &day.world_from_camera(*frame));
@@ -237,7 +232,8 @@ fn at(drives: &[Traversal; 5], place: usize, seed: u64) -> Result<Vec<Trial>, Fa
     let others: Vec<usize> = (0..frames).filter(is_other_street).collect();
     for _ in 0..OTHER_STREETS {
         if let Some(&frame) = others.get(rng.random_range(0..others.len().max(1))) {
-            unknowable(query, &Frame::of(day, frame).reference(&format!("{frame:06}"))?);
+            let reference = Frame::of(day, frame).named(&format!("{frame:06}")).reference(0)?;
+            trials.push(trial(query, &reference, None, [kind; 2]));
         }
     }
     Ok(trials)
@@ -284,15 +280,10 @@ fn logistic(weights: &[f64], values: &[f64]) -> f64 {
 /// ridge, so that signals that tell little keep small weights. The constant first.
 fn fitted(samples: &[&Sample]) -> Option<Vec<f64>> {
     let columns = samples.first()?.values.len();
-    let count = samples.len() as f64;
     let column = |k: usize| samples.iter().map(move |s| s.values[k]);
-    let means: Vec<f64> = (0..columns).map(|k| column(k).sum::<f64>() / count).collect();
-    let deviations: Vec<f64> = (0..columns)
-        .map(|k| {
-            let squared: f64 = column(k).map(|v| (v - means[k]).powi(2)).sum();
-            (squared / count).sqrt().max(1e-9)
-        })
-        .collect();
+    let means: Vec<f64> = (0..columns).map(|k| mean(column(k))).collect();
+    let variance = |k: usize| mean(column(k).map(|v| (v - means[k]).powi(2)));
+    let deviations: Vec<f64> = (0..columns).map(|k| variance(k).sqrt().max(1e-9)).collect();
     let design = DMatrix::from_fn(samples.len(), columns + 1, |row, k| match k {
         0 => 1.0,
         _ => (samples[row].values[k - 1] - means[k - 1]) / deviations[k - 1],
@@ -358,47 +349,39 @@ fn judge(title: &str, samples: &[Sample]) {
     }
     print_table("judged on,poses,within 1 m,calibration error,AUC", &rows);
     println!("Other pairs, all methods, by tenths: probability said / share within 1 m\n");
-    for (predicted, actual) in tenths(&scored(samples, "all", false)).map(predicted_and_actual) {
+    for (predicted, actual, _) in tenths(&scored(samples, "all", false)) {
         println!("- {predicted:.3} / {actual:.3}");
     }
 }
 
-/// Ten bins of equal count of sorted samples.
-fn tenths(sorted: &[Scored]) -> impl Iterator<Item = &[Scored]> {
+/// Ten bins of equal count of sorted samples: the mean probability, the share of poses that are near, and the count.
+fn tenths(sorted: &[Scored]) -> impl Iterator<Item = (f64, f64, usize)> {
     let bins = (0..10).map(|k| &sorted[k * sorted.len() / 10..(k + 1) * sorted.len() / 10]);
-    bins.filter(|bin| !bin.is_empty())
-}
-
-/// The mean probability of a bin, and the share of its poses that are near.
-fn predicted_and_actual(bin: &[Scored]) -> (f64, f64) {
-    let share = mean(bin.iter().map(|s| f64::from(u8::from(s.1))));
-    (mean(bin.iter().map(|s| s.0)), share)
+    bins.filter(|bin| !bin.is_empty()).map(|bin| {
+        let share = mean(bin.iter().map(|s| f64::from(u8::from(s.1))));
+        (mean(bin.iter().map(|s| s.0)), share, bin.len())
+    })
 }
 
 /// Expected calibration error over ten bins of equal count.
 fn calibration_error(scored: &[Scored]) -> f64 {
-    tenths(scored)
-        .map(|bin| {
-            let (predicted, actual) = predicted_and_actual(bin);
-            (predicted - actual).abs() * bin.len() as f64 / scored.len() as f64
-        })
-        .sum()
+    let all = scored.len() as f64;
+    let error = |(predicted, actual, count): (f64, f64, usize)| {
+        (predicted - actual).abs() * count as f64 / all
+    };
+    tenths(scored).map(error).sum()
 }
 
 /// The share of pairs of a near and a far pose in which the near one is believed more; ties are half.
 /// `None` where there is no such pair.
 fn area_under_curve(scored: &[Scored]) -> Option<f64> {
     let (near, far): (Vec<Scored>, Vec<Scored>) = scored.iter().copied().partition(|s| s.1);
-    let wins: f64 = near
-        .iter()
-        .map(|a| {
-            far.iter()
-                .map(|b| match a.0.total_cmp(&b.0) {
-                    std::cmp::Ordering::Greater => 1.0,
-                    std::cmp::Ordering::Equal => 0.5,
-                    std::cmp::Ordering::Less => 0.0,
-                })
-                .sum::<f64>()
+    let wins = near.iter().flat_map(|a| far.iter().map(move |b| a.0.total_cmp(&b.0)));
+    let wins: f64 = wins
+        .map(|order| match order {
+            Ordering::Greater => 1.0,
+            Ordering::Equal => 0.5,
+            Ordering::Less => 0.0,
         })
         .sum();
     let pairs = near.len() * far.len();

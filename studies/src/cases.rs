@@ -1,13 +1,11 @@
 //! What the methods are measured on: places of the street, and pairs of frames of any scene.
 
-use std::collections::HashMap;
-use std::collections::hash_map::Entry;
 use std::sync::Arc;
 
 use posescope::geometry::{Pose, PoseError};
 use posescope::localize::frames_within;
-use posescope::problem::{Problem, Query, ReferenceTuple};
-use posescope::scene::{Scene, SceneError};
+use posescope::problem::Problem;
+use posescope::scene::{CachedScene, FrameStore, Scene};
 use xxhash_rust::xxh3::xxh3_64;
 
 use crate::Failure;
@@ -49,15 +47,23 @@ fn apart_m(scene: &dyn Scene, frame: usize, pose: &Pose) -> f64 {
 }
 
 /// How queries get their references.
+#[derive(clap::Args)]
 pub struct Plan {
+    #[arg(long, default_value_t = 0)]
     pub seed: u64,
-    /// How far from the query its reference is at least and at most, and the uncertainty radius \[m\].
-    pub from_m: f64,
+    /// The uncertainty radius, and how far a reference is from its query at most [m].
+    #[arg(long = "radius", value_name = "RADIUS", default_value_t = 10.0)]
     pub radius_m: f64,
-    /// How far from the query its reference is instead, at least, so that they show nothing in common
-    /// \[m\].
+    /// How far the frames of a pair of --scene are apart at least [m].
+    #[arg(long = "from", value_name = "FROM", default_value_t = 0.0)]
+    pub from_m: f64,
+    /// Take references of the street at least so far away, which show nothing that the query shows [m].
+    #[arg(long = "unrelated", value_name = "UNRELATED")]
     pub unrelated_m: Option<f64>,
 }
+
+/// A scene of references and one of queries, whose frames are cached: they remember what methods make of them.
+type Pair<'a> = [CachedScene<'a>; 2];
 
 impl Plan {
     /// The cases of one of so many places of the street: each pair of conditions, the reference's and the query's.
@@ -65,22 +71,21 @@ impl Plan {
         &self,
         place: usize,
         places: usize,
-        pairs: &[[&dyn Scene; 2]],
+        pairs: &[[Arc<dyn Scene>; 2]],
     ) -> Result<Vec<Case>, Failure> {
-        let mut frames = Remembered::default();
+        let store = Arc::<FrameStore>::default();
         let mut cases = Vec::new();
-        for [references, queries] in pairs {
-            let frame = frame_of_stretch(*queries, place, places, self.seed);
+        for pair in pairs {
+            let pair = pair.each_ref().map(|scene| store.of(scene));
+            let [references, queries] = &pair;
+            let frame = frame_of_stretch(queries, place, places, self.seed);
             let truth = queries.pose(frame).ok_or("the street knows its poses")?;
             let is_same = references.name() == queries.name();
             let is_near = |candidate: &usize| {
-                between(*references, *candidate, &truth).is_some_and(|apart| {
-                    match self.unrelated_m {
-                        Some(least) => {
-                            apart.translation_m >= least && apart.rotation_deg >= UNRELATED_DEG
-                        }
-                        None => apart.translation_m <= self.radius_m,
-                    }
+                let apart = between(references, *candidate, &truth);
+                apart.is_some_and(|apart| match self.unrelated_m {
+                    Some(m) => apart.translation_m >= m && apart.rotation_deg >= UNRELATED_DEG,
+                    None => apart.translation_m <= self.radius_m,
                 })
             };
             let chosen = (0..references.frames().len())
@@ -89,11 +94,14 @@ impl Plan {
                 .min_by_key(|candidate| draw(self.seed, &[&frame, candidate]) as u64);
             if let Some(chosen) = chosen {
                 let condition = |scene: &dyn Scene| scene.name().replacen("street:", "", 1);
-                let cell = format!("{} → {}", condition(*references), condition(*queries));
+                let cell = format!("{} → {}", condition(references), condition(queries));
                 let kind = if is_same { "all equal" } else { "all other" };
-                let query = frames.query(*queries, frame)?;
-                let reference = frames.reference(*references, chosen)?;
-                cases.push(self.case(vec![cell, kind.to_owned()], query, reference, truth));
+                cases.push(self.case(
+                    vec![cell, kind.to_owned()],
+                    &pair,
+                    [chosen, frame],
+                    truth,
+                )?);
             }
         }
         Ok(cases)
@@ -106,8 +114,11 @@ impl Plan {
         start: usize,
         starts: usize,
         bins: usize,
-        [references, queries]: [&dyn Scene; 2],
+        pair: &[Arc<dyn Scene>; 2],
     ) -> Result<Vec<Case>, Failure> {
+        let store = Arc::<FrameStore>::default();
+        let pair = pair.each_ref().map(|scene| store.of(scene));
+        let [references, queries] = &pair;
         let frame = draw(self.seed, &[&"start", &start]) % queries.frames().len();
         let truth = queries.pose(frame).ok_or("the street knows its poses")?;
         let wanted_m = self.radius_m * (start as f64 + 0.5) / starts as f64;
@@ -123,74 +134,37 @@ impl Plan {
         let width = self.radius_m / bins as f64;
         let from = width * (apart(&chosen) / width).floor();
         let row = format!("{from:4.1} to {:.1} m", from + width);
-        let mut frames = Remembered::default();
-        let (query, reference) =
-            (frames.query(queries, frame)?, frames.reference(references, chosen)?);
-        Ok(vec![self.case(vec![row, "all".to_owned()], query, reference, truth)])
+        Ok(vec![self.case(vec![row, "all".to_owned()], &pair, [chosen, frame], truth)?])
     }
 
     /// A frame of a scene as a query against every frame with a cloud that is as far apart as planned.
-    pub fn pairs(&self, scene: &dyn Scene, at: usize) -> Result<Vec<Case>, Failure> {
+    pub fn pairs(&self, scene: &Arc<dyn Scene>, at: usize) -> Result<Vec<Case>, Failure> {
         let Some(truth) = scene.pose(at) else {
             return Ok(Vec::new());
         };
         let is_paired = |other: &usize| {
-            let apart = apart_m(scene, *other, &truth);
+            let apart = apart_m(scene.as_ref(), *other, &truth);
             *other != at
                 && scene.has_cloud(*other)
                 && (self.from_m..=self.radius_m).contains(&apart)
         };
-        let mut frames = Remembered::default();
-        let case = |other| {
-            let rows = vec![scene.name().to_owned()];
-            let (query, reference) = (frames.query(scene, at)?, frames.reference(scene, other)?);
-            Ok(self.case(rows, query, reference, truth))
-        };
+        let store = Arc::<FrameStore>::default();
+        let pair = [store.of(scene), store.of(scene)];
+        let case = |other| self.case(vec![scene.name().to_owned()], &pair, [other, at], truth);
         (0..scene.frames().len()).filter(is_paired).map(case).collect()
     }
 
+    /// The case of two frames, the reference and the query.
     fn case(
         &self,
         rows: Vec<String>,
-        query: Arc<Query>,
-        reference: Arc<ReferenceTuple>,
+        [references, queries]: &Pair<'_>,
+        [reference, query]: [usize; 2],
         truth: Pose,
-    ) -> Case {
-        let mut problem = Problem::new(query, reference, self.radius_m).expect("a radius");
+    ) -> Result<Case, Failure> {
+        let (query, reference) = (queries.query(query)?, references.reference(reference)?);
+        let mut problem = Problem::new(query, reference, self.radius_m)?;
         problem.seed = self.seed;
-        Case { rows, problem, truth }
-    }
-}
-
-/// Frames that were read, by scene and frame, which remember what methods make of them.
-#[derive(Default)]
-struct Remembered {
-    queries: HashMap<(String, usize), Arc<Query>>,
-    references: HashMap<(String, usize), Arc<ReferenceTuple>>,
-}
-
-impl Remembered {
-    fn query(&mut self, scene: &dyn Scene, frame: usize) -> Result<Arc<Query>, SceneError> {
-        Ok(match self.queries.entry((scene.name().to_owned(), frame)) {
-            Entry::Occupied(known) => Arc::clone(known.get()),
-            Entry::Vacant(place) => {
-                let query = Arc::unwrap_or_clone(scene.query(frame)?).remembering();
-                Arc::clone(place.insert(Arc::new(query)))
-            }
-        })
-    }
-
-    fn reference(
-        &mut self,
-        scene: &dyn Scene,
-        frame: usize,
-    ) -> Result<Arc<ReferenceTuple>, SceneError> {
-        Ok(match self.references.entry((scene.name().to_owned(), frame)) {
-            Entry::Occupied(known) => Arc::clone(known.get()),
-            Entry::Vacant(place) => {
-                let reference = Arc::unwrap_or_clone(scene.reference(frame)?).remembering();
-                Arc::clone(place.insert(Arc::new(reference)))
-            }
-        })
+        Ok(Case { rows, problem, truth })
     }
 }

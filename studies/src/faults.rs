@@ -5,7 +5,7 @@
 
 use std::sync::Arc;
 
-use image::{Rgb, RgbImage};
+use image::{Rgb, RgbImage, imageops};
 use nalgebra::{Point3, Translation3, UnitQuaternion, Vector3};
 use posescope::camera::Intrinsics;
 use posescope::cloud::Cloud;
@@ -22,101 +22,120 @@ use rand_pcg::Pcg64;
 use crate::frames::Frame;
 use crate::places::{Case, Place, nearest};
 
-/// A kind of fault: its name in the table, and the place with it; `None` where the place does not
+/// A kind of fault: its name in the table, and what plants it in the case of a place; `None` where the place does not
 /// lend itself to it.
-pub type Fault = (&'static str, fn(&Place<'_>) -> Option<Case>);
+pub type Fault = (&'static str, fn(&Place<'_>, &mut Case) -> Option<()>);
 
 /// All kinds, in the order of the table.
 pub const ALL: &[Fault] = &[
-    ("none", |place| Some(place.case())),
-    ("focal_length", |place| camera(place, 1.05, 0.0, 0.0)),
-    ("another_camera", |place| camera(place, 0.8, 60.0, -20.0)),
-    ("inverse_pose", |place| poses(place, Pose::inverse)),
+    ("none", |_, _| Some(())),
+    ("focal_length", |_, case| camera(case, 1.05, 0.0, 0.0)),
+    ("another_camera", |_, case| camera(case, 0.8, 60.0, -20.0)),
+    ("inverse_pose", |_, case| poses(case, Pose::inverse)),
     ("moved_truth", moved_truth),
-    ("millimetres", |place| points(place, |point| point * 1000.0)),
-    ("poses_in_millimetres", |place| poses(place, in_millimetres)),
-    ("late_cloud", |place| points(place, |point| point + Vector3::new(0.0, 0.0, 0.6))),
-    ("mirrored_cloud", |place| points(place, |point| Point3::new(-point.x, point.y, point.z))),
-    ("cloud_of_another_frame", cloud_of_another_frame),
+    ("millimetres", |_, case| points(case, |point| point * 1000.0)),
+    ("poses_in_millimetres", |_, case| {
+        poses(case, |pose| {
+            let place = Translation3::from(pose.translation.vector * 1000.0);
+            Pose::from_parts(place, pose.rotation)
+        })
+    }),
+    ("late_cloud", |_, case| points(case, |point| point + Vector3::new(0.0, 0.0, 0.6))),
+    ("mirrored_cloud", |_, case| points(case, |point| Point3::new(-point.x, point.y, point.z))),
+    ("cloud_of_another_frame", |place, case| {
+        let farther = place.farther_cloud()?;
+        cloud(case, |_| farther.points)
+    }),
     ("sparse_cloud", sparse_cloud),
-    ("cloud_behind", cloud_behind),
+    ("cloud_behind", |_, case| {
+        cloud(case, |points| points.iter().filter(|point| point.z < 0.0).copied().collect())
+    }),
     ("bleeding_depths", bleeding_depths),
-    ("textureless_query", |place| pixels(place, |_| Rgb([128; 3]))),
-    ("few_keypoints", |place| params(place, |p| p.surf.threshold *= 60.0)),
-    ("noise_query", noise_query),
-    ("mirrored_query", |place| photo(place, image::imageops::flip_horizontal_in_place)),
-    ("foreign_query", |place| photo(place, |own| *own = place.foreign_photo())),
-    ("gamma", |place| pixels(place, |pixel| Rgb(pixel.0.map(darkened)))),
+    ("textureless_query", |_, case| pixels(case, |_| Rgb([128; 3]))),
+    ("few_keypoints", |_, case| params(case, |p| p.surf.threshold *= 60.0)),
+    ("noise_query", |place, case| {
+        let mut rng = Pcg64::seed_from_u64(place.number as u64);
+        pixels(case, |_| Rgb([rng.random(); 3]))
+    }),
+    ("mirrored_query", |_, case| photo(case, imageops::flip_horizontal_in_place)),
+    ("foreign_query", |place, case| photo(case, |own| *own = place.foreign_photo())),
+    ("gamma", |_, case| {
+        let darkened = |value| (255.0 * (f64::from(value) / 255.0).powf(3.3)).round() as u8;
+        pixels(case, |pixel| Rgb(pixel.0.map(darkened)))
+    }),
     ("night", night),
     ("occluder", occluder),
-    ("moved_scenery", moved_scenery),
-    ("strict_ratio", |place| params(place, |p| p.fb.ratio = 0.05)),
-    ("few_trials", few_trials),
+    ("moved_scenery", |place, case| {
+        let street = place.street()?;
+        let other = street.drives.day.image(street.frame_at(street.query, 6));
+        photo(case, |photo| paste(photo, &other, photo.width() * 35 / 100..photo.width()))
+    }),
+    ("strict_ratio", |_, case| params(case, |p| p.fb.ratio = 0.05)),
+    ("few_trials", |_, case| {
+        params(case, |params| {
+            (params.fb.ratio, params.fb.unique) = (1.0, false);
+            (params.fb.mlesac.min_trials, params.fb.mlesac.max_trials) = (1, 2);
+        })
+    }),
     ("narrow_window", narrow_window),
     ("refused", refused),
-    ("yaw", |place| turned_query(place, 40.0)),
-    ("looking_back", |place| turned_query(place, 180.0)),
-    ("outside_disc", outside_disc),
-    ("narrow_yaw", narrow_yaw),
+    ("yaw", |place, case| turned_query(place, case, 40.0)),
+    ("looking_back", |place, case| turned_query(place, case, 180.0)),
+    ("outside_disc", |place, case| {
+        let street = place.street()?;
+        case.references = vec![street.frame(street.frame_at(street.query, -15))];
+        Some(())
+    }),
+    ("narrow_yaw", |place, case| {
+        turned_query(place, case, 9.0)?;
+        params(case, |p| p.grid.yaw_range_deg = 4.0)
+    }),
     ("bend", bend),
-    ("coarse_steps", |place| {
-        params(place, |p| {
+    ("coarse_steps", |_, case| {
+        params(case, |p| {
             (p.grid.coarse_step_m, p.grid.fine_range_m) = (5.0, 0.6);
         })
     }),
     ("raised_camera", raised_camera),
-    ("low_coverage", low_coverage),
+    ("low_coverage", |_, case| {
+        case.request.radius_m = 25.0;
+        params(case, |params| params.grid.coverage_floor = 0.0)
+    }),
     ("bad_reference", bad_reference),
     ("duplicate_place", duplicate_place),
 ];
 
 /// The query's camera with other focal lengths and another principal point.
-fn camera(place: &Place<'_>, times: f64, right_px: f64, down_px: f64) -> Option<Case> {
-    let mut case = place.case();
+fn camera(case: &mut Case, times: f64, right_px: f64, down_px: f64) -> Option<()> {
     let camera = &mut case.query.intrinsics;
     camera.fx *= times;
     camera.fy *= times;
     camera.cx += right_px;
     camera.cy += down_px;
-    Some(case)
+    Some(())
 }
 
-fn poses(place: &Place<'_>, change: impl Fn(&Pose) -> Pose) -> Option<Case> {
-    let mut case = place.case();
+fn poses(case: &mut Case, change: impl Fn(&Pose) -> Pose) -> Option<()> {
     for frame in case.references.iter_mut().chain([&mut case.query]) {
         frame.pose = frame.pose.as_ref().map(&change);
     }
-    Some(case)
+    Some(())
 }
 
-fn in_millimetres(pose: &Pose) -> Pose {
-    Pose::from_parts(Translation3::from(pose.translation.vector * 1000.0), pose.rotation)
-}
-
-fn moved_truth(place: &Place<'_>) -> Option<Case> {
-    let mut case = place.case();
+fn moved_truth(_: &Place<'_>, case: &mut Case) -> Option<()> {
     let moved = case.query.pose? * Pose::translation(12.0, 0.0, 0.0);
     case.query.pose = Some(moved);
-    Some(case)
+    Some(())
 }
 
-fn cloud(
-    place: &Place<'_>,
-    change: impl FnOnce(&[Point3<f32>]) -> Vec<Point3<f32>>,
-) -> Option<Case> {
-    let mut case = place.case();
+fn cloud(case: &mut Case, change: impl FnOnce(&[Point3<f32>]) -> Vec<Point3<f32>>) -> Option<()> {
     let cloud = &mut case.references[0].cloud;
     *cloud = Cloud { points: change(&cloud.points) };
-    Some(case)
+    Some(())
 }
 
-fn points(place: &Place<'_>, change: impl Fn(&Point3<f32>) -> Point3<f32>) -> Option<Case> {
-    cloud(place, |points| points.iter().map(change).collect())
-}
-
-fn cloud_of_another_frame(place: &Place<'_>) -> Option<Case> {
-    let farther = place.farther_cloud()?;
-    cloud(place, |_| farther.points)
+fn points(case: &mut Case, change: impl Fn(&Point3<f32>) -> Point3<f32>) -> Option<()> {
+    cloud(case, |points| points.iter().map(change).collect())
 }
 
 fn in_view(camera: &Intrinsics, point: &Point3<f32>) -> bool {
@@ -124,10 +143,10 @@ fn in_view(camera: &Intrinsics, point: &Point3<f32>) -> bool {
     pixel.is_some_and(|pixel| camera.contains(&pixel))
 }
 
-fn sparse_cloud(place: &Place<'_>) -> Option<Case> {
+fn sparse_cloud(_: &Place<'_>, case: &mut Case) -> Option<()> {
     const LEFT: usize = 30;
-    let camera = place.case().references[0].intrinsics;
-    cloud(place, |points| {
+    let camera = case.references[0].intrinsics;
+    cloud(case, |points| {
         let seen = points.iter().filter(|point| in_view(&camera, point)).copied();
         let seen: Vec<_> = seen.collect();
         let stride = (seen.len() / LEFT).max(1);
@@ -135,13 +154,8 @@ fn sparse_cloud(place: &Place<'_>) -> Option<Case> {
     })
 }
 
-fn cloud_behind(place: &Place<'_>) -> Option<Case> {
-    cloud(place, |points| points.iter().filter(|point| point.z < 0.0).copied().collect())
-}
-
-fn bleeding_depths(place: &Place<'_>) -> Option<Case> {
+fn bleeding_depths(_: &Place<'_>, case: &mut Case) -> Option<()> {
     const BESIDE_PX: f64 = 40.0;
-    let case = place.case();
     let (camera, index) = (case.references[0].intrinsics, &case.references[0].cloud);
     let index = ProjectedCloudIndex::new(index, &camera);
     let bled = |point: &Point3<f32>| {
@@ -151,90 +165,58 @@ fn bleeding_depths(place: &Place<'_>) -> Option<Case> {
         let depths = index.read(&beside, 3.0).within?;
         Some(camera.unproject(&pixel, depths.nearest).cast::<f32>())
     };
-    points(place, |point| bled(point).unwrap_or(*point))
+    points(case, |point| bled(point).unwrap_or(*point))
 }
 
-fn photo(place: &Place<'_>, change: impl FnOnce(&mut RgbImage)) -> Option<Case> {
-    let mut case = place.case();
+fn photo(case: &mut Case, change: impl FnOnce(&mut RgbImage)) -> Option<()> {
     change(&mut case.query.photo);
-    Some(case)
+    Some(())
 }
 
-fn pixels(place: &Place<'_>, mut change: impl FnMut(&Rgb<u8>) -> Rgb<u8>) -> Option<Case> {
-    photo(place, |photo| {
+fn pixels(case: &mut Case, mut change: impl FnMut(&Rgb<u8>) -> Rgb<u8>) -> Option<()> {
+    photo(case, |photo| {
         photo.pixels_mut().for_each(|pixel| *pixel = change(pixel));
     })
 }
 
-fn darkened(value: u8) -> u8 {
-    (255.0 * (f64::from(value) / 255.0).powf(3.3)).round() as u8
-}
-
-fn noise_query(place: &Place<'_>) -> Option<Case> {
-    let mut rng = Pcg64::seed_from_u64(place.number as u64);
-    pixels(place, |_| Rgb([rng.random(); 3]))
-}
-
-fn night(place: &Place<'_>) -> Option<Case> {
+fn night(place: &Place<'_>, case: &mut Case) -> Option<()> {
     let street = place.street()?;
     let night = &street.drives.night;
     let day = street.drives.day.world_from_camera(street.query);
-    let mut case = place.case();
     case.query = Frame::of(night, nearest(night, &day));
-    Some(case)
+    Some(())
 }
 
 /// Copies some columns of another photo of the same size.
 fn paste(photo: &mut RgbImage, other: &RgbImage, columns: std::ops::Range<u32>) {
-    for y in 0..photo.height() {
-        for x in columns.clone() {
-            photo.put_pixel(x, y, *other.get_pixel(x, y));
-        }
-    }
+    let (left, width) = (columns.start, columns.end - columns.start);
+    let part = imageops::crop_imm(other, left, 0, width, photo.height());
+    imageops::replace(photo, &*part, left.into(), 0);
 }
 
-fn occluder(place: &Place<'_>) -> Option<Case> {
+fn occluder(place: &Place<'_>, case: &mut Case) -> Option<()> {
     let street = place.street()?;
     let drive = &street.drives.elsewhere;
     let other = drive.image((street.query + 40) % drive.frame_count());
-    photo(place, |photo| paste(photo, &other, 0..photo.width() / 2))
+    photo(case, |photo| paste(photo, &other, 0..photo.width() / 2))
 }
 
-fn moved_scenery(place: &Place<'_>) -> Option<Case> {
-    let street = place.street()?;
-    let other = street.drives.day.image(street.frame_at(street.query, 6));
-    photo(place, |photo| {
-        paste(photo, &other, photo.width() * 35 / 100..photo.width());
-    })
-}
-
-fn params(place: &Place<'_>, change: impl FnOnce(&mut Params)) -> Option<Case> {
-    let mut case = place.case();
+fn params(case: &mut Case, change: impl FnOnce(&mut Params)) -> Option<()> {
     change(&mut case.params);
-    Some(case)
+    Some(())
 }
 
-fn few_trials(place: &Place<'_>) -> Option<Case> {
-    params(place, |params| {
-        (params.fb.ratio, params.fb.unique) = (1.0, false);
-        (params.fb.mlesac.min_trials, params.fb.mlesac.max_trials) = (1, 2);
-    })
-}
-
-fn narrow_window(place: &Place<'_>) -> Option<Case> {
-    photo(place, |photo| {
+fn narrow_window(_: &Place<'_>, case: &mut Case) -> Option<()> {
+    photo(case, |photo| {
         let (width, height) = photo.dimensions();
         let (left, top) = (width * 35 / 100, height * 45 / 100);
-        for (x, y, pixel) in photo.enumerate_pixels_mut() {
-            if !(left..left + 150).contains(&x) || !(top..top + 100).contains(&y) {
-                *pixel = Rgb([90; 3]);
-            }
-        }
+        let window = imageops::crop_imm(photo, left, top, 150, 100).to_image();
+        photo.fill(90);
+        imageops::replace(photo, &window, left.into(), top.into());
     })
 }
 
-fn refused(place: &Place<'_>) -> Option<Case> {
-    let mut case = place.case();
+fn refused(_: &Place<'_>, case: &mut Case) -> Option<()> {
     // As strict a ratio as leaves four or five matches with a depth.
     for step in 1..30 {
         case.params.fb.ratio = 0.8 - 0.025 * f64::from(step);
@@ -244,78 +226,59 @@ fn refused(place: &Place<'_>) -> Option<Case> {
             return None;
         }
         if counts.with_depth <= 5 {
-            return Some(case);
+            return Some(());
         }
     }
     None
 }
 
-/// The query seen from its true pose times another.
-fn moved_query(place: &Place<'_>, moved: Pose) -> Option<Case> {
-    let street = place.street()?;
-    let day = &street.drives.day;
-    let pose = day.world_from_camera(street.query) * moved;
-    let mut case = place.case();
-    case.query = Frame::seen_from(day, street.query, &pose);
-    Some(case)
+/// The query seen from the pose of a frame of the drive times another.
+fn moved_query(place: &Place<'_>, case: &mut Case, from: usize, moved: Pose) -> Option<()> {
+    let day = &place.street()?.drives.day;
+    let pose = day.world_from_camera(from) * moved;
+    case.query = Frame::seen_from(day, from, &pose);
+    Some(())
 }
 
-fn turned_query(place: &Place<'_>, left_deg: f64) -> Option<Case> {
+fn turned_query(place: &Place<'_>, case: &mut Case, left_deg: f64) -> Option<()> {
     let turn = yaw(left_deg.to_radians());
-    moved_query(place, Pose::from_parts(Translation3::identity(), turn))
+    moved_query(
+        place,
+        case,
+        place.street()?.query,
+        Pose::from_parts(Translation3::identity(), turn),
+    )
 }
 
-fn raised_camera(place: &Place<'_>) -> Option<Case> {
+fn raised_camera(place: &Place<'_>, case: &mut Case) -> Option<()> {
     let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), -5_f64.to_radians());
-    moved_query(place, Pose::from_parts(Translation3::new(0.0, -1.5, 0.0), down))
-}
-
-fn outside_disc(place: &Place<'_>) -> Option<Case> {
-    let street = place.street()?;
-    let mut case = place.case();
-    case.references = vec![street.frame(street.frame_at(street.query, -15))];
-    Some(case)
-}
-
-fn narrow_yaw(place: &Place<'_>) -> Option<Case> {
-    let mut case = turned_query(place, 9.0)?;
-    case.params.grid.yaw_range_deg = 4.0;
-    Some(case)
+    moved_query(
+        place,
+        case,
+        place.street()?.query,
+        Pose::from_parts(Translation3::new(0.0, -1.5, 0.0), down),
+    )
 }
 
 /// The query is moved half a coarse step against the reference and turned.
-fn bend(place: &Place<'_>) -> Option<Case> {
-    let street = place.street()?;
-    let day = &street.drives.day;
+fn bend(place: &Place<'_>, case: &mut Case) -> Option<()> {
     let moved = Pose::from_parts(Translation3::new(1.5, 0.0, 4.5), yaw(-8_f64.to_radians()));
-    let pose = day.world_from_camera(street.reference) * moved;
-    let mut case = place.case();
-    case.query = Frame::seen_from(day, street.reference, &pose);
-    Some(case)
+    moved_query(place, case, place.street()?.reference, moved)
 }
 
-fn low_coverage(place: &Place<'_>) -> Option<Case> {
-    let mut case = place.case();
-    case.params.grid.coverage_floor = 0.0;
-    case.radius_m = 25.0;
-    Some(case)
-}
-
-fn bad_reference(place: &Place<'_>) -> Option<Case> {
+fn bad_reference(place: &Place<'_>, case: &mut Case) -> Option<()> {
     let street = place.street()?;
-    let mut case = place.case();
     let [behind, mut bad] =
         [-4, 4].map(|metres| street.frame(street.frame_at(street.query, metres)));
     bad.pose = bad.pose.map(|pose| pose * Pose::translation(0.0, 0.0, 15.0));
     case.references.extend([behind, bad]);
-    case.chosen = vec![0, 1, 2].into();
-    case.fusion = Fusion::all().find(|fusion| fusion.name == "avg");
-    Some(case)
+    case.request.references = vec![0, 1, 2].into();
+    case.request.fusions = Fusion::all().filter(|fusion| fusion.name == "avg").collect();
+    Some(())
 }
 
-fn duplicate_place(place: &Place<'_>) -> Option<Case> {
+fn duplicate_place(place: &Place<'_>, case: &mut Case) -> Option<()> {
     let street = place.street()?;
-    let mut case = place.case();
     let far = street.frame(street.frame_at(street.query, 150));
     case.references.insert(0, far);
     let ranked = case.references.iter().enumerate().map(|(frame, reference)| RankedReference {
@@ -323,7 +286,7 @@ fn duplicate_place(place: &Place<'_>) -> Option<Case> {
         world_from_camera: reference.pose,
         ranked: Ranked { frame, score: 0.9 - 0.1 * frame as f32, geometry: Geometry::Unchecked },
     });
-    case.chosen = References {
+    case.request.references = References {
         frames: vec![0],
         ranking: Some(Arc::new(ReferenceRanking {
             criterion: Criterion::Words,
@@ -333,5 +296,5 @@ fn duplicate_place(place: &Place<'_>) -> Option<Case> {
         })),
         within_m: None,
     };
-    Some(case)
+    Some(())
 }

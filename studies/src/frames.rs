@@ -1,17 +1,12 @@
 //! Scenes of a few frames that are in memory.
 
-use std::sync::Arc;
-
 use image::{DynamicImage, RgbImage};
 use posescope::camera::Intrinsics;
 use posescope::cloud::Cloud;
 use posescope::geometry::Pose;
 use posescope::image::Photo;
-use posescope::problem::{Query, ReferenceTuple};
 use posescope::scene::street::Traversal;
 use posescope::scene::{Scene, SceneError};
-
-use crate::Failure;
 
 /// A photo, its camera, its pose `world_from_camera` where that is known, and the cloud in the camera's frame.
 #[derive(Clone)]
@@ -51,16 +46,9 @@ impl Frame {
         })
     }
 
-    pub fn query(&self, name: &str) -> Result<Arc<Query>, Failure> {
-        let photo = Photo::from_color(self.photo.clone());
-        Ok(Arc::new(Query::new(name, photo, self.intrinsics)?))
-    }
-
-    pub fn reference(&self, name: &str) -> Result<Arc<ReferenceTuple>, Failure> {
-        let photo = Photo::from_color(self.photo.clone());
-        let pose = self.pose.ok_or("a reference needs a pose")?;
-        let tuple = ReferenceTuple::new(name, photo, self.intrinsics, pose, self.cloud.clone());
-        Ok(Arc::new(tuple?))
+    /// A scene of this frame alone, which has this name in it.
+    pub fn named(self, name: &str) -> Frames {
+        Frames { name: "", names: vec![name.to_owned()], frames: vec![self] }
     }
 }
 

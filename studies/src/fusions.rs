@@ -82,7 +82,7 @@ pub fn run(options: &Options) -> Result<(), Failure> {
             fusions: fusions.clone(),
             setting: None,
         };
-        let keep = |result: QueryResult, _| {
+        let keep = |result, _| {
             results.push(result);
             Ok::<(), LocalizeError>(())
         };

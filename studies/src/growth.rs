@@ -35,9 +35,31 @@ pub struct Options {
 pub fn run(options: &Options) -> Result<(), Failure> {
     rayon::ThreadPoolBuilder::new().num_threads(1).build_global()?;
     let rounds = options.rounds;
-    by_points(rounds);
-    by_size(rounds);
-    by_bins(rounds);
+    let (query, cloud) = seen_by(registered_cost("pm").as_ref());
+    let camera = &PAIR.query.intrinsics;
+    // A hypothesis of PM and one of MI [µs].
+    let of_both = |points: &[ColoredPoint], query: &Arc<FloatImage>, camera: &Intrinsics| {
+        let costs = ["pm", "mi"].map(registered_cost);
+        costs.map(|cost| hypothesis(points, query, camera, cost.as_ref(), rounds))
+    };
+    let rows =
+        POINTS.map(|count| row(count, of_both(&dense(&cloud.points, count), &query, camera)));
+    print_table("points,PM (µs),MI (µs)", &rows);
+    let rows = SCALES.map(|scale| {
+        let camera = scaled(camera, scale);
+        let back = |at: u32, size: u32| ((f64::from(at) / scale) as u32).min(size - 1);
+        let pixel = |x, y| *query.get_pixel(back(x, query.width()), back(y, query.height()));
+        let query = Arc::new(FloatImage::from_fn(camera.width, camera.height, pixel));
+        row(camera.area(), of_both(&cloud.points, &query, &camera))
+    });
+    print_table("pixels,PM (µs),MI (µs)", &rows);
+    let rows = BINS.map(|bins| {
+        let mut cost = MutualInformation::default();
+        cost.bins = bins;
+        let (query, cloud) = seen_by(&cost);
+        row(bins, [hypothesis(&cloud.points, &query, camera, &cost, rounds)])
+    });
+    print_table("bins,MI (µs)", &rows);
     by_keypoints(rounds);
     Ok(())
 }
@@ -45,27 +67,6 @@ pub fn run(options: &Options) -> Result<(), Failure> {
 fn row(of: impl ToString, times: impl IntoIterator<Item = f64>) -> Vec<String> {
     let times = times.into_iter().map(|time| format!("{time:.3}"));
     [of.to_string()].into_iter().chain(times).collect()
-}
-
-/// A hypothesis of PM and one of MI \[µs\].
-fn of_both(
-    points: &[ColoredPoint],
-    query: &Arc<FloatImage>,
-    intrinsics: &Intrinsics,
-    rounds: usize,
-) -> [f64; 2] {
-    let costs = ["pm", "mi"].map(registered_cost);
-    costs.map(|cost| hypothesis(points, query, intrinsics, cost.as_ref(), rounds))
-}
-
-/// A hypothesis over the points of the cloud.
-fn by_points(rounds: usize) {
-    let (query, cloud) = seen_by(registered_cost("pm").as_ref());
-    let rows = POINTS.map(|count| {
-        let points = dense(&cloud.points, count);
-        row(count, of_both(&points, &query, &PAIR.query.intrinsics, rounds))
-    });
-    print_table("points,PM (µs),MI (µs)", &rows);
 }
 
 /// So many points. More than there are come from copies that stand a few centimetres aside.
@@ -84,19 +85,6 @@ fn dense(points: &[ColoredPoint], count: usize) -> Vec<ColoredPoint> {
     (0..count).map(&mut point).collect()
 }
 
-/// A hypothesis over the pixels of the photo.
-fn by_size(rounds: usize) {
-    let (query, cloud) = seen_by(registered_cost("pm").as_ref());
-    let rows = SCALES.map(|scale| {
-        let intrinsics = scaled(&PAIR.query.intrinsics, scale);
-        let back = |at: u32, size: u32| ((f64::from(at) / scale) as u32).min(size - 1);
-        let pixel = |x, y| *query.get_pixel(back(x, query.width()), back(y, query.height()));
-        let query = FloatImage::from_fn(intrinsics.width, intrinsics.height, pixel);
-        row(intrinsics.area(), of_both(&cloud.points, &Arc::new(query), &intrinsics, rounds))
-    });
-    print_table("pixels,PM (µs),MI (µs)", &rows);
-}
-
 fn scaled(intrinsics: &Intrinsics, scale: f64) -> Intrinsics {
     let side = |side: u32| (f64::from(side) * scale) as u32;
     Intrinsics {
@@ -107,18 +95,6 @@ fn scaled(intrinsics: &Intrinsics, scale: f64) -> Intrinsics {
         width: side(intrinsics.width),
         height: side(intrinsics.height),
     }
-}
-
-/// A hypothesis of MI over the bins of its histogram.
-fn by_bins(rounds: usize) {
-    let rows = BINS.map(|bins| {
-        let mut cost = MutualInformation::default();
-        cost.bins = bins;
-        let (query, cloud) = seen_by(&cost);
-        let intrinsics = &PAIR.query.intrinsics;
-        row(bins, [hypothesis(&cloud.points, &query, intrinsics, &cost, rounds)])
-    });
-    print_table("bins,MI (µs)", &rows);
 }
 
 /// Finding, describing and matching features over their number.

@@ -157,15 +157,14 @@ fn view(frame: usize, features: usize, visit: u64) -> Features {
         response: 1.0,
         laplacian_positive: true,
     });
-    let descriptors = landmarks.map(|landmark| {
+    let descriptors = landmarks.map(|landmark| -> Descriptor {
         let look = Pcg64::seed_from_u64(landmark as u64).random_range(0..LOOKS);
         let mut look = Pcg64::seed_from_u64(look);
-        let descriptor: Descriptor = std::array::from_fn(|_| {
+        std::array::from_fn(|_| {
             // Most numbers of a descriptor are small.
             let value: f32 = look.random_range(-1.0..1.0);
             0.35 * value * value * value + noise.random_range(-NOISE..NOISE)
-        });
-        descriptor
+        })
     });
     Features { keypoints: keypoints.collect(), descriptors: descriptors.collect() }
 }

@@ -61,28 +61,24 @@ fn write(folder: &str, map: &Path, count: usize) -> Result<(), Failure> {
     builder.point_format.is_compressed = true;
     let mut writer = Writer::from_path(map, builder.into_header()?)?;
     let mut written = 0;
-    for pass in 0.. {
+    'map: for pass in 0.. {
         for frame in 0..scene.frames().len() {
             let pose = scene.pose(frame).ok_or("a pose expected")?;
             for point in scene.cloud(frame)?.points {
                 if written == count {
-                    writer.close()?;
-                    let text = fs::read_to_string(&description)?;
-                    let named = text.split("\n[clouds]").next().unwrap_or(&text);
-                    fs::write(&description, format!("cloud = \"map.laz\"\n{named}"))?;
-                    return Ok(());
+                    break 'map;
                 }
                 let at = pose * point.cast::<f64>();
                 let beside = 0.004 * f64::from(pass);
-                writer.write_point(Point {
-                    x: at.x + beside,
-                    y: at.y,
-                    z: at.z + beside,
-                    ..Point::default()
-                })?;
+                let (x, z) = (at.x + beside, at.z + beside);
+                writer.write_point(Point { x, y: at.y, z, ..Point::default() })?;
                 written += 1;
             }
         }
     }
+    writer.close()?;
+    let text = fs::read_to_string(&description)?;
+    let named = text.split("\n[clouds]").next().unwrap_or(&text);
+    fs::write(&description, format!("cloud = \"map.laz\"\n{named}"))?;
     Ok(())
 }

@@ -1,6 +1,7 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::str::FromStr;
+use std::sync::Arc;
 use std::time::Instant;
 
 use posescope::diagnosis::{Evidence, Subject, confidence};
@@ -46,17 +47,8 @@ pub struct Options {
     /// Take photos of the street in half size.
     #[arg(long)]
     half: bool,
-    #[arg(long, default_value_t = 0)]
-    seed: u64,
-    /// The uncertainty radius, and how far a reference is from its query at most [m].
-    #[arg(long, default_value_t = 10.0)]
-    radius: f64,
-    /// How far the frames of a pair of --scene are apart at least [m].
-    #[arg(long, default_value_t = 0.0)]
-    from: f64,
-    /// Take references of the street at least so far away, which show nothing that the query shows [m].
-    #[arg(long)]
-    unrelated: Option<f64>,
+    #[command(flatten)]
+    plan: Plan,
     /// Print each method's shares by the condition of reference and query too, and what MI's cost is at the truth.
     #[arg(long)]
     matrices: bool,
@@ -93,34 +85,26 @@ struct Measured {
 }
 
 pub fn run(options: &Options) -> Result<(), Failure> {
-    let plan = Plan {
-        seed: options.seed,
-        from_m: options.from,
-        radius_m: options.radius,
-        unrelated_m: options.unrelated,
-    };
+    let plan = &options.plan;
     let measured = match (&options.scene, options.street, options.starts) {
         (Some(path), None, None) => {
-            let scene = truth::open(path, options.truth.as_deref())?;
-            at_places(scene.frames().len(), |at| {
-                measure(&plan.pairs(scene.as_ref(), at)?, options)
-            })?
+            let scene: Arc<dyn Scene> = truth::open(path, options.truth.as_deref())?.into();
+            at_places(scene.frames().len(), |at| measure(&plan.pairs(&scene, at)?, options))?
         }
         (None, street, starts) if street.is_some() != starts.is_some() => {
             let cells = cells(&options.cells)?;
             let size = if options.half { Size::Half } else { Size::Full };
-            let mut scenes = BTreeMap::new();
+            let mut scenes: BTreeMap<&String, Arc<dyn Scene>> = BTreeMap::new();
             for name in cells.iter().flatten() {
-                scenes.insert(name.clone(), Street::new(name, size)?);
+                scenes.insert(name, Arc::new(Street::new(name, size)?));
             }
-            let scene = |name: &String| &scenes[name] as &dyn Scene;
-            let pairs: Vec<[&dyn Scene; 2]> =
-                cells.iter().map(|cell| cell.each_ref().map(scene)).collect();
+            let scene = |name: &String| Arc::clone(&scenes[name]);
+            let pairs: Vec<_> = cells.iter().map(|cell| cell.each_ref().map(scene)).collect();
             let places = street.or(starts).unwrap_or(0);
             at_places(places, |place| {
                 let cases = match street {
                     Some(_) => plan.at_place(place, places, &pairs)?,
-                    None => plan.of_start(place, places, 6, pairs[0])?,
+                    None => plan.of_start(place, places, 6, &pairs[0])?,
                 };
                 measure(&cases, options)
             })?
@@ -137,18 +121,15 @@ pub fn run(options: &Options) -> Result<(), Failure> {
 
 /// Pairs of conditions, the reference's and the query's.
 fn cells(words: &[String]) -> Result<Vec<[String; 2]>, Failure> {
-    let pairs_of = |conditions: &[String]| -> Vec<[String; 2]> {
-        let pair =
-            |a: &String| conditions.iter().map(|b| [a.clone(), b.clone()]).collect::<Vec<_>>();
-        conditions.iter().flat_map(pair).collect()
-    };
     let conditions: Vec<String> = Street::conditions().map(str::to_owned).collect();
-    let all = pairs_of(&conditions);
+    let has_conditions = words.iter().all(|word| conditions.contains(word));
+    let chosen = if has_conditions { words } else { &conditions };
+    let pairs = chosen.iter().flat_map(|a| chosen.iter().map(|b| [a.clone(), b.clone()]));
     Ok(match words {
-        [word] if word == "all" => all,
-        [word] if word == "equal" => all.into_iter().filter(|[a, b]| a == b).collect(),
-        [word] if word == "other" => all.into_iter().filter(|[a, b]| a != b).collect(),
-        words if words.iter().all(|word| conditions.contains(word)) => pairs_of(words),
+        [word] if word == "equal" => pairs.filter(|[a, b]| a == b).collect(),
+        [word] if word == "other" => pairs.filter(|[a, b]| a != b).collect(),
+        [word] if word == "all" => pairs.collect(),
+        _ if has_conditions => pairs.collect(),
         words => {
             let pair = |word: &String| {
                 let (a, b) =
@@ -212,10 +193,8 @@ fn print(measured: &[Measured], options: &Options) {
 /// fails where it does: whether its search missed the truth's minimum, or the truth costs more than the pose found.
 fn print_matrices(measured: &[Measured], options: &Options) -> Result<(), Failure> {
     let cells = cells(&options.cells)?;
-    let mut conditions: Vec<&String> = cells.iter().flatten().collect();
-    conditions.dedup();
-    conditions.sort_by_key(|name| Street::conditions().position(|known| known == name.as_str()));
-    conditions.dedup();
+    let is_in_any = |known: &&str| cells.iter().flatten().any(|name| name == known);
+    let conditions: Vec<&str> = Street::conditions().filter(is_in_any).collect();
     let matrix = |method: usize, cell: &dyn Fn(&[&Measured]) -> String| {
         let rows = conditions.iter().map(|reference| {
             let cells = conditions.iter().map(|query| {

@@ -36,19 +36,15 @@ pub fn print_table(head: &str, rows: &[Vec<String>]) {
 }
 
 pub fn mean(values: impl IntoIterator<Item = f64>) -> f64 {
-    let (sum, count) =
-        values.into_iter().fold((0.0, 0), |(sum, count), value| (sum + value, count + 1));
-    sum / f64::from(count)
+    let values: Vec<f64> = values.into_iter().collect();
+    values.iter().sum::<f64>() / values.len() as f64
 }
 
 /// The value below which a share of all lies; no number where there is none.
 pub fn percentile(values: &mut [f64], share: f64) -> f64 {
     let index = (values.len().saturating_sub(1) as f64 * share).round() as usize;
-    if values.is_empty() {
-        f64::NAN
-    } else {
-        *values.select_nth_unstable_by(index, f64::total_cmp).1
-    }
+    values.sort_unstable_by(f64::total_cmp);
+    values.get(index).copied().unwrap_or(f64::NAN)
 }
 
 /// The middle one, of an even number the upper one.

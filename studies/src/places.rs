@@ -3,9 +3,8 @@
 use image::RgbImage;
 use posescope::cloud::Cloud;
 use posescope::diagnosis::Tolerance;
-use posescope::fusion::Fusion;
 use posescope::geometry::Pose;
-use posescope::localize::{LocalizeError, Localizer, NoObserver, QueryResult, References, Request};
+use posescope::localize::{LocalizeError, Localizer, NoObserver, QueryResult, Request};
 use posescope::method::Method;
 use posescope::params::Params;
 use posescope::scene::street::{Condition, Size, Traversal, WORLD_SEED};
@@ -108,13 +107,9 @@ pub struct Case {
     /// The query; its pose is the truth.
     pub query: Frame,
     pub references: Vec<Frame>,
-    /// How they were found.
-    pub chosen: References,
+    /// How they were found, and what is asked of them.
+    pub request: Request,
     pub params: Params,
-    /// The uncertainty radius \[m\].
-    pub radius_m: f64,
-    /// The fusion, where there are several references.
-    pub fusion: Option<Fusion>,
     pub seed: u64,
 }
 
@@ -148,10 +143,13 @@ impl<'a> Place<'a> {
         Case {
             query,
             references: vec![reference],
-            chosen: vec![0].into(),
+            request: Request {
+                radius_m: 10.0,
+                references: vec![0].into(),
+                fusions: Vec::new(),
+                setting: None,
+            },
             params: Params::default(),
-            radius_m: 10.0,
-            fusion: None,
             seed: self.number as u64,
         }
     }
@@ -204,18 +202,13 @@ impl Case {
         let references = Frames::new("reference", self.references.clone());
         let localizer = Localizer::new(&references, &queries, &self.params, self.seed);
         let localizer = localizer.with_tolerance(Tolerance::default());
-        let request = Request {
-            radius_m: self.radius_m,
-            references: self.chosen.clone(),
-            fusions: self.fusion.into_iter().collect(),
-            setting: None,
-        };
         let mut results = Vec::new();
         let keep = |result, _| {
             results.push(result);
             Ok::<(), LocalizeError>(())
         };
-        localizer.localize(0, 0, &[request], methods, &mut NoObserver, keep)?;
+        let requests = std::slice::from_ref(&self.request);
+        localizer.localize(0, 0, requests, methods, &mut NoObserver, keep)?;
         Ok(results)
     }
 }

@@ -60,7 +60,8 @@ pub fn run(options: &Options) -> Result<(), Failure> {
     let temporary = tempfile::tempdir()?;
     let path = options.index.clone().unwrap_or_else(|| temporary.path().join("places"));
     if Index::open(&path, params.retrieval.checks).is_err() {
-        let mut request = Retriever::request(references.as_ref(), &index_options, &params);
+        let mut request =
+            Retriever::request(references.as_ref(), &index_options, &Default::default(), &params);
         request.frames.retain(|frame| !held_out.contains(frame));
         let started = Instant::now();
         Retriever::build(references.as_ref(), &path, &request, &params, |p| {
@@ -129,15 +130,15 @@ fn row(name: &str, answers: &[Answer]) -> Vec<String> {
         let count = answers.iter().filter(is_so).count();
         format!("{:.1} %", percent(count, answers.len()))
     };
-    let mut row = vec![name.to_owned(), answers.len().to_string()];
-    for (ranking, top) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
-        row.push(share(&|answer| answer.is_found[ranking][top]));
-    }
-    row.push(share(&|answer| answer.inliers.is_some()));
+    let found = [(0, 0), (0, 1), (1, 0), (1, 1)];
+    let found = found.map(|(ranking, top)| share(&|answer| answer.is_found[ranking][top]));
     let inliers = answers.iter().filter_map(|answer| Some(answer.inliers? as f64));
-    row.push(format!("{:.0}", median(inliers)));
-    row.push(format!("{:.1}", median(answers.iter().map(|answer| answer.ms))));
-    row
+    let last = [
+        share(&|answer| answer.inliers.is_some()),
+        format!("{:.0}", median(inliers)),
+        format!("{:.1}", median(answers.iter().map(|answer| answer.ms))),
+    ];
+    [&[name.to_owned(), answers.len().to_string()], &found[..], &last].concat()
 }
 
 /// So many of the frames, at equal distances.

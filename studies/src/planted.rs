@@ -61,17 +61,20 @@ struct Judged {
     is_withheld: bool,
     /// The primary verdict, `unsure` or `none`.
     found: String,
-    text: String,
-    /// Whether it is trusted, and would not be from a probability of 0.98 on.
+    /// Whether it was expected.
+    is_hit: bool,
+    /// Whether it is trusted against what was expected, and would not be from a probability of 0.98 on.
     is_barely_trusted: bool,
     /// Whether the pose is right all the same: the fault did no harm.
     is_right: bool,
+    /// What was expected and found.
+    words: String,
 }
 
 pub fn run(options: &Options) -> Result<(), Failure> {
     let expected = expectations()?;
     let only = options.only.as_deref();
-    let found = options.chosen.each(|place| at(place, only))?;
+    let found = options.chosen.each(|place| at(place, only, &expected))?;
     let found: Vec<Judged> = found.into_iter().flatten().collect();
     let halves: &[(&str, usize)] = if options.chosen.real {
         &[("Pairs of real photos", 2)]
@@ -85,101 +88,104 @@ pub fn run(options: &Options) -> Result<(), Failure> {
                 one.is_withheld == is_withheld && (half == 2 || one.place % 2 == half)
             };
             let here: Vec<&Judged> = found.iter().filter(is_here).collect();
-            report(&here, &expected, options.misses)?;
+            report(&here, options.misses);
         }
     }
     Ok(())
 }
 
 /// All faults at one place.
-fn at(place: &Place<'_>, only: Option<&str>) -> Result<Vec<Judged>, Failure> {
-    let mut found = Vec::new();
+fn at(
+    place: &Place<'_>,
+    only: Option<&str>,
+    expected: &BTreeMap<String, Expected>,
+) -> Result<Vec<Judged>, Failure> {
+    let mut judged = Vec::new();
     let is_right = |result: &QueryResult| result.grade == Grade::Right;
     // A place at which a method fails anyway says nothing about a fault.
     let mut sound: Vec<bool> = place.case().results(&METHODS, true)?.iter().map(is_right).collect();
     // The hybrid needs its second method where a fault takes the first.
     sound[3] &= sound[2];
     for &(fault, plant) in faults::ALL {
+        let expected = expected.get(fault).ok_or(format!("{fault} is not in the table"))?;
         if only.is_some_and(|only| only != fault) {
             continue;
         }
-        let Some(case) = plant(place) else { continue };
+        let mut case = place.case();
+        if plant(place, &mut case).is_none() {
+            continue;
+        }
         let [known, withheld] = [case.results(&METHODS, true)?, case.results(&METHODS, false)?];
         for method in (0..METHODS.len()).filter(|&method| sound[method]) {
+            let is_right = is_right(&known[method]);
             for (is_withheld, result) in [(false, &known[method]), (true, &withheld[method])] {
-                let primary = result.diagnosis.first();
+                let codes = &expected[usize::from(is_withheld)][method];
+                let is_doubted = codes.iter().any(|code| code == Code::L1.name());
                 let is_unsure = is_withheld && result.confidence_word() == Some(Confidence::Unsure);
-                let probability = result.confidence.as_ref().map(|one| one.probability);
+                let (found, text) = match result.diagnosis.first() {
+                    Some(primary) => (primary.code.name(), primary.text.as_str()),
+                    None if is_unsure => (UNSURE, ""),
+                    None => ("none", ""),
+                };
+                let is_expected = codes.iter().any(|code| code == found);
+                // A pose that is right carries at most L1, whatever was done to it.
+                let is_hit = if is_right {
+                    ["none", UNSURE, Code::L1.name()].contains(&found)
+                } else {
+                    is_expected || found == UNSURE && is_doubted
+                };
                 let barely = confidence::TRUSTED_FROM..0.98;
-                found.push(Judged {
+                let probability = result.confidence.as_ref().map(|one| one.probability);
+                let (number, name) = (place.number, METHODS[method]);
+                let codes = if is_right { "none".to_owned() } else { codes.join("|") };
+                judged.push(Judged {
                     fault,
-                    place: place.number,
+                    place: number,
                     method,
                     is_withheld,
-                    found: match primary {
-                        Some(primary) => primary.code.to_string(),
-                        None if is_unsure => UNSURE.to_owned(),
-                        None => "none".to_owned(),
-                    },
-                    text: primary.map_or_else(String::new, |primary| primary.text.clone()),
-                    is_barely_trusted: probability.is_some_and(|p| barely.contains(&p)),
-                    is_right: is_right(&known[method]),
+                    found: found.to_owned(),
+                    is_hit,
+                    is_barely_trusted: is_doubted
+                        && probability.is_some_and(|p| barely.contains(&p)),
+                    is_right,
+                    words: format!(
+                        "{fault} {number} {name}: {codes} expected, {found} found: {text}"
+                    ),
                 });
             }
         }
     }
-    Ok(found)
+    Ok(judged)
 }
 
-fn report(
-    found: &[&Judged],
-    expected: &BTreeMap<String, Expected>,
-    prints_misses: bool,
-) -> Result<(), Failure> {
-    let (mut all, mut hits, mut kept_by_hybrid) = (0, 0, 0);
-    let (mut only_unsure, mut barely_trusted) = (0, 0);
-    let (mut right, mut alarms) = (0, 0);
+fn report(found: &[&Judged], prints_misses: bool) {
     let mut rows = Vec::new();
     for &(fault, _) in faults::ALL {
-        let expected = expected.get(fault).ok_or(format!("{fault} is not in the table"))?;
         let mut row = vec![fault.to_owned()];
-        for (method, name) in METHODS.iter().enumerate() {
-            let (mut own, mut own_hits, mut harmless) = (0, 0, 0);
-            for one in found.iter().filter(|j| j.fault == fault && j.method == method) {
-                let codes = &expected[usize::from(one.is_withheld)][method];
-                let is_doubted = codes.iter().any(|code| code == Code::L1.name());
-                let is_unsure = one.found == UNSURE;
-                // A pose that is right carries at most L1, whatever was done to it.
-                let is_hit = if one.is_right {
-                    ["none", UNSURE, Code::L1.name()].contains(&one.found.as_str())
-                } else {
-                    codes.contains(&one.found) || is_unsure && is_doubted
-                };
-                if !is_hit && prints_misses {
-                    let codes = if one.is_right { "none".to_owned() } else { codes.join("|") };
-                    let Judged { place, found, text, .. } = one;
-                    println!(
-                        "<!-- {fault} {place} {name}: {codes} expected, {found} found: {text} -->"
-                    );
-                }
-                if one.is_right {
-                    harmless += 1;
-                    alarms += usize::from(!is_hit);
-                    continue;
-                }
-                own += 1;
-                own_hits += usize::from(is_hit);
-                only_unsure += usize::from(is_hit && is_unsure);
-                barely_trusted += usize::from(!is_hit && is_doubted && one.is_barely_trusted);
-                kept_by_hybrid += usize::from(!is_hit && one.found == Code::H1.name());
-            }
-            row.push(format!("{own_hits}/{own} ({harmless} right)"));
-            (all, hits, right) = (all + own, hits + own_hits, right + harmless);
+        for method in 0..METHODS.len() {
+            let own =
+                found.iter().copied().filter(|one| one.fault == fault && one.method == method);
+            let (right, wrong): (Vec<&Judged>, Vec<&Judged>) = own.partition(|one| one.is_right);
+            let hits = wrong.iter().filter(|one| one.is_hit).count();
+            row.push(format!("{hits}/{} ({} right)", wrong.len(), right.len()));
         }
-        if found.iter().any(|one| one.fault == fault) {
+        let own = found.iter().filter(|one| one.fault == fault);
+        if own.clone().next().is_some() {
             rows.push(row);
         }
+        let mut misses: Vec<_> = own.filter(|one| prints_misses && !one.is_hit).collect();
+        misses.sort_by_key(|one| one.method);
+        misses.iter().for_each(|one| println!("<!-- {} -->", one.words));
     }
+    let count = |is: &dyn Fn(&Judged) -> bool| found.iter().filter(|one| is(one)).count();
+    let (right, alarms) = (count(&|one| one.is_right), count(&|one| one.is_right && !one.is_hit));
+    let hits = count(&|one| !one.is_right && one.is_hit);
+    let only_unsure = count(&|one| !one.is_right && one.is_hit && one.found == UNSURE);
+    let missed =
+        |is: &dyn Fn(&Judged) -> bool| count(&|one| !one.is_right && !one.is_hit && is(one));
+    let barely_trusted = missed(&|one| one.is_barely_trusted);
+    let kept_by_hybrid = missed(&|one| one.found == Code::H1.name());
+    let all = found.len() - right;
     print_table("fault,fb,pm,mi,hy", &rows);
     println!(
         "As expected: {hits} of {all} ({:.1} %), {only_unsure} of them unsure without a verdict; with H1 for each \
@@ -189,5 +195,4 @@ fn report(
         hits + kept_by_hybrid,
         percent(hits + kept_by_hybrid, all),
     );
-    Ok(())
 }

@@ -73,23 +73,20 @@ fn pairs_of(frames: &[Frame], foreign: &RgbImage) -> Vec<RealPair> {
         (Some(a), Some(b)) => (a.translation.vector - b.translation.vector).norm(),
         _ => f64::INFINITY,
     };
-    let mut pairs = Vec::new();
-    for query in 0..frames.len() {
-        for reference in 0..frames.len() {
-            if !APART_M.contains(&apart(query, reference)) {
-                continue;
-            }
-            let farther = (0..frames.len())
-                .filter(|&other| other != query && apart(reference, other) >= FARTHER_M)
-                .min_by(|&a, &b| apart(reference, a).total_cmp(&apart(reference, b)));
-            let (width, height) = frames[query].photo.dimensions();
-            pairs.push(RealPair {
-                query: frames[query].clone(),
-                reference: frames[reference].clone(),
-                farther_cloud: farther.map(|other| frames[other].cloud.clone()),
-                foreign_photo: resize(foreign, width, height, FilterType::Triangle),
-            });
+    let all = 0..frames.len();
+    let pairs = all.clone().flat_map(|query| all.clone().map(move |reference| (query, reference)));
+    let pairs = pairs.filter(|&(query, reference)| APART_M.contains(&apart(query, reference)));
+    let pair = |(query, reference): (usize, usize)| {
+        let far = |&other: &usize| other != query && apart(reference, other) >= FARTHER_M;
+        let farther = all.clone().filter(far);
+        let farther = farther.min_by(|&a, &b| apart(reference, a).total_cmp(&apart(reference, b)));
+        let (width, height) = frames[query].photo.dimensions();
+        RealPair {
+            query: frames[query].clone(),
+            reference: frames[reference].clone(),
+            farther_cloud: farther.map(|other| frames[other].cloud.clone()),
+            foreign_photo: resize(foreign, width, height, FilterType::Triangle),
         }
-    }
-    pairs
+    };
+    pairs.map(pair).collect()
 }

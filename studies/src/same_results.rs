@@ -102,14 +102,12 @@ fn differences(
 ) -> BTreeMap<String, Vec<String>> {
     let mut found = BTreeMap::new();
     for (name, of_a) in a {
+        let value = |of: &Value, at: &str| of.pointer(at).cloned().unwrap_or(Value::Null);
         let lines = match b.get(name) {
             None => vec!["only in A".to_owned()],
             Some(of_b) => COMPARED
                 .split(' ')
-                .flat_map(|pointer| {
-                    let value = |of: &Value| of.pointer(pointer).cloned().unwrap_or(Value::Null);
-                    below(pointer, &value(of_a), &value(of_b))
-                })
+                .flat_map(|at| below(at, &value(of_a, at), &value(of_b, at)))
                 .collect(),
         };
         if !lines.is_empty() {

@@ -187,11 +187,8 @@ fn pairs(
         let problem = Problem::new(query_frame, scene.reference(reference)?, 2.0 * distance_m)?;
         let params = Params::default();
         let outcome = localize(&problem, Method::FB, &params);
-        errors.push(
-            outcome
-                .pose
-                .map_or(f64::INFINITY, |pose| PoseError::between(&truth, &pose).translation_m),
-        );
+        let off_m = |pose| PoseError::between(&truth, &pose).translation_m;
+        errors.push(outcome.pose.map_or(f64::INFINITY, off_m));
         inliers.extend(outcome.counts.map(|counts| counts.inliers as f64));
         let direct = estimator::entry(Method::MI).make(&params);
         let at_truth = direct.compare_at(&problem, &truth);

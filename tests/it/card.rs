@@ -5,7 +5,7 @@ use std::sync::Arc;
 use egui::{Key, Modifiers};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
-use posescope::app::{App, Command, Results, SaveTarget, Setup};
+use posescope::app::{App, Results, SaveTarget, Setup};
 use posescope::diagnosis::Grade;
 use posescope::method::Method;
 use posescope::scene::{self, Scene};
@@ -35,7 +35,7 @@ fn the_bar_says_what_each_result_is_worth_and_the_sentence_why() {
     let mut grey = finished(Setup { query: GREY, ..setup() });
     assert_eq!(right_ones(&grey), 0);
     for result in results(&grey) {
-        send(&mut grey, Command::ShowPart(Part::Reference(result.method, 0)));
+        send(&mut grey, |app| app.app_state_mut().show_outcome(Part::Reference(result.method, 0)));
         assert!(app(&grey).options.shows_why);
         let primary = result.diagnosis.first().expect("a verdict");
         let sentence = primary.text.split(". ").next().expect("a sentence");
@@ -84,9 +84,9 @@ fn nothing_moves_between_two_steps() {
             .to_vec()
     };
     let at_end = places(&window);
-    for command in [Command::First, Command::Forward(40), Command::Last] {
-        send(&mut window, command.clone());
-        assert_eq!(places(&window), at_end, "{command:?}");
+    for action in ["To the first step", "Ten steps on", "To the last step"] {
+        send(&mut window, |app| app.act(action));
+        assert_eq!(places(&window), at_end, "{action}");
     }
 }
 
@@ -109,7 +109,9 @@ fn a_stray_key_of_lock_step_leaves_the_card_where_it_is() {
         assert_eq!(app(&window).options.lockstep, None);
         assert_eq!(right_ones(&window), 4, "{key:?}");
     }
-    send(&mut window, Command::StepTogether(Some(3)));
+    send(&mut window, |app| {
+        app.app_state_mut().options.lockstep = Some(3);
+    });
     press(&mut window, Modifiers::NONE, Key::Period);
     assert_eq!(app(&window).options.lockstep, Some(4));
 }
@@ -186,7 +188,7 @@ fn frames_of_two_scenes_are_told_apart_and_the_query_is_in_sight() {
         row.is_some()
     };
     assert!(is_listed(&window, "000450") && !is_listed(&window, "000002"));
-    window.state_mut().send(Command::SelectQuery(2));
+    window.state_mut().app_state_mut().select_query(2);
     window.run_steps(4);
     assert!(!is_listed(&window, "000450") && is_listed(&window, "000002"));
 }
@@ -196,7 +198,7 @@ fn a_lecture_shows_nothing_of_what_is_still_to_come() {
     let mut window = finished(setup());
     press(&mut window, Modifiers::NONE, Key::F3);
     window.run_steps(3);
-    send(&mut window, Command::MoveCursor(1));
+    send(&mut window, |app| app.app_state_mut().move_cursor(1));
     assert!(is_said(&window, "It finds points that stand out"), "the stage in one sentence");
     let known = app(&window).options.clone();
     assert!(known.hides_future && !known.shows_why);
@@ -237,14 +239,14 @@ fn a_batch_is_filtered_sorted_and_opened() {
 fn saving_asks_where_and_offers_a_name_that_says_what_it_is() {
     let folder = tempfile::tempdir().expect("a folder");
     let mut window = finished(Setup { folder: folder.path().to_owned(), ..setup() });
-    send(&mut window, Command::AskWhere(SaveTarget::Recording));
+    send(&mut window, |app| app.ask_where(SaveTarget::Recording));
     assert!(is_said(&window, "Save the recording"));
     press(&mut window, Modifiers::NONE, Key::Escape);
     assert!(!is_said(&window, "Save the recording"));
     let name = folder.path().join("walls-000001-000000.rrd");
     assert!(!name.exists(), "nobody said so");
 
-    send(&mut window, Command::AskWhere(SaveTarget::Recording));
+    send(&mut window, |app| app.ask_where(SaveTarget::Recording));
     // Keys belong to the field meanwhile: no view changes for them.
     press(&mut window, Modifiers::NONE, Key::Enter);
     window.run_steps(3);

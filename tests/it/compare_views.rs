@@ -3,7 +3,7 @@
 use egui::{Key, Modifiers};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
-use posescope::app::{App, Command, KnownResults, Results, Tab};
+use posescope::app::{App, KnownResults, Results, Tab};
 use posescope::diagnosis::Code;
 use posescope::event::{Event, Stage};
 use posescope::localize::QueryResult;
@@ -16,7 +16,7 @@ use crate::window::{
 };
 
 fn show(window: &mut Harness<'_, App>, view: &'static str) {
-    window.state_mut().send(Command::Maximize(Some(view)));
+    window.state_mut().app_state_mut().show_alone(Some(view));
     window.run_steps(4);
 }
 
@@ -25,13 +25,13 @@ fn two_runs_are_one_table_of_what_became_different() {
     let mut window = finished(setup());
     let before = results(&window);
     press(&mut window, Modifiers::NONE, Key::P);
-    send(&mut window, Command::ShowPart(Part::Reference(Method::FB, 0)));
-    send(&mut window, Command::ShowTab(Tab::Numbers));
+    send(&mut window, |app| app.app_state_mut().show_outcome(Part::Reference(Method::FB, 0)));
+    send(&mut window, |app| app.app_state_mut().show_tab(Tab::Numbers));
     assert!(is_said(&window, "Both runs have the same settings."));
 
-    send(&mut window, Command::SetParam { key: "fb.ratio".to_owned(), value: "0.6".to_owned() });
+    send(&mut window, |app| app.app_state_mut().set_param("fb.ratio", "0.6"));
     run_until_idle(&mut window);
-    send(&mut window, Command::ShowPart(Part::Reference(Method::FB, 0)));
+    send(&mut window, |app| app.app_state_mut().show_outcome(Part::Reference(Method::FB, 0)));
     let after = results(&window);
     let matches = |results: &[QueryResult]| results[0].counts.expect("of FB").with_depth;
     let (a, b) = (matches(&before), matches(&after));
@@ -51,7 +51,7 @@ fn two_runs_are_one_table_of_what_became_different() {
     press(&mut window, Modifiers::NONE, Key::D);
 
     let degradation = "gamma=0.5".parse().expect("a degradation");
-    send(&mut window, Command::Degrade(degradation));
+    send(&mut window, |app| app.app_state_mut().degrade(degradation));
     run_until_idle(&mut window);
     window.run_steps(3);
     assert!(is_said(&window, "--degrade gamma=0.5"));
@@ -106,12 +106,16 @@ fn results_are_drawn_as_the_condition_chooses_them() {
     window.get_by_label("Scatter").click();
     window.run_steps(3);
     assert!(is_said(&window, &drawn(&is_it)));
-    window.state_mut().send(Command::FilterResults(String::new()));
+    window.state_mut().app_state_mut().options.results_filter = String::new();
 
     window.get_by_label("Scatter").click();
-    send(&mut window, Command::FilterResults("method = mi".to_owned()));
+    send(&mut window, |app| {
+        app.app_state_mut().options.results_filter = "method = mi".to_owned();
+    });
     assert!(is_said(&window, &drawn(&|result| result.method == Method::MI)));
-    send(&mut window, Command::FilterResults("method = ".to_owned()));
+    send(&mut window, |app| {
+        app.app_state_mut().options.results_filter = "method = ".to_owned();
+    });
     assert!(is_said(&window, "expected"));
 }
 
@@ -125,7 +129,7 @@ fn a_result_is_opened_at_the_step_that_decided_it() {
             .position(|result| result.diagnosis.first().is_some_and(|finding| finding.code == code))
     };
     let result = failed(&window, Code::R2).expect("a grey photo has no features");
-    send(&mut window, Command::OpenResult { query: GREY, result });
+    send(&mut window, |app| app.app_state_mut().open_result(GREY, result));
     run_until_idle(&mut window);
     let state = app(&window);
     assert_eq!(state.setup.query, GREY);
@@ -203,7 +207,7 @@ fn verdicts_that_became_others_are_a_matrix_and_a_click_shows_their_queries() {
 
     window.get_by_label(&format!("MI {code} → ok: 1")).click();
     window.run_steps(4);
-    send(&mut window, Command::Maximize(None));
+    send(&mut window, |app| app.app_state_mut().show_alone(None));
     assert!(is_said(&window, &format!("1 of {results} results")));
     assert!(is_said(&window, "wrong or without a pose: MI 0"));
     // The same among a condition, and away again.
@@ -236,10 +240,7 @@ fn results_are_kept_and_those_that_follow_are_held_against_them() {
     since_a(&mut window);
     assert!(is_said(&window, "None of 12 verdicts changed"));
     // Nothing is right any more within a hair.
-    send(
-        &mut window,
-        Command::SetParam { key: "grid.coarse_step".to_owned(), value: "3".to_owned() },
-    );
+    send(&mut window, |app| app.app_state_mut().set_param("grid.coarse_step", "3"));
     run_until_idle(&mut window);
     show(&mut window, "batch");
     window.get_by_label("Forget A").click();

@@ -3,7 +3,7 @@
 use egui::accesskit::Role;
 use egui_kittest::kittest::Queryable as _;
 use image::imageops;
-use posescope::app::{Command, Setup};
+use posescope::app::{SaveTarget, Setup};
 use posescope::image::Degradation;
 use posescope::scene;
 
@@ -90,7 +90,7 @@ fn query_photo(setup: &Setup) -> image::GrayImage {
 fn a_slider_degrades_the_photo_runs_again_and_is_kept_in_the_session() {
     let mut window = finished(setup());
     let taken = query_photo(&app(&window).setup);
-    send(&mut window, Command::ShowView("parameters"));
+    send(&mut window, |app| app.app_state_mut().show_view("parameters"));
     let invert = window.get_by_role_and_label(Role::CheckBox, "invert");
     invert.click_accesskit();
     window.run_steps(2);
@@ -108,7 +108,7 @@ fn a_slider_degrades_the_photo_runs_again_and_is_kept_in_the_session() {
 
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("session.json");
-    window.state_mut().send(Command::SaveSession(path.clone()));
+    window.state_mut().save(SaveTarget::Session, path.clone());
     window.step();
     // The strength of a step is set as assistive technology does it.
     let gamma = window.get_by_role_and_label(Role::SpinButton, "gamma");
@@ -122,7 +122,7 @@ fn a_slider_degrades_the_photo_runs_again_and_is_kept_in_the_session() {
     run_until_idle(&mut window);
     let setup = &app(&window).setup;
     assert_eq!(query_photo(setup), taken);
-    send(&mut window, Command::RestoreSession(path));
+    send(&mut window, |app| app.save(SaveTarget::Restored, path));
     run_until_idle(&mut window);
     let state = app(&window);
     assert_eq!(degraded(state), "invert");

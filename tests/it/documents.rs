@@ -96,7 +96,7 @@ fn table_of_verdicts() -> String {
             all if all == Family::ALL.len() => "all".to_owned(),
             _ => families.join(", "),
         };
-        let conclusive = if rule.is_conclusive { ", conclusive" } else { "" };
+        let conclusive = if rule.is_conclusive { " (*conclusive*)" } else { "" };
         let truth = if rule.needs_truth { "yes" } else { "no" };
         table += &format!(
             "| **{}** | {}{conclusive} | {applies_to} | {truth} | {} |\n",

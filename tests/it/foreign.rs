@@ -91,6 +91,34 @@ fn small() -> (SmallSequence, Vec<QueryResult>) {
 const ALL: &str = "sequences/42 --all --reference 4 --method mi";
 
 #[test]
+fn an_inverted_pose_is_told_by_its_convention() {
+    let (sequence, found) = small();
+    // Truly right poses, read as `world_from_camera` although they are `camera_from_world`.
+    let named = named_poses(&found, Method::MI);
+    let rows: String = named
+        .lines()
+        .map(|line| {
+            let words: Vec<&str> = line.split(' ').collect();
+            let [name, w, x, y, z, at @ ..] = &words[..] else { panic!("{line}") };
+            format!("{name} {} {x} {y} {z} {w}\n", at.join(" "))
+        })
+        .collect();
+    write(sequence.path().join("poses.txt"), "name x y z qx qy qz qw\n".to_owned() + &rows);
+    let all = "sequences/42 --all --reference 4 --method other --estimates other=poses.txt";
+    let found = results(sequence.path(), all);
+    assert!(!found.is_empty());
+    for result in found {
+        let first = &result.diagnosis[0];
+        assert_eq!(first.code, Code::X1, "{}: {}", result.query, first.text);
+        assert!(
+            first.text.contains("read as camera_from_world (inverted), it is 0."),
+            "{}",
+            first.text
+        );
+    }
+}
+
+#[test]
 fn all_four_texts_say_the_same() {
     let (sequence, found) = small();
     let at = |name: &str| sequence.path().join(name);

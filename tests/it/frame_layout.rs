@@ -4,7 +4,7 @@ use egui::Rect;
 use egui::accesskit::Role;
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
-use posescope::app::{App, Command, Setup};
+use posescope::app::{App, Setup};
 use posescope::method::Method;
 use posescope::session::{Part, RunMode};
 
@@ -100,7 +100,7 @@ fn eight_methods_and_three_references_have_their_places() {
         assert!(cells.iter().all(|cell| whole.contains_rect(*cell)), "{size:?}: {cells:?}");
         // Every reference can be reached.
         let last = Part::Reference(Method::FB, 1);
-        send(&mut window, Command::ShowPart(last));
+        send(&mut window, |app| app.app_state_mut().show_outcome(last));
         let state = app(&window);
         let here = state.run().span_at(state.cursor()).map(|span| span.part);
         assert_eq!(here, Some(last));

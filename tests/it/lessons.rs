@@ -1,11 +1,9 @@
 //! Lessons: their claims, and the way through each of them.
 
-use std::sync::Arc;
-
 use egui::{Key, Modifiers};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
-use posescope::app::{App, Command, Setup, views};
+use posescope::app::{App, Setup, views};
 use posescope::lesson::{Answer, Lesson, Moment};
 use posescope::localize::{NoObserver, QueryResult};
 use posescope::session::RunState;
@@ -134,7 +132,9 @@ fn a_place_is_guessed_on_the_empty_map_and_measured_afterwards() {
     press(&mut window, Modifiers::NONE, Key::Period);
     assert_eq!(app(&window).options.lockstep, Some(4));
     assert!(!is_said(&window, "● right"), "no method is done at its fourth step");
-    send(&mut window, Command::StepTogether(Some(usize::MAX - 1)));
+    send(&mut window, |app| {
+        app.app_state_mut().options.lockstep = Some(usize::MAX - 1);
+    });
     assert_eq!(window.query_all_by_label_contains("● right").count(), 2, "a panel each");
 
     window.get_by_label("Close the lesson").click();
@@ -225,7 +225,7 @@ fn claims_hold(is_meant: impl Fn(&Lesson) -> bool) {
         // What no page shows is run for its claims alone.
         for (variant, setting) in &lesson.variants {
             if !results.iter().any(|(shown, _)| shown == variant) {
-                let job = setting.open(&|_| None).expect("a setting").job(&Arc::default());
+                let job = setting.open(&|_| None).expect("a setting");
                 let told = job.work(0, &mut NoObserver, |_| {}).expect("results");
                 results.push((variant.clone(), told));
             }

@@ -245,7 +245,7 @@ fn no_damage_to_an_index_makes_its_reader_panic() {
     let params = Params::default();
     let path = sequence.path().join("an.posescope-index");
     let options = IndexOptions { words: 16, every: 1, seed: 0 };
-    let request = Retriever::request(scene.as_ref(), &options, &params);
+    let request = Retriever::request(scene.as_ref(), &options, &Default::default(), &params);
     Retriever::build(scene.as_ref(), &path, &request, &params, |_| {}).expect("enough features");
     let query = scene.query(1).expect("readable");
     let read = || {

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use egui::{Pos2, Rect, Vec2};
 use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
-use posescope::app::{App, Command};
+use posescope::app::App;
 use posescope::event::{
     DebugEvent, DepthsLifted, FeaturesClassified, FeaturesDetected, MatchesDecided,
     MinimumAssessed, Side, ViewRendered,
@@ -20,8 +20,8 @@ use crate::window::{app, finished, run_until_idle, send, setup, wait, window};
 /// The small world after its run, at the end of a method, with a view in front.
 fn at_end(method: Method, view: &'static str) -> Harness<'static, App> {
     let mut window = finished(setup());
-    send(&mut window, Command::SelectMethod(method));
-    send(&mut window, Command::Maximize(Some(view)));
+    send(&mut window, |app| app.app_state_mut().select_method(method));
+    send(&mut window, |app| app.app_state_mut().show_alone(Some(view)));
     window
 }
 
@@ -78,7 +78,7 @@ fn lonely_inlier(window: &Harness<'_, App>) -> (usize, Pos2) {
 fn before_detection_there_are_just_the_photos() {
     let mut window = window(setup());
     run_until_idle(&mut window);
-    send(&mut window, Command::ShowView("images"));
+    send(&mut window, |app| app.app_state_mut().show_view("images"));
     window.get_by_label("No features yet: FB finds them first");
     window.get_by_label("query photo 000001");
     window.get_by_label("reference photo 000000");
@@ -154,10 +154,12 @@ fn a_clicked_match_shows_the_numbers_that_were_told_about_it() {
 fn a_match_is_compared_with_the_truth_while_the_truth_is_shown() {
     let mut window = at_end(Method::FB, "images");
     let (feature, _) = lonely_inlier(&window);
-    send(&mut window, Command::SelectFeature(Some(feature)));
+    send(&mut window, |app| {
+        app.app_state_mut().options.selected_feature = Some(feature);
+    });
     window.get_by_label("true match");
     window.get_by_label("Off the epipolar line");
-    send(&mut window, Command::ShowTruth);
+    send(&mut window, |app| app.act("Ground truth"));
     assert!(window.query_by_label("true match").is_none());
     assert!(window.query_by_label("Off the epipolar line").is_none());
 }
@@ -182,12 +184,16 @@ fn both_photos_zoom_together_and_a_double_click_shows_them_whole() {
     // The match is elsewhere on the screen, so a click at its old place does not select it.
     click(&mut window, whole);
     assert_ne!(app(&window).options.selected_feature, Some(feature));
-    send(&mut window, Command::SelectFeature(None));
+    send(&mut window, |app| {
+        app.app_state_mut().options.selected_feature = None;
+    });
     // Each step of the test takes a quarter of a second; these clicks are one second apart, the one before is earlier.
     window.ctx.options_mut(|options| options.input_options.max_double_click_delay = 1.3);
     click(&mut window, area.center());
     click(&mut window, area.center());
-    send(&mut window, Command::SelectFeature(None));
+    send(&mut window, |app| {
+        app.app_state_mut().options.selected_feature = None;
+    });
     click(&mut window, whole);
     assert_eq!(app(&window).options.selected_feature, Some(feature));
 }
@@ -196,7 +202,7 @@ fn both_photos_zoom_together_and_a_double_click_shows_them_whole() {
 fn the_synthetic_view_shows_the_recorded_cost_and_place() {
     let mut window = at_end(Method::MI, "synthetic");
     for method in [Method::MI, Method::PM] {
-        send(&mut window, Command::SelectMethod(method));
+        send(&mut window, |app| app.app_state_mut().select_method(method));
         let event = latest::<ViewRendered>(&window);
         let cost = event.comparison.score.cost.expect("a cost");
         assert!(event.offset.right_m.abs() < 0.005 && event.offset.yaw_rad == 0.0);
@@ -220,7 +226,9 @@ fn the_synthetic_view_shows_the_recorded_cost_and_place() {
 fn a_pose_of_ones_own_has_the_costs_of_both_methods() {
     let mut window = at_end(Method::MI, "synthetic");
     let truth = app(&window).run().loaded.as_ref().expect("loaded").truth;
-    send(&mut window, Command::TakeCamera(truth));
+    send(&mut window, |app| {
+        app.app_state_mut().camera = truth;
+    });
     wait(&mut window, |app| app.app_state().probe().is_some());
     window.step();
     window.get_by_label_contains("MI, camera in hand: cost ");
@@ -236,16 +244,16 @@ fn a_pose_of_ones_own_has_the_costs_of_both_methods() {
 #[test]
 fn the_pictures_of_the_synthetic_view_are_chosen_by_name_and_blink_with_the_query() {
     let mut window = at_end(Method::MI, "synthetic");
-    let common = ["query", "view", "blend", "residual", "coverage"];
+    let common = ["query", "view", "blend", "residual"];
     for (method, own) in [(Method::MI, "shares"), (Method::PM, "weights")] {
-        send(&mut window, Command::SelectMethod(method));
+        send(&mut window, |app| app.app_state_mut().select_method(method));
         for name in common.into_iter().chain([own]) {
             window.get_by_label(&format!("Show {name}")).click();
             window.run_steps(2);
             window.get_by_label(&format!("{} picture: {name}", method.label()));
         }
     }
-    send(&mut window, Command::Blink);
+    send(&mut window, |app| app.act("Blink between query and synthetic view"));
     let mut seen = [0, 0];
     for _ in 0..200 {
         window.step();
@@ -260,14 +268,16 @@ fn the_pictures_of_the_synthetic_view_are_chosen_by_name_and_blink_with_the_quer
 #[test]
 fn both_views_draw_at_every_moment_of_a_run() {
     let mut window = at_end(Method::FB, "images");
-    send(&mut window, Command::SelectFeature(Some(0)));
+    send(&mut window, |app| {
+        app.app_state_mut().options.selected_feature = Some(0);
+    });
     let len = app(&window).run().len();
     // Every moment of FB's story, and some of the long searches.
     let mut cursor = 0;
     while cursor < len {
         for view in ["images", "synthetic"] {
-            window.state_mut().send(Command::Maximize(Some(view)));
-            send(&mut window, Command::MoveCursor(cursor));
+            window.state_mut().app_state_mut().show_alone(Some(view));
+            send(&mut window, |app| app.app_state_mut().move_cursor(cursor));
         }
         cursor += if cursor < 12 { 1 } else { 1 + len / 97 };
     }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
-use posescope::app::{App, Command, ReferencePick, Setup};
+use posescope::app::{App, ReferencePick, SaveTarget, Setup};
 use posescope::camera::Intrinsics;
 use posescope::cloud::Cloud;
 use posescope::event::KindSet;
@@ -25,12 +25,12 @@ use crate::walls_scene::Walls;
 use crate::window::{app, finish, finished, is_said, results, run_until_idle, send, setup};
 
 fn maximize(window: &mut Harness<'_, App>, view: &'static str) {
-    send(window, Command::Maximize(Some(view)));
+    send(window, |app| app.app_state_mut().show_alone(Some(view)));
 }
 
 fn pick(window: &mut Harness<'_, App>, selection: Selection) -> RunState {
     let pick = ReferencePick::By(selection);
-    send(window, Command::PickReferences(pick));
+    send(window, |app| app.app_state_mut().pick_references(pick));
     run_until_idle(window)
 }
 
@@ -38,7 +38,7 @@ fn index(file: &Path, params: &Params) {
     let scene = Walls::new();
     let options = IndexOptions { words: 400, every: 1, seed: 0 };
     // The photos behind the first three cannot all be read.
-    let mut request = Retriever::request(&scene, &options, params);
+    let mut request = Retriever::request(&scene, &options, &Default::default(), params);
     request.frames.truncate(3);
     Retriever::build(&scene, file, &request, params, |_| {}).expect("an index");
 }
@@ -73,8 +73,7 @@ fn references_are_chosen_by_hand_and_their_poses_fused() {
     }
     let folder = tempfile::tempdir().expect("a folder");
     let recording = folder.path().join("fused.rrd");
-    let save = Command::SaveRecording(recording.clone());
-    send(&mut window, save);
+    send(&mut window, |app| app.save(SaveTarget::Recording, recording.clone()));
     let recorded = timelines(&chunks(&recording));
     assert!(recorded.contains_key(&entities::fusion_weights(Method::FB)));
     assert!(!recorded.contains_key(entities::RETRIEVAL_TABLE));
@@ -84,11 +83,11 @@ fn references_are_chosen_by_hand_and_their_poses_fused() {
     has(&command, "--fusion wavg");
 
     maximize(&mut window, "fusion");
-    send(&mut window, Command::Last);
+    send(&mut window, |app| app.act("To the last step"));
     assert!(is_said(&window, "HY, 2 references"));
     let error = fused[3].error.expect("the truth is known");
     assert!(is_said(&window, &format!("{:.3} m", error.translation_m)));
-    send(&mut window, Command::SelectMethod(Method::FB));
+    send(&mut window, |app| app.app_state_mut().select_method(Method::FB));
     assert!(is_said(&window, "FB, 2 references"));
 
     // Without a second reference there is nothing to fuse, but a fusion of one is its pose.
@@ -130,7 +129,7 @@ fn references_are_ranked_by_their_matches() {
     // What a setting changes does not change the references.
     let key = "fb.ratio".to_owned();
     let value = "0.7".to_owned();
-    send(&mut window, Command::SetParam { key, value });
+    send(&mut window, |app| app.app_state_mut().set_param(&key, &value));
     finish(&mut window);
     let again = &app(&window).run().spans()[0];
     assert_eq!(again.part, Part::Retrieval);
@@ -161,8 +160,7 @@ fn references_are_found_by_an_index_and_a_missing_one_is_named() {
     let first = &ranking.expect("an index ranks").frames[0];
     let found = first.ranked.verification().expect("the walls are the same");
     let recording = folder.path().join("ranked.rrd");
-    let save = Command::SaveRecording(recording.clone());
-    send(&mut window, save);
+    send(&mut window, |app| app.save(SaveTarget::Recording, recording.clone()));
     assert!(timelines(&chunks(&recording)).contains_key(entities::RETRIEVAL_TABLE));
     let name = format!("{} matches with {}", found.matches.len(), first.name);
     assert!(is_said(&window, &name), "{name}");

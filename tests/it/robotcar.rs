@@ -60,9 +60,9 @@ pub fn write_part(root: &Path, frames: Range<usize>) -> PathBuf {
     });
     for index in frames {
         let shot = Shot { index, photo: &photo, scan: &scan(index), depth: &|_| None };
-        writer.frame(&shot).expect("writable");
+        (writer.frame)(&shot).expect("writable");
     }
-    writer.finish().expect("writable");
+    (writer.finish)().expect("writable");
     root.join((layout.place)("drive"))
 }
 

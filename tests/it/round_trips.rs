@@ -46,9 +46,9 @@ pub fn written(layout: &Layout, street: &Street, root: &Path) -> Box<dyn Scene> 
             scan: &scan,
             depth: &|pixel| traversal.depth(index, pixel),
         };
-        writer.frame(&shot).expect("writable");
+        (writer.frame)(&shot).expect("writable");
     }
-    writer.finish().expect("writable");
+    (writer.finish)().expect("writable");
     let place = root.join((layout.place)("dusk"));
     let place = place.to_str().expect("a plain path");
     // One frame in ten would be too few.

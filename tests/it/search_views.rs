@@ -2,7 +2,7 @@
 
 use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
-use posescope::app::{App, Command};
+use posescope::app::App;
 use posescope::cost::Explanation;
 use posescope::event::{ConsensusJudged, DebugEvent, HypothesisTried, PoseScored, ViewRendered};
 use posescope::grid::{DenseSurface, Offset, Phase};
@@ -15,7 +15,7 @@ use crate::window::{app, finished, run_until_idle, send, setup, wait};
 /// The small world after all of its run, with a view in front.
 fn after(view: &'static str) -> Harness<'static, App> {
     let mut window = finished(setup());
-    send(&mut window, Command::Maximize(Some(view)));
+    send(&mut window, |app| app.app_state_mut().show_alone(Some(view)));
     window
 }
 
@@ -33,7 +33,7 @@ fn told<E: DebugEvent + Clone>(window: &Harness<'_, App>, method: Method) -> Vec
 }
 
 fn move_to(window: &mut Harness<'_, App>, cursor: usize) {
-    window.state_mut().send(Command::MoveCursor(cursor));
+    window.state_mut().app_state_mut().move_cursor(cursor);
     // Obeyed in this frame, drawn in it or the next.
     window.run_steps(2);
 }
@@ -131,7 +131,9 @@ fn leaving_a_map_is_said_once() {
     window.hover_at(egui::pos2(5.0, 5.0));
     window.run_steps(3);
     assert_eq!(app(&window).hovered, None);
-    send(&mut window, Command::Hover(hovered));
+    send(&mut window, |app| {
+        app.app_state_mut().hovered = hovered;
+    });
     assert_eq!(app(&window).hovered, hovered);
 }
 
@@ -245,7 +247,7 @@ fn ransac_counts_the_trials_and_a_click_goes_to_one() {
     }
     move_to(&mut window, trials[trials.len() - 1].0);
     window.run_steps(2);
-    window.get_by_label_contains("log likelihood by trial").click();
+    window.get_by_label_contains("inliers by trial").click();
     window.run_steps(3);
     let cursor = app(&window).cursor();
     let place = trials.iter().position(|(at, _)| *at == cursor);
@@ -274,10 +276,10 @@ fn every_moment_of_a_run_can_be_drawn() {
     let views: [(&str, &[&str]); 3] = [
         ("surface", &["Nothing is searched yet", "Cost map"]),
         ("histogram", &["No synthetic view yet", "Joint histogram of", "Residuals of"]),
-        ("ransac", &["No hypothesis yet", "log likelihood by trial"]),
+        ("ransac", &["No hypothesis yet", "inliers by trial"]),
     ];
     for (view, said) in views {
-        send(&mut window, Command::Maximize(Some(view)));
+        send(&mut window, |app| app.app_state_mut().show_alone(Some(view)));
         for cursor in (0..records).step_by(9).chain([records - 1]) {
             move_to(&mut window, cursor);
             let count: usize = said.iter().map(|part| texts(&window, part).len()).sum();
@@ -296,7 +298,7 @@ fn the_costs_from_the_result_to_the_truth_end_in_those_of_both() {
     }
     let mut window = finished(setup);
     move_to_end(&mut window, Method::MI);
-    send(&mut window, Command::Maximize(Some("surface")));
+    send(&mut window, |app| app.app_state_mut().show_alone(Some("surface")));
     wait(&mut window, |app| {
         app.app_state().cost_along(Method::MI).is_some() && !app.app_state().is_tracing_line()
     });
@@ -336,7 +338,7 @@ fn the_costs_from_the_result_to_the_truth_end_in_those_of_both() {
     let length = app(&window).cost_along(Method::MI).expect("traced").line.length_m();
     assert!(way.norm() < 1.3 * length, "{way} of {length}");
     // A truth that is hidden has no line.
-    send(&mut window, Command::ShowTruth);
+    send(&mut window, |app| app.act("Ground truth"));
     assert!(texts(&window, "Cost from the result").is_empty());
 }
 
@@ -348,7 +350,7 @@ fn filled_densely() -> Harness<'static, App> {
     }
     let mut window = finished(setup);
     move_to_end(&mut window, Method::MI);
-    window.state_mut().send(Command::Maximize(Some("surface")));
+    window.state_mut().app_state_mut().show_alone(Some("surface"));
     window.key_press(egui::Key::F);
     window.run_steps(2);
     wait(&mut window, |app| {
@@ -457,7 +459,7 @@ fn the_dense_map_is_the_cheapest_heading_of_each_position_and_takes_the_camera_t
 fn a_dense_map_that_nobody_looks_at_stands_still_and_is_gone_on_with() {
     let mut window = after("surface");
     move_to_end(&mut window, Method::MI);
-    window.state_mut().send(Command::Maximize(Some("surface")));
+    window.state_mut().app_state_mut().show_alone(Some("surface"));
     // Many more hypotheses than can be scored between two frames.
     window.key_press(egui::Key::F);
     let has_begun = |app: &App| {
@@ -465,7 +467,7 @@ fn a_dense_map_that_nobody_looks_at_stands_still_and_is_gone_on_with() {
         map.is_some_and(|map| map.surface().expect("small").tried() > 0)
     };
     wait(&mut window, has_begun);
-    window.state_mut().send(Command::Maximize(Some("report")));
+    window.state_mut().app_state_mut().show_alone(Some("report"));
     window.run_steps(4);
     assert!(!app(&window).is_filling_dense_map());
     std::thread::sleep(std::time::Duration::from_millis(50));
@@ -475,7 +477,7 @@ fn a_dense_map_that_nobody_looks_at_stands_still_and_is_gone_on_with() {
     window.run_steps(2);
     assert_eq!(dense(&window).tried(), stood.tried());
     assert!(!stood.is_complete());
-    window.state_mut().send(Command::Maximize(Some("surface")));
+    window.state_mut().app_state_mut().show_alone(Some("surface"));
     let is_done = |app: &App| {
         let map = app.app_state().dense_map(Method::MI);
         map.is_some_and(|map| map.surface().expect("small").is_complete())
@@ -502,9 +504,7 @@ fn a_dense_map_that_nobody_looks_at_stands_still_and_is_gone_on_with() {
     }
 
     // Other parameters make it another map.
-    window
-        .state_mut()
-        .send(Command::SetParam { key: "grid.yaw_range".to_owned(), value: "1".to_owned() });
+    window.state_mut().app_state_mut().set_param("grid.yaw_range", "1");
     wait(&mut window, |app| {
         let map = app.app_state().dense_map(Method::MI);
         map.is_none_or(|map| map.surface().expect("small").hypotheses() != whole.hypotheses())
@@ -535,8 +535,8 @@ fn the_truth_is_seen_whatever_else_is_there() {
         return;
     };
     run_until_idle(&mut window);
-    window.state_mut().send(Command::SelectMethod(Method::MI));
-    send(&mut window, Command::Maximize(Some("surface")));
+    window.state_mut().app_state_mut().select_method(Method::MI);
+    send(&mut window, |app| app.app_state_mut().show_alone(Some("surface")));
     // The colour of the truth, which recordings have too.
     let [r, g, b] = posescope::palette::TRUTH;
     let truth = egui::Color32::from_rgb(r, g, b);
@@ -550,7 +550,7 @@ fn the_truth_is_seen_whatever_else_is_there() {
     let alone = pixels_of(&map(&mut window), truth);
     assert!(alone > 20, "{alone}");
     // The camera goes to the truth, where its own mark lies on that place too.
-    send(&mut window, Command::JumpCamera(posescope::app::NamedPose::Truth));
+    send(&mut window, |app| app.app_state_mut().jump_camera(posescope::app::NamedPose::Truth));
     wait(&mut window, |app| !app.app_state().is_probing());
     window.run_steps(3);
     let beneath = pixels_of(&map(&mut window), truth);

@@ -3,9 +3,7 @@
 
 use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
-use posescope::app::{App, Command, Setup};
-use posescope::event::PhaseSearched;
-use posescope::grid::Phase;
+use posescope::app::{App, Setup};
 use posescope::method::Method;
 use posescope::session::{Part, RunMode};
 
@@ -15,7 +13,7 @@ use crate::window::{app, finished, run_until_idle, send, setup};
 /// A window after its run, with the view in front.
 fn after(setup: Setup) -> Harness<'static, App> {
     let mut window = finished(setup);
-    send(&mut window, Command::Maximize(Some("space")));
+    send(&mut window, |app| app.app_state_mut().show_alone(Some("space")));
     window
 }
 
@@ -64,12 +62,12 @@ fn every_moment_of_a_run_is_drawn_and_the_cameras_come_one_by_one() {
     let moments =
         (0..run.len()).filter(|at| at % 100 == 0 || ends.iter().any(|end| at.abs_diff(*end) <= 2));
     for cursor in moments {
-        send(&mut window, Command::MoveCursor(cursor));
+        send(&mut window, |app| app.app_state_mut().move_cursor(cursor));
         assert!(headline(&window).contains("points"));
     }
-    send(&mut window, Command::First);
+    send(&mut window, |app| app.act("To the first step"));
     assert!(window.query_by_label_contains("FB: ").is_none(), "FB has no pose yet");
-    send(&mut window, Command::MoveCursor(ends[0]));
+    send(&mut window, |app| app.app_state_mut().move_cursor(ends[0]));
     assert!(window.query_by_label_contains("FB: ").is_some());
 }
 
@@ -82,7 +80,7 @@ fn the_best_pose_so_far_is_that_of_the_method_at_the_cursor() {
     let part = app(&window).run().span_of(Part::Reference(fb2, 0)).expect("it ran");
     let records = part.records.clone();
     let mut has_best = |cursor| {
-        send(&mut window, Command::MoveCursor(cursor));
+        send(&mut window, |app| app.app_state_mut().move_cursor(cursor));
         window.query_by_label_contains("FB2, best so far: ").is_some()
     };
     assert!(!has_best(records.start), "FB2 has tried nothing yet");
@@ -94,7 +92,7 @@ fn the_truth_hides_with_its_errors() {
     let mut window = after(setup());
     assert!(label(&window, "FB: ").contains("from the truth"));
     assert!(window.query_by_label_contains("Truth: ").is_some());
-    send(&mut window, Command::ShowTruth);
+    send(&mut window, |app| app.act("Ground truth"));
     assert!(!label(&window, "FB: ").contains("from the truth"));
     assert!(window.query_by_label_contains("Truth: ").is_none());
 }
@@ -115,7 +113,7 @@ fn choose(window: &mut Harness<'_, App>, name: &str) {
 #[test]
 fn one_looks_through_a_camera_and_leaves_it_by_turning() {
     let mut window = after(setup());
-    assert!(headline(&window).contains("Drag: turn"));
+    assert!(headline(&window).contains("A square is 0.5 m. Drag: turn"), "{}", headline(&window));
     choose(&mut window, "Through FB");
     assert!(headline(&window).contains("Through FB"));
     let pane = window.get_by_label_contains("3-D view of").rect();
@@ -126,7 +124,7 @@ fn one_looks_through_a_camera_and_leaves_it_by_turning() {
     window.get_by_label_contains("Truth: ").click();
     window.run_steps(2);
     assert!(headline(&window).contains("Through Truth"));
-    send(&mut window, Command::ShowTruth);
+    send(&mut window, |app| app.act("Ground truth"));
     assert!(headline(&window).contains("Truth has no pose at this step"));
     choose(&mut window, "Whole scene");
     assert!(headline(&window).contains("Drag: turn"));
@@ -147,105 +145,12 @@ fn shifting_takes_the_labels_along() {
     assert!(moved.x >= 20.0 && moved.y >= 12.0 && moved.length() < 60.0, "{moved}");
 }
 
-/// The number that follows some words.
-fn number_after(text: &str, words: &str) -> f64 {
-    let rest = text.split(words).nth(1).expect("the words are there");
-    let number: String =
-        rest.chars().take_while(|c| c.is_ascii_digit() || "-.".contains(*c)).collect();
-    number.parse().expect("a number")
-}
-
-#[test]
-fn the_cost_under_the_pointer_is_the_recorded_one() {
-    let mut window = after(setup());
-    // The hybrid took the pose of FB and searched nothing.
-    let method = posescope::method::Method::MI;
-    send(&mut window, Command::SelectMethod(method));
-    choose(&mut window, "From above");
-    let pane = window.get_by_label_contains("3-D view of").rect();
-    let mut found = 0;
-    for (x, y) in [(0.5, 0.5), (0.4, 0.55), (0.55, 0.4), (0.6, 0.6)] {
-        window.hover_at(pane.min + egui::vec2(x * pane.width(), y * pane.height()));
-        window.run_steps(2);
-        let words = headline(&window);
-        if !words.contains("cost ") {
-            continue;
-        }
-        found += 1;
-        let cost = number_after(&words, "cost ");
-        let right_m = number_after(&words, "at (");
-        let forward_m = number_after(&words, &format!("at ({right_m:.1}, "));
-        let run = app(&window).run();
-        let span =
-            run.spans().iter().rfind(|span| span.part.method() == Some(method)).expect("MI ran");
-        let at_place = run
-            .all_until::<PhaseSearched>(span.records.end - 1)
-            .map(|(_, searched)| &searched.surface)
-            .filter(|surface| {
-                matches!(surface.lattice.phase, Phase::PositionCoarse | Phase::PositionFine)
-            })
-            .flat_map(|surface| {
-                surface.lattice.hypotheses().filter_map(|(cell, offset)| {
-                    let near = (offset.right_m - right_m).abs() < 0.051
-                        && (offset.forward_m - forward_m).abs() < 0.051;
-                    near.then(|| surface.eligible_cost(cell)).flatten()
-                })
-            })
-            .collect::<Vec<_>>();
-        assert!(
-            at_place.iter().any(|recorded| (recorded - cost).abs() < 5.1e-5),
-            "{words}: {at_place:?}"
-        );
-    }
-    assert!(found >= 2, "the pointer met {found} cells: {}", headline(&window));
-}
-
-#[test]
-fn the_ground_has_the_colours_of_the_cost_map() {
-    let mut setup = setup();
-    // A coarse grid beside the truth: the fine positions reach lower costs.
-    for assignment in ["grid.coarse_step=1.7", "grid.fine_range=1"] {
-        setup.task.params.assign(assignment).expect("a parameter");
-    }
-    let mut window = finished(setup);
-    send(&mut window, Command::SelectMethod(Method::MI));
-    let bar = |window: &mut Harness<'_, App>, view| {
-        send(window, Command::Maximize(Some(view)));
-        label(window, "Colours of cost")
-    };
-    let on_ground = bar(&mut window, "space");
-    assert_eq!(on_ground, bar(&mut window, "surface"));
-    // The lowest cost is that of a fine position, which the first surface does not have.
-    let run = app(&window).run();
-    let mut spans = run.spans().iter();
-    let span = spans.find(|span| span.part.method() == Some(posescope::method::Method::MI));
-    let end = span.expect("MI ran").records.end;
-    let surfaces: Vec<_> =
-        run.all_until::<PhaseSearched>(end - 1).map(|(_, searched)| &searched.surface).collect();
-    let lowest = |phase| {
-        let of_phase = surfaces.iter().filter(|surface| surface.lattice.phase == phase);
-        let costs = of_phase.flat_map(|surface| {
-            (0..surface.scores.len()).filter_map(|cell| surface.eligible_cost(cell))
-        });
-        costs.fold(f64::INFINITY, f64::min)
-    };
-    let (coarse, fine) = (lowest(Phase::PositionCoarse), lowest(Phase::PositionFine));
-    assert!(fine < coarse, "{fine} {coarse}");
-    assert!(on_ground.contains(&format!("{fine:.4} is bright")), "{on_ground}");
-}
-
-#[test]
-fn without_a_graphics_card_the_view_says_so() {
-    let window = after(setup());
-    assert!(window.query_by_label_contains("No graphics card").is_some());
-}
-
 /// The window with its run over, drawn by any adapter there is; `None` without one.
 fn drawn() -> Option<PaintedWindow> {
     let setup = Setup { mode: RunMode::Running, ..setup() };
     let mut painted = painted(setup, [1500.0, 950.0])?;
     run_until_idle(&mut painted.window);
-    send(&mut painted.window, Command::Maximize(Some("space")));
+    send(&mut painted.window, |app| app.app_state_mut().show_alone(Some("space")));
     Some(painted)
 }
 
@@ -266,16 +171,13 @@ fn count(window: &mut Harness<'_, App>, [r, g, b]: [u8; 3]) -> usize {
 }
 
 #[test]
-fn the_layers_are_drawn_and_can_be_taken_away() {
+fn the_truth_is_drawn_and_can_be_taken_away() {
     let Some(mut painted) = drawn() else { return };
     let window = &mut painted.window;
     const TRUTH: [u8; 3] = posescope::palette::TRUTH;
-    assert!(window.query_by_label_contains("No graphics card").is_none());
-    assert!(window.query_by_label_contains("Nothing is drawn").is_none());
     let with_truth = count(window, TRUTH);
     assert!(with_truth > 50, "{with_truth} pixels of the truth");
-    send(window, Command::ShowTruth);
-    // Inlier rays have the same colour, but are pale.
+    send(window, |app| app.act("Ground truth"));
     let without = count(window, TRUTH);
     assert!(without < with_truth / 2, "{without} of {with_truth}");
 }

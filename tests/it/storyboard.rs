@@ -4,7 +4,7 @@ use egui::accesskit::Role;
 use egui::{Key, Modifiers};
 use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
-use posescope::app::{App, Command, Setup};
+use posescope::app::{App, Setup};
 use posescope::method::Method;
 use posescope::session::{Part, Span};
 
@@ -32,7 +32,7 @@ fn ends(window: &Harness<'_, App>, part: Part) -> Vec<usize> {
 #[test]
 fn the_arrows_go_from_stage_to_stage_and_from_the_last_to_the_cause() {
     let mut window = grey();
-    send(&mut window, Command::ShowPart(MI));
+    send(&mut window, |app| app.app_state_mut().show_outcome(MI));
     let ends = ends(&window, MI);
     assert!(ends.len() > 1, "{ends:?}");
     assert!(app(&window).options.shows_why);
@@ -52,7 +52,7 @@ fn the_arrows_go_from_stage_to_stage_and_from_the_last_to_the_cause() {
 #[test]
 fn a_lecture_shows_no_cause_and_inspect_shows_it_again() {
     let mut window = grey();
-    send(&mut window, Command::ShowPart(Part::Reference(Method::FB, 0)));
+    send(&mut window, |app| app.app_state_mut().show_outcome(Part::Reference(Method::FB, 0)));
     assert!(is_said(&window, "0 and 146 keypoints"));
     press(&mut window, Modifiers::NONE, Key::F3);
     assert!(!app(&window).options.shows_why);
@@ -60,7 +60,7 @@ fn a_lecture_shows_no_cause_and_inspect_shows_it_again() {
     press(&mut window, Modifiers::NONE, Key::F2);
     assert!(app(&window).options.shows_why);
     // At another step there is no cause to come back to.
-    send(&mut window, Command::MoveCursor(1));
+    send(&mut window, |app| app.app_state_mut().move_cursor(1));
     press(&mut window, Modifiers::NONE, Key::F3);
     press(&mut window, Modifiers::NONE, Key::F2);
     assert!(!app(&window).options.shows_why);
@@ -69,7 +69,7 @@ fn a_lecture_shows_no_cause_and_inspect_shows_it_again() {
 #[test]
 fn a_click_on_the_words_of_another_finding_opens_it() {
     let mut window = grey();
-    send(&mut window, Command::ShowPart(Part::Reference(Method::FB, 0)));
+    send(&mut window, |app| app.app_state_mut().show_outcome(Part::Reference(Method::FB, 0)));
     let words = "Too few true matches: 0 of 0";
     assert!(!is_said(&window, words));
     window.get_by_label("Too few true matches").click();
@@ -81,9 +81,9 @@ fn a_click_on_the_words_of_another_finding_opens_it() {
 fn remedies_are_tried_beside_the_picture_of_the_cause() {
     let mut window = grey();
     let part = Part::Reference(Method::PM, 0);
-    send(&mut window, Command::ShowPart(part));
+    send(&mut window, |app| app.app_state_mut().show_outcome(part));
     assert!(app(&window).options.shows_why);
-    send(&mut window, Command::Explain);
+    send(&mut window, |app| app.act("Try what would have helped"));
     finish(&mut window);
     let state = app(&window);
     assert!(state.options.shows_why);
@@ -122,7 +122,7 @@ fn a_stage_is_shown_by_a_click_and_has_a_small_picture() {
 #[test]
 fn a_click_on_a_small_picture_of_a_proof_makes_it_large() {
     let mut window = grey();
-    send(&mut window, Command::ShowPart(MI));
+    send(&mut window, |app| app.app_state_mut().show_outcome(MI));
     wait(&mut window, |app| !app.app_state().is_working_out());
     window.run_steps(2);
     let canvas = window.state().canvas();

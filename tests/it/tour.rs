@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::sync::Arc;
 
 use egui_kittest::Harness;
-use posescope::app::{App, Command, Setup};
+use posescope::app::{App, Setup};
 use posescope::diagnosis::Grade;
 use posescope::method::Method;
 use posescope::scene::{self, Scene};
@@ -52,26 +52,26 @@ fn the_tour_leads_from_a_failure_to_a_right_pose() {
         settle(window);
         pictures.push((window.render().expect("a picture"), seconds));
     };
-    send(&mut window, Command::RunAllQueries);
+    send(&mut window, |app| app.act("Run all queries, or stop"));
     wait(&mut window, |app| app.app_state().results.len() == frames.len());
     wait(&mut window, |app| app.app_state().queries.progress().is_none());
-    send(&mut window, Command::Arrange(posescope::app::Arrangement::Batch));
+    send(&mut window, |app| app.arrange(posescope::app::Arrangement::Batch));
     take(&mut window, 2.5);
     let result = app(&window).results[&450]
         .iter()
         .position(|result| result.method == Method::MI)
         .expect("MI ran");
-    send(&mut window, Command::OpenResult { query: 450, result });
+    send(&mut window, |app| app.app_state_mut().open_result(450, result));
     finish(&mut window);
     take(&mut window, 2.0);
-    send(&mut window, Command::OpenSelected);
+    send(&mut window, |app| app.open_selected());
     take(&mut window, 3.5);
     let explained = app(&window).run().results().find(|result| result.method == Method::MI);
     let explanation = explained.and_then(|result| result.explanation.clone()).expect("explained");
     let best = explanation.best().expect("something helped").args.clone();
-    send(&mut window, Command::Try(best));
+    send(&mut window, |app| app.app_state_mut().try_again(&best));
     finish(&mut window);
-    send(&mut window, Command::SelectMethod(Method::MI));
+    send(&mut window, |app| app.app_state_mut().select_method(Method::MI));
     take(&mut window, 3.5);
     let mut results = app(&window).run().results();
     let result = results.find(|result| result.method == Method::MI);

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use posescope::app::{Command, Results, Setup, Tab};
+use posescope::app::{Results, Setup, Tab};
 use posescope::localize::QueryResult;
 use posescope::measure::{Field, measure, read_rows};
 use posescope::method::Method;
@@ -58,7 +58,7 @@ fn the_terminal_and_the_window_write_the_same_numbers_under_the_same_names() {
     setup.task.scene = folder;
     setup.task.protocol.methods = vec![Method::FB];
     let mut window = finished(setup);
-    send(&mut window, Command::ShowTab(Tab::Numbers));
+    send(&mut window, |app| app.app_state_mut().show_tab(Tab::Numbers));
     let result = &results(&window)[0];
     for name in ["error", "rotation"] {
         let text = Field::find(name).expect("a field").text(result);
@@ -94,7 +94,7 @@ fn the_window_counts_the_failures_that_the_run_counts() {
         Setup { offered: results.keys().copied().filter(|query| *query < 3).collect(), ..setup() };
     let mut window = window_with_results(setup, results);
     run_until_idle(&mut window);
-    send(&mut window, Command::Maximize(Some("queries")));
+    send(&mut window, |app| app.app_state_mut().show_alone(Some("queries")));
     assert!(is_said(&window, &format!("{failed} of 6 wrong")));
 }
 

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use egui::{Key, Modifiers};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
-use posescope::app::{App, AppState, Command, CompareMode, KnownResults, Results, Setup, Tab};
+use posescope::app::{App, AppState, CompareMode, KnownResults, Results, SaveTarget, Setup, Tab};
 use posescope::event::{Event, Stage};
 use posescope::localize::{Localizer, NoObserver, QueryResult, Request};
 use posescope::method::Method;
@@ -82,9 +82,9 @@ pub fn app<'a>(window: &'a Harness<'_, App>) -> &'a AppState {
     window.state().app_state()
 }
 
-/// Sends a command; it is obeyed in the next frame and drawn in that or the one behind it.
-pub fn send(window: &mut Harness<'_, App>, command: Command) {
-    window.state_mut().send(command);
+/// Does what a key or a view would do; it is drawn in the next frame or the one after it.
+pub fn send(window: &mut Harness<'_, App>, command: impl FnOnce(&mut App)) {
+    command(window.state_mut());
     window.run_steps(3);
 }
 
@@ -184,7 +184,7 @@ fn looking_back_computes_nothing_and_every_moment_can_be_drawn() {
     let mut window = finished(setup());
     let last = app(&window).run().len() - 1;
     for cursor in (0..=last).step_by(7).chain([last]) {
-        send(&mut window, Command::MoveCursor(cursor));
+        send(&mut window, |app| app.app_state_mut().move_cursor(cursor));
         assert_eq!(app(&window).cursor(), cursor);
     }
     assert_eq!(app(&window).run().len(), last + 1);
@@ -270,17 +270,15 @@ fn a_wrong_breakpoint_is_refused_with_what_there_is() {
     let mut window = window(setup());
     run_until_idle(&mut window);
     let wrong = vec!["inlers < 3".to_owned()];
-    send(&mut window, Command::SetBreakpoints(wrong));
+    send(&mut window, |app| app.app_state_mut().set_breakpoints(wrong));
     assert!(is_said(&window, "`inlers` is not one of"));
 }
 
 #[test]
 fn a_changed_parameter_runs_again_only_what_depends_on_it_and_keeps_the_place() {
     let mut window = finished(setup());
-    send(&mut window, Command::SelectMethod(Method::MI));
-    window
-        .state_mut()
-        .send(Command::SetParam { key: "grid.yaw_step".to_owned(), value: "2".to_owned() });
+    send(&mut window, |app| app.app_state_mut().select_method(Method::MI));
+    window.state_mut().app_state_mut().set_param("grid.yaw_step", "2");
     window.step();
     finish(&mut window);
     let state = app(&window);
@@ -304,17 +302,17 @@ fn a_changed_parameter_runs_again_only_what_depends_on_it_and_keeps_the_place() 
 fn two_settings_are_compared_and_their_differences_marked() {
     let mut window = finished(setup());
     press(&mut window, Modifiers::NONE, Key::P);
-    window.state_mut().send(Command::SetParam { key: "mi.bins".to_owned(), value: "8".to_owned() });
+    window.state_mut().app_state_mut().set_param("mi.bins", "8");
     window.step();
     run_until_idle(&mut window);
-    send(&mut window, Command::SelectMethod(Method::MI));
-    send(&mut window, Command::ShowTab(Tab::Numbers));
+    send(&mut window, |app| app.app_state_mut().select_method(Method::MI));
+    send(&mut window, |app| app.app_state_mut().show_tab(Tab::Numbers));
     assert!(is_said(&window, "mi.bins=8"));
     press(&mut window, Modifiers::NONE, Key::X);
     assert_eq!(app(&window).options.compare_mode, CompareMode::Kept);
     press(&mut window, Modifiers::NONE, Key::X);
     assert_eq!(app(&window).options.compare_mode, CompareMode::Present);
-    window.state_mut().send(Command::ShowView("parameters"));
+    window.state_mut().app_state_mut().show_view("parameters");
     press(&mut window, Modifiers::NONE, Key::D);
     assert!(window.query_all_by_label("bins").next().is_some());
     // What is equal in both is not listed.
@@ -326,7 +324,7 @@ fn the_next_failure_is_found_once_all_queries_were_run() {
     let mut window = finished(setup());
     press(&mut window, Modifiers::NONE, Key::N);
     assert_eq!(app(&window).setup.query, 1);
-    send(&mut window, Command::RunAllQueries);
+    send(&mut window, |app| app.act("Run all queries, or stop"));
     wait(&mut window, |app| app.app_state().results.len() == 3);
     press(&mut window, Modifiers::NONE, Key::N);
     assert_eq!(app(&window).setup.query, GREY);
@@ -352,9 +350,9 @@ fn the_run_over_all_queries_and_a_run_with_old_settings_stop_soon() {
     // Every worker has its handles on the scene.
     let alone = Arc::strong_count(&scene);
     let is_alone = |_: &App| Arc::strong_count(&scene) <= alone;
-    let mut stop_by = |command: Command| {
+    let mut stop_by = |command: &dyn Fn(&mut App)| {
         let begun = Instant::now();
-        window.state_mut().send(command);
+        command(window.state_mut());
         window.step();
         assert_eq!(app(&window).queries.progress(), None);
         wait(&mut window, is_alone);
@@ -363,16 +361,16 @@ fn the_run_over_all_queries_and_a_run_with_old_settings_stop_soon() {
         while running.elapsed() < Duration::from_millis(200) {
             window.step();
         }
-        window.state_mut().send(Command::RunAllQueries);
+        window.state_mut().act("Run all queries, or stop");
         window.step();
         assert_eq!(app(&window).queries.progress(), Some((0, 3)));
         wait(&mut window, |app| !is_alone(app));
     };
     // The first time there is nothing to stop but the session, which waits at its first event.
-    stop_by(Command::SetSeed(8));
-    stop_by(Command::RunAllQueries);
-    stop_by(Command::SetParam { key: "grid.yaw_step".to_owned(), value: "2".to_owned() });
-    stop_by(Command::SetReferences(vec![2]));
+    stop_by(&|app| app.app_state_mut().set_seed(8));
+    stop_by(&|app| app.act("Run all queries, or stop"));
+    stop_by(&|app| app.app_state_mut().set_param("grid.yaw_step", "2"));
+    stop_by(&|app| app.app_state_mut().set_references(vec![2]));
     assert!(is_said(&window, "its settings were changed"));
 }
 
@@ -381,17 +379,17 @@ fn what_goes_wrong_is_said_and_the_window_lives_on() {
     let mut setup = setup();
     setup.offered.push(UNREADABLE);
     let mut window = finished(setup);
-    window.state_mut().send(Command::SelectQuery(UNREADABLE));
+    window.state_mut().app_state_mut().select_query(UNREADABLE);
     window.step();
     assert!(matches!(run_until_idle(&mut window), RunState::Broken(_)));
     assert!(is_said(&window, "000004"));
     // Frame 1 has no cloud, and the scene of this test panics when it is asked for it.
-    window.state_mut().send(Command::SelectQuery(1));
-    window.state_mut().send(Command::SetReferences(vec![1]));
+    window.state_mut().app_state_mut().select_query(1);
+    window.state_mut().app_state_mut().set_references(vec![1]);
     window.step();
     assert!(matches!(run_until_idle(&mut window), RunState::Broken(_)));
     assert!(is_said(&window, "internal error"));
-    window.state_mut().send(Command::SetReferences(vec![0]));
+    window.state_mut().app_state_mut().set_references(vec![0]);
     window.step();
     finish(&mut window);
 }
@@ -401,19 +399,17 @@ fn a_session_is_saved_and_restored() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("session.json");
     let mut window = finished(setup());
-    window
-        .state_mut()
-        .send(Command::SetParam { key: "fb.ratio".to_owned(), value: "0.8".to_owned() });
+    window.state_mut().app_state_mut().set_param("fb.ratio", "0.8");
     window.step();
     run_until_idle(&mut window);
-    window.state_mut().send(Command::MoveCursor(40));
-    window.state_mut().send(Command::SaveSession(path.clone()));
+    window.state_mut().app_state_mut().move_cursor(40);
+    window.state_mut().save(SaveTarget::Session, path.clone());
     window.step();
-    window.state_mut().send(Command::ResetParams);
-    window.state_mut().send(Command::SelectQuery(2));
+    window.state_mut().app_state_mut().reset_params();
+    window.state_mut().app_state_mut().select_query(2);
     window.step();
     run_until_idle(&mut window);
-    window.state_mut().send(Command::RestoreSession(path.clone()));
+    window.state_mut().save(SaveTarget::Restored, path.clone());
     window.step();
     run_until_idle(&mut window);
     let state = app(&window);
@@ -421,7 +417,7 @@ fn a_session_is_saved_and_restored() {
     assert_eq!(state.setup.task.params.changes(), ["fb.ratio=0.8"]);
     assert_eq!(state.cursor(), 40);
     std::fs::write(&path, "{}").expect("writable");
-    send(&mut window, Command::RestoreSession(path));
+    send(&mut window, |app| app.save(SaveTarget::Restored, path));
     assert!(is_said(&window, "session.json"));
 }
 
@@ -432,14 +428,13 @@ fn a_restored_session_takes_no_frame_of_another_scene_for_its_own() {
     let scene = folder.to_str().expect("a plain path");
     let path = sequence.path().join("session.json");
     let mut window = finished(setup());
-    let save = Command::SaveSession(path.clone());
-    window.state_mut().send(save);
+    window.state_mut().save(SaveTarget::Session, path.clone());
     window.step();
     let saved = std::fs::read_to_string(&path).expect("saved");
     let elsewhere = saved.replace("\"walls\"", &format!("{scene:?}"));
     assert_ne!(saved, elsewhere);
     std::fs::write(&path, elsewhere).expect("writable");
-    window.state_mut().send(Command::RestoreSession(path));
+    window.state_mut().save(SaveTarget::Restored, path);
     window.step();
     finish(&mut window);
     let photo = scene::open(scene, None).and_then(|scene| scene.photo(1));
@@ -459,7 +454,7 @@ fn what_is_wrong_in_a_session_is_told_with_its_line() {
     setup.task.params.assign("fb.ratio=0.75").expect("a value");
     setup.task.breakpoints = vec!["inliers < 3".parse().expect("a breakpoint")];
     let mut window = finished(setup);
-    window.state_mut().send(Command::SaveSession(path.clone()));
+    window.state_mut().save(SaveTarget::Session, path.clone());
     window.step();
     let good = std::fs::read_to_string(&path).expect("just saved");
     for (from, to, words) in [
@@ -476,8 +471,7 @@ fn what_is_wrong_in_a_session_is_told_with_its_line() {
         let at = bad.find(to).expect("replaced");
         let line = bad[..at].matches('\n').count() + 1;
         std::fs::write(&path, &bad).expect("writable");
-        let restore = Command::RestoreSession(path.clone());
-        send(&mut window, restore);
+        send(&mut window, |app| app.save(SaveTarget::Restored, path.clone()));
         // The schema is told without a line: it is about the whole file.
         let place = match from {
             "session/4" => "session.json: ".to_owned(),
@@ -504,10 +498,10 @@ fn a_session_keeps_the_format_and_the_index() {
     setup.task.protocol.index = vec!["an.index".into()];
     let path = sequence.path().join("session.json");
     let mut there = finished(setup);
-    there.state_mut().send(Command::SaveSession(path.clone()));
+    there.state_mut().save(SaveTarget::Session, path.clone());
     there.step();
     let mut here = finished(self::setup());
-    here.state_mut().send(Command::RestoreSession(path.clone()));
+    here.state_mut().save(SaveTarget::Restored, path.clone());
     here.step();
     run_until_idle(&mut here);
     let restored = &here.state().app_state().setup;
@@ -517,7 +511,7 @@ fn a_session_keeps_the_format_and_the_index() {
     // A format that does not fit is refused as it would be on the command line.
     let saved = std::fs::read_to_string(&path).expect("saved");
     std::fs::write(&path, saved.replace("\"kitti\"", "\"rosbag\"")).expect("writable");
-    here.state_mut().send(Command::RestoreSession(path));
+    here.state_mut().save(SaveTarget::Restored, path);
     here.step();
     here.step();
     assert!(is_said(&here, "rosbag"));
@@ -528,7 +522,7 @@ fn the_run_is_saved_as_a_recording_and_its_command_line_is_copied() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("run.rrd");
     let mut window = finished(setup());
-    send(&mut window, Command::SaveRecording(path.clone()));
+    send(&mut window, |app| app.save(SaveTarget::Recording, path.clone()));
     assert!(path.metadata().expect("written").len() > 10_000);
     assert_eq!(
         app(&window).setup.command_line(),
@@ -584,8 +578,8 @@ fn a_method_beyond_the_paper_has_its_place_in_every_view() {
     asked.task.protocol.methods = vec!["nid".parse().expect("is registered"), Method::FB];
     let mut window = finished(asked);
     for view in posescope::app::views::ALL {
-        send(&mut window, Command::Maximize(Some(view.name)));
+        send(&mut window, |app| app.app_state_mut().show_alone(Some(view.name)));
     }
-    send(&mut window, Command::Maximize(None));
+    send(&mut window, |app| app.app_state_mut().show_alone(None));
     assert!(is_said(&window, "NID"));
 }

@@ -5,7 +5,7 @@ use egui::epaint::ClippedShape;
 use egui::{Color32, Key, Modifiers, Pos2, Rect, Shape, TextureId};
 use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
-use posescope::app::{App, Command, Setup, views};
+use posescope::app::{App, Setup, views};
 use posescope::method::Method;
 use posescope::session::RunMode;
 
@@ -23,7 +23,7 @@ fn finished(size: [f32; 2], pixels_per_point: f32) -> Harness<'static, App> {
         .with_pixels_per_point(pixels_per_point)
         .build_eframe(|creation| App::new(creation, setup));
     finish(&mut window);
-    window.state_mut().send(Command::SelectMethod(Method::MI));
+    window.state_mut().app_state_mut().select_method(Method::MI);
     settle(&mut window);
     window
 }
@@ -176,11 +176,11 @@ fn everywhere(window: &mut Harness<'_, App>, mut see: impl FnMut(&Harness<'_, Ap
     }
     press(window, Modifiers::NONE, Key::F2);
     for entry in views::ALL {
-        window.state_mut().send(Command::Maximize(Some(entry.name)));
+        window.state_mut().app_state_mut().show_alone(Some(entry.name));
         settle(window);
         see(window, entry.name);
     }
-    window.state_mut().send(Command::Maximize(None));
+    window.state_mut().app_state_mut().show_alone(None);
     settle(window);
 }
 
@@ -266,7 +266,7 @@ fn all_buttons_of_the_bars_are_in_the_window() {
 #[test]
 fn a_long_line_of_the_log_is_broken_and_none_is_cut() {
     let mut window = finished([820.0, 520.0], 1.0);
-    window.state_mut().send(Command::Maximize(Some("log")));
+    window.state_mut().app_state_mut().show_alone(Some("log"));
     settle(&mut window);
     let shapes = &window.output().shapes;
     let log: Vec<Drawn> = texts(shapes);
@@ -279,7 +279,7 @@ fn a_long_line_of_the_log_is_broken_and_none_is_cut() {
 #[test]
 fn the_decision_at_the_cursor_stays_in_sight_when_the_window_shrinks() {
     let mut window = finished([820.0, 950.0], 1.0);
-    window.state_mut().send(Command::Maximize(Some("log")));
+    window.state_mut().app_state_mut().show_alone(Some("log"));
     settle(&mut window);
     let found = results(&window);
     let found = found.iter().find(|result| result.method == Method::MI);
@@ -309,7 +309,7 @@ fn empty_views_say_what_to_do() {
         ("charts", "No results match. Run all queries"),
         ("fusion", "reference"),
     ] {
-        waiting.state_mut().send(Command::Maximize(Some(view)));
+        waiting.state_mut().app_state_mut().show_alone(Some(view));
         waiting.run_steps(3);
         assert!(is_said(&waiting, words), "{view}");
         // Nothing has failed before anything ran.

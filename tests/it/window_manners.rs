@@ -3,7 +3,7 @@
 use egui::{Key, Modifiers};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
-use posescope::app::{ACTIONS, App, Command};
+use posescope::app::{ACTIONS, App};
 use posescope::geometry::Pose;
 
 use crate::window::{app, is_said, press, run_until_idle, send, setup, wait, window};
@@ -35,7 +35,7 @@ fn the_list_of_keys_opens_with_a_question_mark_and_closes_with_escape() {
 fn the_list_of_keys_is_seen_whole() {
     let mut window = window(setup());
     run_until_idle(&mut window);
-    window.state_mut().send(Command::Help);
+    window.state_mut().act("All keys");
     window.run_steps(4);
     let seen = window.ctx.content_rect();
     for shortcut in ACTIONS.iter().filter(|action| !action.keys.is_empty()) {
@@ -55,7 +55,9 @@ fn a_menu_closes_with_escape_and_the_camera_stays() {
     let mut window = window(setup());
     run_until_idle(&mut window);
     let pose = Pose::identity();
-    send(&mut window, Command::TakeCamera(Some(pose)));
+    send(&mut window, |app| {
+        app.app_state_mut().camera = Some(pose);
+    });
     window.get_by_label("Menu").click();
     window.run_steps(2);
     assert!(is_said(&window, "Window and files"));
@@ -77,7 +79,7 @@ fn what_is_told_goes_by_itself_and_what_went_wrong_stays() {
     assert!(is_said(&window, "MI has not begun yet"));
     // The bar does not say that anything works while the run is paused.
     assert!(!is_said(&window, "at work"));
-    window.state_mut().send(Command::SetBreakpoints(vec!["nonsense".to_owned()]));
+    window.state_mut().app_state_mut().set_breakpoints(vec!["nonsense".to_owned()]);
     // A step is a quarter of a second.
     window.run_steps(60);
     assert!(!is_said(&window, "MI has not begun yet"));
@@ -94,7 +96,7 @@ fn no_query_of_all_is_localised_against_itself() {
     assert_eq!(reference, 0);
     let mut window = window(setup);
     run_until_idle(&mut window);
-    window.state_mut().send(Command::RunAllQueries);
+    window.state_mut().act("Run all queries, or stop");
     wait(&mut window, |app| {
         app.app_state().queries.progress().is_none() && !app.app_state().results.is_empty()
     });

@@ -1,14 +1,15 @@
 //! The batch: what many queries came to, all results in a table, and the proof of the selected one.
 
 use egui::{
-    Align2, Color32, CornerRadius, Rect, RichText, Role, Sense, Ui, UiBuilder, WidgetInfo, pos2,
-    vec2,
+    Align2, Color32, CornerRadius, Painter, Rect, RichText, Role, Sense, Ui, UiBuilder, WidgetInfo,
+    pos2, vec2,
 };
 
 use super::inspector::capital;
-use super::verdicts::split;
+use super::verdicts::{split, told};
 use super::{Panes, canvas, proof::elided};
-use crate::app::command::{Command, Queue};
+use crate::app::App;
+use crate::app::command::Queue;
 use crate::app::state::AppState;
 use crate::app::theme;
 use crate::diagnosis::Grade;
@@ -21,7 +22,7 @@ const BAR: f32 = 22.0;
 /// Bars and causes that are drawn, at most.
 const MOST: usize = 8;
 
-pub(in crate::app) fn left(ui: &mut Ui, state: &AppState, commands: &Queue, panes: &mut Panes) {
+pub(crate) fn left(ui: &mut Ui, state: &AppState, commands: &Queue, panes: &mut Panes) {
     let results: Vec<QueryResult> = state
         .results
         .values()
@@ -39,7 +40,7 @@ pub(in crate::app) fn left(ui: &mut Ui, state: &AppState, commands: &Queue, pane
             None => ("Run all".to_owned(), "Localise all queries, to know which fail"),
         };
         if ui.button(text).on_hover_text(help).clicked() {
-            commands.send(Command::RunAllQueries);
+            commands.send(|app| app.act("Run all queries, or stop"));
         }
     });
     ui.add_space(4.0);
@@ -56,18 +57,11 @@ pub(in crate::app) fn left(ui: &mut Ui, state: &AppState, commands: &Queue, pane
 fn draw_bars(ui: &Ui, overview: &Overview, area: Rect) {
     const NAME: f32 = 64.0;
     for (row, bar) in overview.bars.iter().take(MOST).enumerate() {
-        let top = area.top() + row as f32 * BAR;
-        let line = Rect::from_min_size(pos2(area.left(), top), vec2(area.width(), BAR - 4.0));
         let words = Grade::ALL.iter().filter(|grade| bar.count(**grade) > 0);
         let words: Vec<String> =
             words.map(|grade| format!("{} {grade}", bar.count(*grade))).collect();
         let spoken = format!("{}: {}", bar.name, words.join(", "));
-        let response = ui.interact(line, ui.scope_id().with(("bar", row)), Sense::hover());
-        response.widget_info(|| WidgetInfo::labeled(Role::Image, true, &spoken));
-        let painter = ui.painter_at(line);
-        let text = ui.visuals().text_color();
-        let name = elided(ui, &bar.name, text, NAME - 4.0);
-        painter.galley(pos2(line.left(), line.center().y - name.size().y / 2.0), name, text);
+        let (painter, line) = bar_row(ui, area, row, spoken, &bar.name, NAME - 4.0);
         let width = (line.width() - NAME) / bar.total().max(1) as f32;
         let mut left = line.left() + NAME;
         for grade in Grade::ALL {
@@ -81,23 +75,40 @@ fn draw_bars(ui: &Ui, overview: &Overview, area: Rect) {
             );
             let color = theme::rgb(palette::dark(palette::grade(grade)));
             painter.rect_filled(part, CornerRadius::ZERO, color);
-            let galley = painter.layout_no_wrap(
-                format!("{count} {grade}"),
-                theme::caption(),
-                Color32::WHITE,
-            );
+            let galley =
+                painter.layout_no_wrap(format!("{count} {grade}"), theme::CAPTION, Color32::WHITE);
             let galley = if galley.size().x + 6.0 <= part.width() {
                 galley
             } else {
-                painter.layout_no_wrap(count.to_string(), theme::caption(), Color32::WHITE)
+                painter.layout_no_wrap(count.to_string(), theme::CAPTION, Color32::WHITE)
             };
             if galley.size().x + 4.0 <= part.width() {
                 painter.galley(part.center() - galley.size() / 2.0, galley, Color32::WHITE);
             }
             left = part.right();
         }
-        response.on_hover_text(spoken);
     }
+}
+
+/// The place of a row with its name at the left, and what paints there. The whole row is said on hover.
+fn bar_row(
+    ui: &Ui,
+    area: Rect,
+    row: usize,
+    spoken: String,
+    name: &str,
+    width: f32,
+) -> (Painter, Rect) {
+    let top = area.top() + row as f32 * BAR;
+    let line = Rect::from_min_size(pos2(area.left(), top), vec2(area.width(), BAR - 4.0));
+    let id = ui.scope_id().with((area.left().to_bits(), row));
+    let response = ui.interact(line, id, Sense::hover());
+    response.widget_info(|| WidgetInfo::labeled(Role::Image, true, &spoken));
+    response.on_hover_text(spoken);
+    let (painter, text) = (ui.painter_at(line), ui.visuals().text_color());
+    let name = elided(ui, name, text, width);
+    painter.galley(pos2(line.left(), line.center().y - name.size().y / 2.0), name, text);
+    (painter, line)
 }
 
 /// The causes of all failures, in words.
@@ -106,16 +117,9 @@ fn draw_causes(ui: &Ui, overview: &Overview, area: Rect) {
     let most = overview.causes.first().map_or(1, |(_, times)| *times);
     let names = area.width() * 0.62;
     for (row, (code, times)) in overview.causes.iter().take(MOST).enumerate() {
-        let top = area.top() + row as f32 * BAR;
-        let line = Rect::from_min_size(pos2(area.left(), top), vec2(area.width(), BAR - 4.0));
         let title = capital(code.title());
         let spoken = format!("{title} ({code}): {times} results");
-        let response = ui.interact(line, ui.scope_id().with(("cause", row)), Sense::hover());
-        response.widget_info(|| WidgetInfo::labeled(Role::Image, true, &spoken));
-        let painter = ui.painter_at(line);
-        let text = ui.visuals().text_color();
-        let name = elided(ui, &title, text, names - 8.0);
-        painter.galley(pos2(line.left(), line.center().y - name.size().y / 2.0), name, text);
+        let (painter, line) = bar_row(ui, area, row, spoken, &title, names - 8.0);
         let longest = area.width() - names - COUNT;
         let bar = Rect::from_min_size(
             pos2(line.left() + names, line.top() + 2.0),
@@ -126,33 +130,26 @@ fn draw_causes(ui: &Ui, overview: &Overview, area: Rect) {
             bar.right_center() + vec2(6.0, 0.0),
             Align2::LEFT_CENTER,
             times,
-            theme::caption(),
-            text,
+            theme::CAPTION,
+            ui.visuals().text_color(),
         );
-        response.on_hover_text(spoken);
     }
 }
 
 /// The selected result: its name, its sentence, its proof, and one plot below.
-pub(in crate::app) fn right(ui: &mut Ui, state: &AppState, commands: &Queue, panes: &mut Panes) {
+pub(crate) fn right(ui: &mut Ui, state: &AppState, commands: &Queue, panes: &mut Panes) {
     let area = ui.available_rect_before_wrap();
     let (upper, lower) = area.split_top_bottom_at_fraction(0.56);
     ui.scope_builder(UiBuilder::new().max_rect(upper), |ui| {
         ui.shrink_clip_rect(upper);
         let span = state.shown_span();
-        let result =
-            span.filter(|span| state.has_come(span)).and_then(|span| state.shown_result(span));
-        match &result {
+        match &span.and_then(|span| state.outcome(span)) {
             Some(result) => {
                 let error = result
                     .error
                     .map_or(String::new(), |error| format!(" · {} off", error.translation()));
                 ui.strong(format!("{} · {}{error}", result.query, result.method.label()));
-                let text = match (result.diagnosis.first(), &result.reason) {
-                    (Some(found), _) => found.text.clone(),
-                    (None, Some(reason)) => reason.text.clone(),
-                    (None, None) => result.evidence(),
-                };
+                let text = told(result);
                 ui.add(egui::Label::new(split(&text).0).truncate()).on_hover_text(&text);
             }
             None => {
@@ -162,7 +159,7 @@ pub(in crate::app) fn right(ui: &mut Ui, state: &AppState, commands: &Queue, pan
         ui.horizontal(|ui| {
             let open = ui.button("Open in Inspect");
             if open.on_hover_text("Show this query at its proof picture (Enter)").clicked() {
-                commands.send(Command::OpenSelected);
+                commands.send(App::open_selected);
             }
         });
         match span.map(|span| span.part) {

@@ -3,7 +3,7 @@
 use egui::{Rect, RichText, Sense, Ui, UiBuilder, vec2};
 
 use super::{Panes, proof, stage};
-use crate::app::command::{Command, Queue};
+use crate::app::command::Queue;
 use crate::app::state::AppState;
 use crate::app::theme;
 use crate::app::views;
@@ -15,7 +15,7 @@ const GAP: f32 = 8.0;
 const TITLE: f32 = 18.0;
 
 /// The views on the canvas: the large one first.
-pub(in crate::app) fn scene(state: &AppState) -> Vec<&'static str> {
+pub(crate) fn scene(state: &AppState) -> Vec<&'static str> {
     let here = state.shown_stage();
     let of_stage = stage::scene(here);
     let mut views: Vec<&'static str> = match &state.options.presented {
@@ -32,13 +32,7 @@ pub(in crate::app) fn scene(state: &AppState) -> Vec<&'static str> {
     views
 }
 
-pub(in crate::app) fn ui(
-    ui: &mut Ui,
-    state: &AppState,
-    commands: &Queue,
-    panes: &mut Panes,
-    most: usize,
-) {
+pub(crate) fn ui(ui: &mut Ui, state: &AppState, commands: &Queue, panes: &mut Panes, most: usize) {
     if state.options.shows_why && !state.is_presenting() {
         why(ui, state, panes);
         return;
@@ -90,11 +84,11 @@ fn small_title(ui: &mut Ui, state: &AppState, commands: &Queue, name: &'static s
     } else {
         ui.visuals().weak_text_color()
     };
-    let galley = ui.painter().layout_no_wrap(title.to_owned(), theme::caption(), color);
+    let galley = ui.painter().layout_no_wrap(title.to_owned(), theme::CAPTION, color);
     ui.painter().galley(rect.min + vec2(2.0, 2.0), galley, color);
     if response.on_hover_text(spoken).clicked() {
-        let large = state.shown_stage();
-        commands.send(Command::Enlarge(large, name));
+        let large = Some((state.shown_stage(), name));
+        commands.send(move |app| app.state.options.large = large);
     }
 }
 
@@ -120,11 +114,11 @@ pub(super) fn why(ui: &mut Ui, state: &AppState, panes: &mut Panes) {
 }
 
 /// A view alone, with a way back.
-pub(in crate::app) fn alone(ui: &mut Ui, state: &AppState, commands: &Queue, panes: &mut Panes) {
+pub(crate) fn alone(ui: &mut Ui, state: &AppState, commands: &Queue, panes: &mut Panes) {
     ui.horizontal(|ui| {
         let button = ui.button(RichText::new("All panels").small());
         if button.on_hover_text("Back to the window with all its parts (M)").clicked() {
-            commands.send(Command::Maximize(None));
+            commands.send(|app| app.state.show_alone(None));
         }
     });
     match state.options.alone {

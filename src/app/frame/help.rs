@@ -7,7 +7,7 @@ use crate::app::command::Queue;
 use crate::app::state::AppState;
 
 /// The list of keys, in two columns.
-pub(in crate::app) fn keys_ui(ctx: &egui::Context, open: &mut bool) {
+pub(crate) fn keys_ui(ctx: &egui::Context, open: &mut bool) {
     /// What the title and the margins take \[points\].
     const AROUND: f32 = 90.0;
     let of = |group: Group| {
@@ -54,7 +54,7 @@ pub(in crate::app) fn keys_ui(ctx: &egui::Context, open: &mut bool) {
 
 /// The search for an action: what was typed, and which of the matches is chosen.
 #[derive(Default)]
-pub(in crate::app) struct ActionSearch {
+pub(crate) struct ActionSearch {
     typed: String,
     chosen: usize,
     has_focus: bool,
@@ -62,12 +62,7 @@ pub(in crate::app) struct ActionSearch {
 
 impl ActionSearch {
     /// Draws the search; whether it is over.
-    pub(in crate::app) fn ui(
-        &mut self,
-        ctx: &egui::Context,
-        state: &AppState,
-        commands: &Queue,
-    ) -> bool {
+    pub(crate) fn ui(&mut self, ctx: &egui::Context, state: &AppState, commands: &Queue) -> bool {
         let modal = Modal::new(egui::Id::unique("action search"));
         let answer = modal.show(ctx, |ui| self.content(ui, state, commands));
         answer.inner || answer.should_close()
@@ -119,7 +114,7 @@ impl ActionSearch {
             ui.weak("No action has these words. Try one of them alone.");
         }
         if let Some(action) = taken {
-            commands.send(action.command.clone());
+            commands.send(action.run);
         }
         taken.is_some()
     }

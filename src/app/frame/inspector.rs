@@ -9,15 +9,15 @@ use serde_json::Value;
 use super::Panes;
 use super::stage::three_digits;
 use super::storyboard::part_name;
-use super::verdicts::{short, split};
-use crate::app::command::{Command, Queue};
+use super::verdicts::{short, split, told};
+use crate::app::command::Queue;
 use crate::app::state::AppState;
 use crate::app::theme;
 use crate::app::view_options::Tab;
 use crate::diagnosis::{Code, Confidence, Diagnosis, Grade, confidence};
 use crate::localize::{Helped, QueryResult};
 
-pub(in crate::app) fn ui(ui: &mut Ui, state: &AppState, commands: &Queue, panes: &mut Panes) {
+pub(crate) fn ui(ui: &mut Ui, state: &AppState, commands: &Queue, panes: &mut Panes) {
     let tab = state.options.tab;
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 2.0;
@@ -25,7 +25,7 @@ pub(in crate::app) fn ui(ui: &mut Ui, state: &AppState, commands: &Queue, panes:
             let text = RichText::new(title).size(12.5);
             let button = Button::selectable(tab == other, text).frame_when_inactive(false);
             if ui.add(button).clicked() {
-                commands.send(Command::ShowTab(other));
+                commands.send(move |app| app.state.show_tab(other));
             }
         }
     });
@@ -49,7 +49,7 @@ fn why(ui: &mut Ui, state: &AppState, commands: &Queue) {
         ui.weak("Nothing has run yet. Space runs the query.");
         return;
     };
-    let Some(result) = state.shown_result(span).filter(|_| state.has_come(span)) else {
+    let Some(result) = state.outcome(span) else {
         ui.weak(format!("{} has no result yet.", part_name(span.part)));
         return;
     };
@@ -79,8 +79,7 @@ fn why(ui: &mut Ui, state: &AppState, commands: &Queue) {
         }
         None => {
             ui.strong(format!("{}: {}", part_name(span.part), result.grade));
-            let reason = result.reason.as_ref().map(|reason| reason.text.clone());
-            ui.label(reason.unwrap_or_else(|| result.evidence()));
+            ui.label(told(&result));
         }
     }
     changed(ui, &state.shown_run().params.changes());
@@ -224,7 +223,7 @@ fn readable(code: Code, key: &str) -> (String, &'static str) {
 }
 
 /// With a capital letter first.
-pub(in crate::app) fn capital(text: &str) -> String {
+pub(crate) fn capital(text: &str) -> String {
     let mut letters = text.chars();
     match letters.next() {
         Some(first) => first.to_uppercase().chain(letters).collect(),
@@ -252,7 +251,7 @@ fn helped(
                 .button("Try what would help")
                 .on_hover_text("Run the query again in other ways (E)");
             if button.clicked() {
-                commands.send(Command::Explain);
+                commands.send(|app| app.state.switch_explaining());
             }
         }
         return;
@@ -297,7 +296,8 @@ fn remedy(ui: &mut Ui, commands: &Queue, helped: &Helped) {
     let spoken = format!("Run with {args}");
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, &spoken));
     if response.on_hover_text("Keeps this run as A and runs the query with this").clicked() {
-        commands.send(Command::Try(helped.args.clone()));
+        let args = helped.args.clone();
+        commands.send(move |app| app.state.try_again(&args));
     }
 }
 

@@ -2,12 +2,12 @@
 
 use egui::RichText;
 
-use crate::app::command::{Command, Queue};
+use crate::app::command::Queue;
 use crate::app::state::AppState;
 use crate::app::theme;
 
 /// Draws the notes in the lower right corner.
-pub(in crate::app) fn ui(ctx: &egui::Context, state: &AppState, commands: &Queue) {
+pub(crate) fn ui(ctx: &egui::Context, state: &AppState, commands: &Queue) {
     if state.notes.is_empty() {
         return;
     }
@@ -20,7 +20,7 @@ pub(in crate::app) fn ui(ctx: &egui::Context, state: &AppState, commands: &Queue
             for (index, note) in state.notes.iter().enumerate() {
                 ui.horizontal_wrapped(|ui| {
                     if ui.small_button("×").on_hover_text("Dismiss").clicked() {
-                        commands.send(Command::Dismiss(index));
+                        commands.send(move |app| app.state.dismiss(index));
                     }
                     let text = RichText::new(&note.text);
                     ui.label(if note.is_error {

@@ -1,9 +1,13 @@
 //! A proof picture on the canvas.
 
-use egui::{Align2, Color32, Pos2, Rect, Role, Sense, Shape, Stroke, Ui, WidgetInfo, pos2, vec2};
+use egui::{
+    Align2, Color32, Pos2, Rect, Role, Sense, Shape, Stroke, TextureHandle, Ui, WidgetInfo, pos2,
+    vec2,
+};
 
 use crate::app::textures::{Textures, color_image};
 use crate::app::theme;
+use crate::app::views::legend::paint_mark;
 use crate::palette;
 use crate::proof::{
     ColorScale, MARK, Mark, Panel, Place, ProofPicture, Thing, free_corner, label_place, title_end,
@@ -45,6 +49,11 @@ pub(super) fn ui(
     ui.advance_cursor_after_rect(area);
 }
 
+/// The picture of a panel on the graphics card.
+pub(super) fn texture(ui: &Ui, textures: &Textures, panel: &Panel) -> TextureHandle {
+    textures.of(ui.ctx(), "proof", &panel.picture, |picture| color_image(&picture.clone().into()))
+}
+
 fn on_screen(area: Rect, place: &Place) -> Rect {
     let corner = area.min + vec2(place.left, place.top);
     Rect::from_min_size(corner, vec2(place.width, place.height))
@@ -55,9 +64,7 @@ fn draw(ui: &Ui, textures: &Textures, panel: &Panel, rect: Rect, title_end: f32)
     let title = pos2(rect.left(), rect.top() - 3.0);
     let galley = elided(ui, &panel.title, words, title_end - rect.left());
     ui.painter().galley(title - vec2(0.0, galley.size().y), galley, words);
-    let texture = textures.of(ui.ctx(), "proof", &panel.picture, |picture| {
-        color_image(&image::DynamicImage::ImageRgb8(picture.clone()))
-    });
+    let texture = texture(ui, textures, panel);
     let whole = Rect::from_min_max(Pos2::ZERO, pos2(1.0, 1.0));
     let painter = ui.painter_at(rect.expand(1.0).intersect(ui.clip_rect()));
     painter.image(texture.id(), rect, whole, Color32::WHITE);
@@ -68,37 +75,12 @@ fn draw(ui: &Ui, textures: &Textures, panel: &Panel, rect: Rect, title_end: f32)
         painter.add(Shape::line(points, Stroke::new(line.width, theme::rgb(line.color))));
     }
     for mark in &panel.marks {
-        draw_mark(&painter, mark.thing, at(mark.at));
+        paint_mark(&painter, mark.thing, at(mark.at), MARK);
     }
     let marks = || panel.marks.iter().map(|mark| (mark, at(mark.at)));
     let scale = panel.scale.as_ref();
     let taken = scale.map(|scale| color_scale(&painter, scale, rect, marks().map(|(_, at)| at)));
     labels(&painter, marks(), rect, taken);
-}
-
-/// Draws a mark in its shape and colour, with a dark edge.
-pub(in crate::app) fn draw_mark(painter: &egui::Painter, thing: Thing, at: Pos2) {
-    let color = theme::rgb(thing.color());
-    for stroke in [Stroke::new(5.0, Color32::BLACK), Stroke::new(2.5, color)] {
-        match thing {
-            Thing::Reference => {
-                painter.circle_stroke(at, MARK, stroke);
-            }
-            Thing::Truth => {
-                painter.hline(at.x - MARK..=at.x + MARK, at.y, stroke);
-                painter.vline(at.x, at.y - MARK..=at.y + MARK, stroke);
-            }
-            Thing::Result(_) => {
-                let corners =
-                    [vec2(0.0, -MARK), vec2(MARK, 0.0), vec2(0.0, MARK), vec2(-MARK, 0.0)];
-                painter.add(Shape::closed_line(corners.map(|to| at + to).to_vec(), stroke));
-            }
-            Thing::Dot(_) => {
-                painter.circle_stroke(at, 3.0, stroke);
-            }
-            Thing::Words => {}
-        }
-    }
 }
 
 /// Labels beside their marks, inside the panel, none upon another.
@@ -112,7 +94,7 @@ fn labels<'a>(
     let within = place_of(panel);
     let mut taken: Vec<Place> = taken.into_iter().map(place_of).collect();
     for (mark, at) in marks.filter(|(mark, _)| !mark.label.is_empty()) {
-        let galley = painter.layout_no_wrap(mark.label.clone(), theme::caption(), Color32::WHITE);
+        let galley = painter.layout_no_wrap(mark.label.clone(), theme::CAPTION, Color32::WHITE);
         let size = galley.size();
         if mark.thing == Thing::Words {
             painter.galley(at - vec2(0.0, size.y / 2.0), galley, Color32::WHITE);
@@ -144,7 +126,7 @@ fn color_scale(
     const BAR: egui::Vec2 = vec2(90.0, 12.0);
     const STEPS: usize = 45;
     let galley =
-        |words: &str| painter.layout_no_wrap(words.to_owned(), theme::caption(), Color32::WHITE);
+        |words: &str| painter.layout_no_wrap(words.to_owned(), theme::CAPTION, Color32::WHITE);
     let (dark, bright) = (galley(&scale.dark), galley(&scale.bright));
     let width = dark.size().x + bright.size().x + BAR.x + 20.0;
     let size = vec2(width, 18.0);
@@ -173,8 +155,7 @@ pub(super) fn elided(
     color: Color32,
     width: f32,
 ) -> std::sync::Arc<egui::Galley> {
-    let mut job =
-        egui::text::LayoutJob::simple_singleline(words.to_owned(), theme::caption(), color);
+    let mut job = egui::text::LayoutJob::simple_singleline(words.to_owned(), theme::CAPTION, color);
     job.wrap = egui::text::TextWrapping::truncate_at_width(width.max(1.0));
     ui.fonts_mut(|fonts| fonts.layout_job(job))
 }

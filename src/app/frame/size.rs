@@ -2,26 +2,26 @@
 
 /// How large the parts around the canvas are \[points\].
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(in crate::app) struct Sizes {
+pub(crate) struct Sizes {
     /// Height of the toolbar.
-    pub(in crate::app) toolbar: f32,
+    pub(crate) toolbar: f32,
     /// Height of the verdict bar.
-    pub(in crate::app) verdicts: f32,
+    pub(crate) verdicts: f32,
     /// Height of the storyboard.
-    pub(in crate::app) storyboard: f32,
+    pub(crate) storyboard: f32,
     /// Width of the list of queries.
-    pub(in crate::app) queries: f32,
+    pub(crate) queries: f32,
     /// Width of the inspector.
-    pub(in crate::app) inspector: f32,
+    pub(crate) inspector: f32,
     /// Height of the sentence of a lecture.
-    pub(in crate::app) sentence: f32,
+    pub(crate) sentence: f32,
     /// Whether the window is wide enough for the panels at the sides.
-    pub(in crate::app) has_sides: bool,
+    pub(crate) has_sides: bool,
 }
 
 impl Sizes {
     /// The sizes for a window of this size \[points\].
-    pub(in crate::app) fn of(window: egui::Vec2) -> Self {
+    pub(crate) fn of(window: egui::Vec2) -> Self {
         let is_large = window.x >= 1400.0 && window.y >= 860.0;
         Self {
             toolbar: if is_large { 42.0 } else { 38.0 },

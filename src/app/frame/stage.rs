@@ -98,7 +98,7 @@ fn number(stage: Stage, event: &Event) -> Option<String> {
 }
 
 /// A number with three digits that count.
-pub(in crate::app) fn three_digits(number: f64) -> String {
+pub(crate) fn three_digits(number: f64) -> String {
     match number.abs() {
         100.0.. => format!("{number:.0}"),
         10.0.. => format!("{number:.1}"),

@@ -7,9 +7,9 @@ use egui::{
     pos2, vec2,
 };
 
-use super::proof::elided;
+use super::proof::{self, elided};
 use super::stage;
-use crate::app::command::{Command, Queue};
+use crate::app::command::Queue;
 use crate::app::setup::Setup;
 use crate::app::state::AppState;
 use crate::app::theme;
@@ -37,7 +37,7 @@ struct Row<'a> {
 }
 
 /// The height that all rows of a setup take, with the line below them \[points\]. It is the same at every step.
-pub(in crate::app) fn height(setup: &Setup) -> f32 {
+pub(crate) fn height(setup: &Setup) -> f32 {
     let protocol = &setup.task.protocol;
     let fused = usize::from(!protocol.fusions.is_empty());
     let rows = protocol.methods.len() * (1 + fused) + usize::from(!protocol.is_by_hand());
@@ -45,7 +45,7 @@ pub(in crate::app) fn height(setup: &Setup) -> f32 {
 }
 
 /// Draws all rows and the line below them.
-pub(in crate::app) fn ui(ui: &mut Ui, state: &AppState, commands: &Queue) {
+pub(crate) fn ui(ui: &mut Ui, state: &AppState, commands: &Queue) {
     let area = ui.available_rect_before_wrap();
     let (above, line) = area.split_top_bottom_at_y(area.bottom() - SCRUB);
     let rows = rows(state);
@@ -116,7 +116,7 @@ fn draw(ui: &mut Ui, state: &AppState, commands: &Queue, row: &Row<'_>, size: eg
         };
         let response = cell.ui(ui, size);
         if response.clicked() {
-            commands.send(Command::MoveCursor(end));
+            commands.send(move |app| app.state.move_cursor(end));
         }
         let part = row.part;
         let stage = bar.stage;
@@ -134,21 +134,12 @@ fn why(
     size: egui::Vec2,
     is_selected: bool,
 ) {
-    let Some(span) = row.span.filter(|span| state.has_come(span)) else {
-        return;
-    };
-    let Some(result) = state.shown_result(span) else {
-        return;
-    };
-    if result.grade == Grade::Right {
-        return;
-    }
+    let Some(span) = row.span else { return };
+    let result = state.outcome(span).filter(|result| result.grade != Grade::Right);
+    let Some(result) = result else { return };
     let caption = if result.grade.is_failure() { "why" } else { "what decided" };
-    let picture = state.proof(span.part).map(|proof| {
-        let picture = &proof.large.picture;
-        let texture = state.textures.of(ui.ctx(), "proof", picture, |picture| {
-            crate::app::textures::color_image(&image::DynamicImage::ImageRgb8(picture.clone()))
-        });
+    let picture = state.proof(span.part).map(|picture| {
+        let texture = proof::texture(ui, &state.textures, &picture.large);
         (texture.id(), texture.size_vec2())
     });
     let cell = Cell {
@@ -160,7 +151,8 @@ fn why(
         is_pale: false,
     };
     if cell.ui(ui, size).clicked() {
-        commands.send(Command::ShowWhy(row.part));
+        let part = row.part;
+        commands.send(move |app| app.state.show_part(part, true));
     }
 }
 
@@ -183,7 +175,7 @@ fn stop_here(ui: &mut Ui, state: &AppState, commands: &Queue, part: Part, stage:
             }
             None => texts.push(breakpoint),
         }
-        commands.send(Command::SetBreakpoints(texts));
+        commands.send(|app| app.state.set_breakpoints(texts));
         ui.close();
     }
 }
@@ -235,7 +227,7 @@ impl Cell {
 }
 
 /// `MI`, `MI fusion`, `references`.
-pub(in crate::app) fn part_name(part: Part) -> String {
+pub(crate) fn part_name(part: Part) -> String {
     match part {
         Part::Retrieval => "references".to_owned(),
         Part::Reference(method, _) => method.label(),
@@ -254,8 +246,7 @@ fn name(ui: &mut Ui, state: &AppState, commands: &Queue, row: &Row<'_>, height: 
     let color = row.part.method().map_or(ui.visuals().text_color(), |method| {
         theme::text(ui.visuals(), theme::method(method))
     });
-    let result =
-        row.span.filter(|span| state.has_come(span)).and_then(|span| state.shown_result(span));
+    let result = row.span.and_then(|span| state.outcome(span));
     let (grade, grade_color) = match &result {
         Some(result) => {
             let error = result.error.map(|error| error.translation());
@@ -271,8 +262,8 @@ fn name(ui: &mut Ui, state: &AppState, commands: &Queue, row: &Row<'_>, height: 
     let left = rect.left() + 4.0;
     let (upper, lower) = (rect.center().y - 7.0, rect.center().y + 8.0);
     let name = part_name(row.part);
-    painter.text(pos2(left, upper), Align2::LEFT_CENTER, name, theme::body(), color);
-    let small = theme::caption();
+    painter.text(pos2(left, upper), Align2::LEFT_CENTER, name, theme::BODY, color);
+    let small = theme::CAPTION;
     let at =
         painter.text(pos2(left, lower), Align2::LEFT_CENTER, &grade, small.clone(), grade_color);
     let weak = ui.visuals().weak_text_color();
@@ -286,13 +277,13 @@ fn name(ui: &mut Ui, state: &AppState, commands: &Queue, row: &Row<'_>, height: 
 /// A click on a name shows the method; a second one its next reference.
 fn click(state: &AppState, commands: &Queue, row: &Row<'_>, references: usize) {
     let here = state.shown_span().map(|span| span.part);
-    match row.part {
+    let part = match row.part {
         Part::Reference(method, reference) if here == Some(row.part) && references > 1 => {
-            let next = Part::Reference(method, (reference + 1) % references);
-            commands.send(Command::ShowPart(next));
+            Part::Reference(method, (reference + 1) % references)
         }
-        part => commands.send(Command::ShowPart(part)),
-    }
+        part => part,
+    };
+    commands.send(move |app| app.state.show_outcome(part));
 }
 
 /// The line that moves the cursor inside the selected stage, and what the run is doing.
@@ -355,7 +346,7 @@ fn line(
         let share = ((pointer.x - inside.left()) / inside.width().max(1.0)).clamp(0.0, 1.0);
         let wanted = records.start + (share * last as f32).round() as usize;
         if wanted != cursor && !records.is_empty() {
-            commands.send(Command::MoveCursor(wanted));
+            commands.send(move |app| app.state.move_cursor(wanted));
         }
     }
     response.on_hover_text("Drag to move inside the stage (← →)");

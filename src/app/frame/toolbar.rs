@@ -1,12 +1,12 @@
 //! The toolbar: one line with the scene, the query, its references, running and what is shown.
 
 use egui::containers::menu::{MenuButton, MenuConfig};
-use egui::{Align, Button, Label, Layout, PopupCloseBehavior, RichText, Ui};
+use egui::{Align, Button, Label, Layout, PopupCloseBehavior, Response, RichText, Ui};
 
 use super::Panes;
 use crate::app::action::{self, ACTIONS, Group, button};
 use crate::app::arrangement::Arrangement;
-use crate::app::command::{Command, Queue};
+use crate::app::command::Queue;
 use crate::app::state::AppState;
 use crate::app::theme;
 use crate::event::Side;
@@ -16,23 +16,24 @@ use crate::session::RunState;
 const RIGHT: f32 = 440.0;
 const MIDDLE: f32 = 232.0;
 
-pub(in crate::app) fn ui(ui: &mut Ui, state: &AppState, commands: &Queue, panes: &mut Panes) {
+pub(crate) fn ui(ui: &mut Ui, state: &AppState, commands: &Queue, panes: &mut Panes) {
     ui.horizontal_centered(|ui| {
         menu(ui, state, commands);
         let room = ui.available_width() - RIGHT - MIDDLE;
-        let size = egui::vec2(room.max(200.0), ui.available_height());
-        ui.allocate_ui_with_layout(size, Layout::left_to_right(Align::Center), |ui| {
-            ui.set_min_width(size.x);
-            query(ui, state, commands, panes);
-        });
-        let size = egui::vec2(MIDDLE, ui.available_height());
-        ui.allocate_ui_with_layout(size, Layout::left_to_right(Align::Center), |ui| {
-            ui.set_min_width(size.x);
-            running(ui, state, commands, panes);
-        });
+        part(ui, room.max(200.0), |ui| query(ui, state, commands, panes));
+        part(ui, MIDDLE, |ui| running(ui, state, commands, panes));
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             shown(ui, state, commands);
         });
+    });
+}
+
+/// Draws something in a fixed width.
+fn part(ui: &mut Ui, width: f32, draw: impl FnOnce(&mut Ui)) {
+    let size = egui::vec2(width, ui.available_height());
+    ui.allocate_ui_with_layout(size, Layout::left_to_right(Align::Center), |ui| {
+        ui.set_min_width(width);
+        draw(ui);
     });
 }
 
@@ -49,7 +50,7 @@ fn menu(ui: &mut Ui, state: &AppState, commands: &Queue) {
         ui.menu_button("Views", |ui| {
             for entry in crate::app::views::ALL {
                 if ui.button(entry.title).on_hover_text(entry.about).clicked() {
-                    commands.send(Command::ShowView(entry.name));
+                    commands.send(|app| app.state.show_view(entry.name));
                     ui.close();
                 }
             }
@@ -63,9 +64,9 @@ fn query(ui: &mut Ui, state: &AppState, commands: &Queue, panes: &mut Panes) {
     let scene = RichText::new(setup.queries.name()).strong();
     ui.add(Label::new(scene).truncate()).on_hover_text("The scene of the query");
     ui.weak("›");
-    button(ui, state, commands, "◀", Command::NextQuery { back: true });
+    button(ui, state, commands, "◀", "Previous query");
     ui.label(RichText::new(setup.query_name()).strong()).on_hover_text("The query");
-    button(ui, state, commands, "▶", Command::NextQuery { back: false });
+    button(ui, state, commands, "▶", "Next query");
     // The names of the references are worth more than the word before them.
     if ui.available_width() > 170.0 {
         ui.weak("against");
@@ -81,13 +82,9 @@ fn query(ui: &mut Ui, state: &AppState, commands: &Queue, panes: &mut Panes) {
         [one] => one.clone(),
         [first, others @ ..] => format!("{first} and {} more", others.len()),
     };
-    let config = MenuConfig::new().close_behavior(PopupCloseBehavior::CloseOnClickOutside);
     let chip = Button::new(format!("{text} ▾")).truncate();
-    let (response, _) = MenuButton::from_button(chip).config(config).ui(ui, |ui| {
-        ui.set_min_size(egui::vec2(380.0, 420.0));
-        ui.set_max_size(egui::vec2(380.0, 420.0));
-        panes.show(ui, "references", state, commands);
-    });
+    let show = |ui: &mut Ui| panes.show(ui, "references", state, commands);
+    let response = popup(ui, chip, [380.0, 420.0], show);
     let all = names.join(", ");
     let spoken = format!("References: {all}");
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, &spoken));
@@ -99,42 +96,45 @@ fn running(ui: &mut Ui, state: &AppState, commands: &Queue, panes: &mut Panes) {
     let is_paused = matches!(state.run_state(), RunState::Paused { .. });
     let text = if is_running { "Pause" } else { "▶ Run" };
     let run = ui.add_sized([64.0, 26.0], Button::new(text));
-    let tooltip = action::of(&Command::RunOrPause).map(|action| action.tooltip(ui.ctx()));
-    if run.on_hover_text(tooltip.unwrap_or_default()).clicked() {
-        commands.send(Command::RunOrPause);
+    if run.on_hover_text(action::tooltip(ui.ctx(), "Run or pause")).clicked() {
+        commands.send(|app| app.state.run_or_pause());
     }
     ui.add_enabled_ui(is_paused || is_running, |ui| {
-        button(ui, state, commands, "Stage", Command::StepOver);
-        button(ui, state, commands, "Step", Command::StepInto);
+        button(ui, state, commands, "Stage", "Step over the stage");
+        button(ui, state, commands, "Step", "Step to the next event");
     });
-    let config = MenuConfig::new().close_behavior(PopupCloseBehavior::CloseOnClickOutside);
     let count = state.setup.task.breakpoints.len();
     let text = if count == 0 { "Break".to_owned() } else { format!("Break ({count})") };
-    let (response, _) = MenuButton::new(text).config(config).ui(ui, |ui| {
-        ui.set_min_size(egui::vec2(320.0, 260.0));
-        ui.set_max_size(egui::vec2(320.0, 260.0));
-        panes.show(ui, "breakpoints", state, commands);
-    });
+    let show = |ui: &mut Ui| panes.show(ui, "breakpoints", state, commands);
+    let response = popup(ui, Button::new(text), [320.0, 260.0], show);
     response.on_hover_text("Where the run stops");
+}
+
+/// A button that opens something of a fixed size below it, until a click beside it.
+fn popup(ui: &mut Ui, button: Button<'_>, size: [f32; 2], show: impl FnOnce(&mut Ui)) -> Response {
+    let config = MenuConfig::new().close_behavior(PopupCloseBehavior::CloseOnClickOutside);
+    let (response, _) = MenuButton::from_button(button).config(config).ui(ui, |ui| {
+        ui.set_min_size(size.into());
+        ui.set_max_size(size.into());
+        show(ui);
+    });
+    response
 }
 
 /// What is shown, and the layouts; from the right.
 fn shown(ui: &mut Ui, state: &AppState, commands: &Queue) {
-    button(ui, state, commands, "?", Command::Help);
-    button(ui, state, commands, "Search", Command::Search);
+    button(ui, state, commands, "?", "All keys");
+    button(ui, state, commands, "Search", "Search for an action");
     ui.separator();
-    for (arrangement, title, _) in Arrangement::ALL.into_iter().rev() {
-        let is_on = state.options.layout == arrangement;
-        let tooltip =
-            action::of(&Command::Arrange(arrangement)).map(|action| action.tooltip(ui.ctx()));
-        let response = ui.add(Button::selectable(is_on, title));
-        if response.on_hover_text(tooltip.unwrap_or_default()).clicked() {
-            commands.send(Command::Arrange(arrangement));
+    for (layout, title, text) in Arrangement::ALL.into_iter().rev() {
+        let response = ui.add(Button::selectable(state.options.layout == layout, title));
+        if response.on_hover_text(action::tooltip(ui.ctx(), text)).clicked() {
+            commands.send(move |app| app.arrange(layout));
         }
     }
     ui.separator();
     compare(ui, state, commands);
-    button(ui, state, commands, "Truth", Command::ShowTruth);
+    button(ui, state, commands, "Truth", "Ground truth");
 }
 
 fn compare(ui: &mut Ui, state: &AppState, commands: &Queue) {

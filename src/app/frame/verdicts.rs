@@ -7,7 +7,7 @@ use egui::{
 use super::proof::elided;
 use super::storyboard::part_name;
 use crate::app::action;
-use crate::app::command::{Command, Queue};
+use crate::app::command::Queue;
 use crate::app::lecture;
 use crate::app::state::AppState;
 use crate::app::theme;
@@ -25,7 +25,7 @@ const HINT: &str =
     "Space runs the query to its end, I steps into the next event, ? lists all keys.";
 
 /// Draws the cells, the sentence and the remedy.
-pub(in crate::app) fn ui(ui: &mut Ui, state: &AppState, commands: &Queue) {
+pub(crate) fn ui(ui: &mut Ui, state: &AppState, commands: &Queue) {
     let area = ui.available_rect_before_wrap();
     let methods = &state.setup.task.protocol.methods;
     let width = if methods.len() > 4 { NARROW_CELL } else { CELL };
@@ -40,7 +40,7 @@ pub(in crate::app) fn ui(ui: &mut Ui, state: &AppState, commands: &Queue) {
     let rest = Rect::from_min_max(pos2(left + 12.0, area.top()), area.max);
     let (words, button) = rest.split_left_right_at_x(rest.right() - BUTTON);
     let span = state.shown_span();
-    let result = span.filter(|span| state.has_come(span)).and_then(|span| state.shown_result(span));
+    let result = span.and_then(|span| state.outcome(span));
     let layout = Layout::top_down(Align::Min);
     ui.scope_builder(
         UiBuilder::new().max_rect(words.shrink2(vec2(0.0, 4.0))).layout(layout),
@@ -51,7 +51,7 @@ pub(in crate::app) fn ui(ui: &mut Ui, state: &AppState, commands: &Queue) {
             let rows = lines(ui, &first, egui::FontId::proportional(15.0), strong, 2);
             if !second.is_empty() {
                 let weak = ui.visuals().weak_text_color();
-                lines(ui, &second, theme::body(), weak, if rows > 1 { 1 } else { 2 });
+                lines(ui, &second, theme::BODY, weak, if rows > 1 { 1 } else { 2 });
             }
         },
     );
@@ -97,7 +97,7 @@ fn cell(ui: &Ui, state: &AppState, commands: &Queue, rect: Rect, part: Part, spa
         ui.visuals().widgets.noninteractive.bg_stroke,
     );
     let color = theme::text(ui.visuals(), theme::method(method));
-    let name = painter.layout_no_wrap(part_name(part), theme::strong(), color);
+    let name = painter.layout_no_wrap(part_name(part), theme::STRONG, color);
     painter.galley(rect.min + vec2(10.0, 12.0), name, color);
     let (words, color) = match &result {
         Some(result) => worth(ui, result),
@@ -112,7 +112,7 @@ fn cell(ui: &Ui, state: &AppState, commands: &Queue, rect: Rect, part: Part, spa
         None => spoken.clone(),
     };
     if response.on_hover_text(help).clicked() {
-        commands.send(Command::ShowPart(part));
+        commands.send(move |app| app.state.show_outcome(part));
     }
 }
 
@@ -164,16 +164,20 @@ fn sentence(
         let latest = lecture::latest(state.shown_run(), span, state.shown_cursor());
         return (first, latest.unwrap_or_default());
     };
-    let text = match (result.diagnosis.first(), &result.reason) {
+    split(&told(result))
+}
+
+/// What a result is, in its own words: its verdict, or why it has no pose, or what speaks for it.
+pub(super) fn told(result: &QueryResult) -> String {
+    match (result.diagnosis.first(), &result.reason) {
         (Some(found), _) => found.text.clone(),
         (None, Some(reason)) => reason.text.clone(),
         (None, None) => result.evidence(),
-    };
-    split(&text)
+    }
 }
 
 /// The first sentence, and the others; without the marks of code, which a page would show.
-pub(in crate::app) fn split(text: &str) -> (String, String) {
+pub(crate) fn split(text: &str) -> (String, String) {
     let text = text.replace('`', "");
     let (first, others) = first_sentence(&text);
     (first.to_owned(), others.to_owned())
@@ -189,7 +193,7 @@ pub(super) fn short(args: &[String]) -> String {
 fn fitted(ui: &Ui, words: &str, number: &str, width: f32) -> String {
     let fits = |text: &str| {
         let text = text.to_owned();
-        let galley = ui.painter().layout_no_wrap(text, theme::body(), ui.visuals().text_color());
+        let galley = ui.painter().layout_no_wrap(text, theme::BODY, ui.visuals().text_color());
         galley.size().x <= width
     };
     let whole = format!("Try {words}{number}");
@@ -212,49 +216,46 @@ fn remedy(ui: &mut Ui, state: &AppState, commands: &Queue, result: &QueryResult)
     let explaining = state.run().explaining.filter(|explaining| explaining.method == result.method);
     let can_explain = result.error.or(result.initial_error).is_some();
     let mut whole = String::new();
-    let (text, command) = match (&result.explanation, explaining) {
+    let mut args = None;
+    let is_offered = can_explain && state.setup.task.protocol.explain == 0;
+    let (text, help) = match (&result.explanation, explaining) {
         (Some(explanation), _) => match explanation.best() {
             Some(helped) => {
-                let args = short(&helped.args);
-                let error = helped.error.translation();
-                let (words, number) = (args, format!(" → {error}"));
+                let (words, number) =
+                    (short(&helped.args), format!(" → {}", helped.error.translation()));
                 whole = format!("Try {words}{number}");
-                let text = fitted(ui, &words, &number, size.x - 16.0);
-                (text, Some(Command::Try(helped.args.clone())))
+                args = Some(helped.args.clone());
+                let all = helped.args.join(" ");
+                let help = format!("Keeps this run as A and runs the query with {all}");
+                (fitted(ui, &words, &number, size.x - 16.0), help)
             }
-            None => (format!("None of {} remedies helped", explanation.runs), None),
+            None => (format!("None of {} remedies helped", explanation.runs), String::new()),
         },
         (None, Some(explaining)) => {
-            (format!("Trying {} of {} …", explaining.tried, explaining.remedies), None)
+            let (tried, all) = (explaining.tried, explaining.remedies);
+            (format!("Trying {tried} of {all} …"), String::new())
         }
-        (None, None) if can_explain && state.setup.task.protocol.explain == 0 => {
-            ("Try what would help".to_owned(), Some(Command::Explain))
-        }
+        (None, None) if is_offered => (
+            "Try what would help".to_owned(),
+            action::tooltip(ui.ctx(), "Try what would have helped"),
+        ),
         (None, None) => return,
     };
-    let is_on = command.is_some();
     let button =
         Button::new(text.as_str()).truncate().min_size(size).fill(theme::selected(ui.visuals()));
-    let response = ui.add_enabled(is_on, button.wrap_mode(egui::TextWrapMode::Truncate));
+    let button = button.wrap_mode(egui::TextWrapMode::Truncate);
+    let mut response = ui.add_enabled(!help.is_empty(), button);
     if !whole.is_empty() {
         response.widget_info(|| WidgetInfo::labeled(Role::Button, true, &whole));
     }
-    let help = match &command {
-        Some(Command::Explain) => {
-            action::of(&Command::Explain).map(|action| action.tooltip(ui.ctx()))
-        }
-        Some(Command::Try(args)) => {
-            Some(format!("Keeps this run as A and runs the query with {}", args.join(" ")))
-        }
-        Some(_) => None,
-        None => None,
-    };
-    let response = match help {
-        Some(help) => response.on_hover_text(help),
-        None => response,
-    };
-    if let Some(command) = command.filter(|_| response.clicked()) {
-        commands.send(command);
+    if !help.is_empty() {
+        response = response.on_hover_text(help);
+    }
+    if response.clicked() {
+        commands.send(move |app| match args {
+            Some(args) => app.state.try_again(&args),
+            None => app.state.switch_explaining(),
+        });
     }
 }
 

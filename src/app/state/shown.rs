@@ -1,32 +1,35 @@
 //! What is shown of the state: the run, the cursor in it, its results, with nothing in them that is hidden.
 
+use std::rc::Rc;
 use std::sync::Arc;
 
 use super::AppState;
 use crate::app::run_pictures::RunPictures;
+use crate::app::selection::{ResultRow, Wanted};
 use crate::app::view_options::CompareMode;
 use crate::diagnosis::Grade;
 use crate::event::Stage;
 use crate::localize::QueryResult;
+use crate::measure::{ConditionError, Migration};
 use crate::method::Method;
 use crate::proof::ProofPicture;
 use crate::session::{Part, Run, Span, StageBar};
 
 impl AppState {
     /// Whether a part came to something that needs an explanation.
-    pub(in crate::app) fn needs_why(&self, part: Part) -> bool {
-        let span = self.shown_run().span_of(part).filter(|span| self.has_come(span));
-        let result = span.and_then(|span| self.shown_result(span));
+    pub(crate) fn needs_why(&self, part: Part) -> bool {
+        let span = self.shown_run().span_of(part);
+        let result = span.and_then(|span| self.outcome(span));
         result.is_some_and(|result| result.grade != Grade::Right)
     }
 
     /// Whether the run A is shown.
-    pub(in crate::app) fn is_showing_kept(&self) -> bool {
+    pub(crate) fn is_showing_kept(&self) -> bool {
         self.kept.is_some() && self.options.compare_mode == CompareMode::Kept
     }
 
     /// The run that is shown: the present one, or A.
-    pub(in crate::app) fn shown_run(&self) -> &Run {
+    pub(crate) fn shown_run(&self) -> &Run {
         match &self.kept {
             Some(kept) if self.is_showing_kept() => &kept.run,
             _ => self.run(),
@@ -34,7 +37,7 @@ impl AppState {
     }
 
     /// The cursor in the run that is shown.
-    pub(in crate::app) fn shown_cursor(&self) -> usize {
+    pub(crate) fn shown_cursor(&self) -> usize {
         match self.kept_cursor() {
             Some(cursor) if self.is_showing_kept() => cursor,
             _ => self.cursor(),
@@ -42,12 +45,12 @@ impl AppState {
     }
 
     /// The part of the run that is shown at the cursor.
-    pub(in crate::app) fn shown_span(&self) -> Option<&Span> {
+    pub(crate) fn shown_span(&self) -> Option<&Span> {
         self.shown_run().span_at(self.shown_cursor())
     }
 
     /// The stage at the cursor that chooses what the canvas shows.
-    pub(in crate::app) fn shown_stage(&self) -> Option<Stage> {
+    pub(crate) fn shown_stage(&self) -> Option<Stage> {
         let (run, cursor) = (self.shown_run(), self.shown_cursor());
         let here = run.stages_at(cursor).last()?;
         let Stage::Estimator(_) = here.stage else {
@@ -63,7 +66,7 @@ impl AppState {
     }
 
     /// The part that a method is judged by: its fused pose, else that of the selected reference, else its last.
-    pub(in crate::app) fn deciding_span(&self, method: Method) -> Option<&Span> {
+    pub(crate) fn deciding_span(&self, method: Method) -> Option<&Span> {
         let run = self.shown_run();
         let reference = run.reference_at(self.shown_cursor());
         let own = || {
@@ -76,19 +79,24 @@ impl AppState {
     }
 
     /// The result of a part with nothing in it that is hidden.
-    pub(in crate::app) fn shown_result(&self, span: &Span) -> Option<QueryResult> {
+    pub(crate) fn shown_result(&self, span: &Span) -> Option<QueryResult> {
         Some(span.result.as_ref()?.shown(self.options.shows_truth))
     }
 
+    /// The same, once the part has come to its end.
+    pub(crate) fn outcome(&self, span: &Span) -> Option<QueryResult> {
+        self.has_come(span).then(|| self.shown_result(span)).flatten()
+    }
+
     /// What an earlier run found for the method of a part, with nothing in it that is hidden.
-    pub(in crate::app) fn known_result(&self, part: Part) -> Option<QueryResult> {
+    pub(crate) fn known_result(&self, part: Part) -> Option<QueryResult> {
         let known = self.results.get(&self.setup.query)?;
         let result = known.iter().rfind(|result| Some(result.method) == part.method())?;
         Some(result.shown(self.options.shows_truth))
     }
 
     /// The same result in the other run, with nothing in it that is hidden.
-    pub(in crate::app) fn other_result(&self, result: &QueryResult) -> Option<QueryResult> {
+    pub(crate) fn other_result(&self, result: &QueryResult) -> Option<QueryResult> {
         let kept = self.kept.as_ref()?;
         let other = if self.is_showing_kept() { self.run() } else { &kept.run };
         let is_same = |other: &&QueryResult| {
@@ -100,13 +108,29 @@ impl AppState {
         Some(found.shown(self.options.shows_truth))
     }
 
+    /// The results that are looked at, in the order of the queries: those that meet the condition that was typed,
+    /// whose verdict became what was asked for.
+    pub(crate) fn selected_results(&self) -> Result<Rc<[ResultRow]>, ConditionError> {
+        let wanted = Wanted {
+            condition: self.options.results_filter.clone(),
+            change: self.options.verdict_change.clone(),
+            only_changed: self.options.only_differences && self.results_before.is_some(),
+        };
+        self.selection.rows(self.known(), wanted)
+    }
+
+    /// What became of the verdicts since the results A, also of those that stayed what they were.
+    pub(crate) fn migrations(&self) -> Rc<[Migration]> {
+        self.selection.migrations(self.known())
+    }
+
     /// Whether a record is known at the cursor: in a lecture what comes later is not.
-    pub(in crate::app) fn has_begun(&self, record: usize) -> bool {
+    pub(crate) fn has_begun(&self, record: usize) -> bool {
         !self.options.hides_future || record <= self.shown_cursor()
     }
 
     /// Whether a page of a lesson chooses what the canvas shows.
-    pub(in crate::app) fn is_presenting(&self) -> bool {
+    pub(crate) fn is_presenting(&self) -> bool {
         self.options.presented.is_some()
     }
 
@@ -118,26 +142,26 @@ impl AppState {
     }
 
     /// The small picture of a stage of the run that is shown, once it is made.
-    pub(in crate::app) fn thumbnail(
+    pub(crate) fn thumbnail(
         &self,
         part: &std::ops::Range<usize>,
         stage: &std::ops::Range<usize>,
     ) -> Option<egui::TextureHandle> {
-        self.shown_pictures().thumbnail(self.shown_run(), part, stage)
+        self.shown_pictures().stage(self.shown_run(), part, stage)
     }
 
     /// The picture that proves the result of a part, once it is made.
-    pub(in crate::app) fn proof(&self, part: Part) -> Option<&Arc<ProofPicture>> {
+    pub(crate) fn proof(&self, part: Part) -> Option<&Arc<ProofPicture>> {
         self.shown_pictures().proof(part)
     }
 
     /// Whether proofs are still being made.
-    pub(in crate::app) fn is_proving(&self) -> bool {
+    pub(crate) fn is_proving(&self) -> bool {
         self.shown_pictures().is_proving() || self.session.is_alive()
     }
 
     /// The stages right below a part of the run, those only that are known at the cursor.
-    pub(in crate::app) fn stages_of(&self, span: &Span) -> Vec<&StageBar> {
+    pub(crate) fn stages_of(&self, span: &Span) -> Vec<&StageBar> {
         let run = self.shown_run();
         let inside = |bar: &&StageBar| {
             span.records.contains(&bar.records.start) && self.has_begun(bar.records.start)
@@ -152,7 +176,7 @@ impl AppState {
     }
 
     /// The last record of a stage of a part. What a part reports after its last stage belongs to that stage.
-    pub(in crate::app) fn stage_end(&self, span: &Span, bar: &StageBar) -> usize {
+    pub(crate) fn stage_end(&self, span: &Span, bar: &StageBar) -> usize {
         let stages = self.stages_of(span);
         let is_last = stages.last().is_some_and(|last| last.records == bar.records);
         let end = if is_last && self.has_come(span) { span.records.end } else { bar.records.end };

@@ -7,8 +7,8 @@ use egui::{Button, RichText, ScrollArea, Sense, TextEdit, Ui};
 use egui_extras::{Column, TableBuilder, TableRow};
 
 use super::View;
-use super::memo::Memo;
-use crate::app::{Command, ResultRow, ViewContext, theme};
+use crate::app::memo::Memo;
+use crate::app::{ResultRow, ViewContext, theme};
 use crate::localize::QueryResult;
 use crate::measure::{Field, Order, select, verdict_name};
 use crate::method::Method;
@@ -53,11 +53,11 @@ impl View for BatchView {
             let field = TextEdit::singleline(&mut typed).hint_text(hint);
             let field = ui.add(field.desired_width(ui.available_width() - 8.0));
             if field.labelled_by(label.id).changed() {
-                context.send(Command::FilterResults(typed));
+                context.send(|app| app.state.options.results_filter = typed);
             }
         });
         changes(ui, context);
-        let chosen = match context.selected() {
+        let chosen = match context.state.selected_results() {
             Ok(chosen) => chosen,
             Err(error) => {
                 ui.label(
@@ -67,22 +67,23 @@ impl View for BatchView {
                 return;
             }
         };
-        if context.results.is_empty() {
+        if context.state.results.is_empty() {
             ui.weak("No query was run yet: Run all in the list of queries, or open a run folder");
             return;
         }
         // Clicks on the names of the columns sort from the next frame on.
         let mut order = self.order;
-        let key = (Rc::clone(&chosen), order, context.results_version());
+        let key = (Rc::clone(&chosen), order, context.state.known().version);
         let (rows, words) = self.shown.get(key, || {
-            let known = chosen.iter().filter_map(|row| context.result(*row));
+            let known = chosen.iter().filter_map(|row| context.state.known().result(*row));
             let sorted = select(&known.collect::<Vec<_>>(), None, order).into_iter();
             let rows: Vec<ResultRow> = sorted.map(|index| chosen[index]).collect();
             let words = words(context, &rows);
             (rows, words)
         });
         ui.weak(words);
-        let (height, has_before) = (ui.spacing().interact_size.y, context.has_results_before());
+        let (height, has_before) =
+            (ui.spacing().interact_size.y, context.state.known().before.is_some());
         // The names of the columns move sideways with the rows, and stay above them.
         ScrollArea::horizontal().auto_shrink(false).show(ui, |ui| {
             let mut table = TableBuilder::new(ui).striped(true).sense(Sense::click());
@@ -123,23 +124,23 @@ fn changes(ui: &mut Ui, context: &ViewContext<'_>) {
         if let Some(change) = &context.options.verdict_change {
             let button = ui.button(format!("{change} ×"));
             if button.on_hover_text("Show all verdicts again").clicked() {
-                context.send(Command::FilterVerdictChange(None));
+                context.send(|app| app.state.options.verdict_change = None);
             }
         }
         let keep = ui.button("Keep results as A");
         let help = "Compare later results with these: change a setting, run all queries, and see Verdicts since A in Charts";
         if keep.on_hover_text(help).clicked() {
-            context.send(Command::KeepResults);
+            context.send(|app| app.state.keep_results());
         }
-        if context.has_results_before() {
+        if context.state.known().before.is_some() {
             let mut only = context.options.only_differences;
             let toggle = ui.toggle_value(&mut only, "Only what changed");
             if toggle.on_hover_text("Only results whose verdict differs from A (D)").clicked() {
-                context.send(Command::OnlyDifferences);
+                context.send(move |app| app.state.options.only_differences = only);
             }
             let forget = ui.button("Forget A");
             if forget.on_hover_text("Forget the results A").clicked() {
-                context.send(Command::ForgetResults);
+                context.send(|app| app.state.set_results_before(None));
             }
         }
     });
@@ -147,9 +148,9 @@ fn changes(ui: &mut Ui, context: &ViewContext<'_>) {
 
 /// How many results are shown, and how many of each method are wrong or missing.
 fn words(context: &ViewContext<'_>, rows: &[ResultRow]) -> String {
-    let results: usize = context.results.values().map(Vec::len).sum();
+    let results: usize = context.state.results.values().map(Vec::len).sum();
     let mut failed: BTreeMap<Method, usize> = BTreeMap::new();
-    for result in rows.iter().filter_map(|row| context.result(*row)) {
+    for result in rows.iter().filter_map(|row| context.state.known().result(*row)) {
         let is_failed = result.grade.is_failure();
         *failed.entry(result.method).or_default() += usize::from(is_failed);
     }
@@ -176,7 +177,7 @@ fn header(ui: &mut Ui, name: &str, order: &mut Option<Order>) {
 }
 
 fn draw(row: &mut TableRow<'_, '_>, context: &ViewContext<'_>, at: ResultRow) {
-    let Some(result) = context.result(at) else {
+    let Some(result) = context.state.known().result(at) else {
         return;
     };
     let is_here = at.query == context.setup.query;
@@ -200,9 +201,9 @@ fn draw(row: &mut TableRow<'_, '_>, context: &ViewContext<'_>, at: ResultRow) {
             label(ui, text);
         });
     }
-    if context.has_results_before() {
+    if context.state.known().before.is_some() {
         let primary = |result: &QueryResult| Some(result.diagnosis.first()?.code);
-        let was = context.result_before(at);
+        let was = context.state.known().before_row(at);
         let was = was.map(|was| verdict_name(primary(was)));
         let text = RichText::new(was.unwrap_or("–"));
         let is_change = was.is_some_and(|was| was != verdict_name(primary(result)));
@@ -213,6 +214,6 @@ fn draw(row: &mut TableRow<'_, '_>, context: &ViewContext<'_>, at: ResultRow) {
         answer = answer.on_hover_text(&finding.text);
     }
     if answer.clicked() {
-        context.send(Command::OpenResult { query: at.query, result: at.place });
+        context.send(move |app| app.state.open_result(at.query, at.place));
     }
 }

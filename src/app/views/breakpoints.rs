@@ -3,7 +3,7 @@
 use egui::{ScrollArea, TextEdit, Ui};
 
 use super::View;
-use crate::app::{Command, ViewContext};
+use crate::app::ViewContext;
 use crate::session::Breakpoint;
 
 /// The list of breakpoints, and a line to write a new one.
@@ -67,7 +67,7 @@ impl View for BreakpointsView {
             });
         });
         if wanted != breakpoints {
-            context.send(Command::SetBreakpoints(wanted));
+            context.send(|app| app.state.set_breakpoints(wanted));
         }
     }
 }

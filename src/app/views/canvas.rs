@@ -117,7 +117,7 @@ impl Placement {
 
 /// Words in a corner of a picture, readable on any ground.
 pub(super) fn tag(painter: &Painter, at: Pos2, text: &str, color: Color32) {
-    let galley = painter.layout_no_wrap(text.to_owned(), theme::caption(), color);
+    let galley = painter.layout_no_wrap(text.to_owned(), theme::CAPTION, color);
     let ground = Rect::from_min_size(at, galley.size()).expand2(vec2(4.0, 1.0));
     let ground = ground.translate(vec2(4.0, 1.0));
     painter.rect_filled(ground, 2.0, Color32::from_black_alpha(190));

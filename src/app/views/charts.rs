@@ -10,7 +10,7 @@ use egui_plot::{Legend, MarkerShape, Plot, PlotPoint, Points};
 
 use super::View;
 use super::legend::name_picture;
-use crate::app::{Command, ResultRow, ViewContext, theme};
+use crate::app::{ResultRow, ViewContext, theme};
 use crate::diagnosis::Grade;
 use crate::localize::QueryResult;
 use crate::measure::{Field, Value};
@@ -65,10 +65,10 @@ impl Default for ChartsView {
 
 impl View for ChartsView {
     fn ui(&mut self, ui: &mut Ui, context: &ViewContext<'_>) {
-        let results: Vec<Chosen<'_>> = match context.selected() {
+        let results: Vec<Chosen<'_>> = match context.state.selected_results() {
             Ok(rows) => {
                 let rows = rows.iter();
-                rows.filter_map(|row| Some((*row, context.result(*row)?))).collect()
+                rows.filter_map(|row| Some((*row, context.state.known().result(*row)?))).collect()
             }
             Err(error) => {
                 ui.weak(error.to_string());
@@ -175,7 +175,8 @@ impl ChartsView {
             return;
         };
         if answer.clicked() {
-            context.send(Command::OpenResult { query: row.query, result: row.place });
+            let ResultRow { query, place } = *row;
+            context.send(move |app| app.state.open_result(query, place));
         }
         let code = result.diagnosis.first();
         let code =

@@ -17,8 +17,7 @@ use self::visible::VisibleFeatures;
 use super::View;
 use super::canvas::PanZoom;
 use super::features::{FeatureProgress, INLIER, KINDS};
-use super::mesh_painter::MeshPainter;
-use crate::app::{Command, ViewContext};
+use crate::app::ViewContext;
 use crate::diagnosis::TRUE_MATCH_THRESHOLDS;
 use crate::problem::Problem;
 
@@ -78,20 +77,19 @@ impl View for ImagesView {
         };
         let visible = VisibleFeatures::new(&progress, &kinds, &pair.at, is_shown, is_false);
         let hovered = point_at(ui, context, &visible, &progress, &pair.over);
-        let mut mesh = MeshPainter::new(ui.pixels_per_point());
+        let painter = ui.painter();
         let strength = if hovered.is_some() { PALE } else { 1.0 };
         if progress.is_unmatched() || self.shown[0] {
-            visible.draw_unmatched(&mut mesh, &progress, &pair.at[1], strength);
+            visible.draw_unmatched(painter, &progress, &pair.at[1], strength);
         }
-        visible.draw(&mut mesh, strength);
+        visible.draw(painter, strength);
         for feature in [selected, hovered].into_iter().flatten() {
-            visible.draw_accent(&mut mesh, feature);
+            visible.draw_accent(painter, feature);
         }
-        mesh.paint_on(ui.painter());
         let truth = selected.and_then(|feature| true_match(context, &progress, problem, feature));
         if let Some(truth) = &truth {
-            draw_truth(&mut mesh, &pair.at[0], &problem.query.intrinsics, truth);
-            mesh.paint_on(&pair.at[0].painter(ui.painter()));
+            let painter = pair.at[0].painter(painter);
+            draw_truth(&painter, &pair.at[0], &problem.query.intrinsics, truth);
         }
         pair.name(ui, captions);
 
@@ -165,7 +163,7 @@ fn point_at(
     let over = over.iter().find(|over| over.hovered())?;
     let hovered = visible.nearest(over.hover_pos()?);
     if over.clicked() && context.options.selected_feature != hovered {
-        context.send(Command::SelectFeature(hovered));
+        context.send(move |app| app.state.options.selected_feature = hovered);
     }
     if let Some(feature) = hovered {
         ui.ctx().set_cursor_icon(egui::CursorIcon::PointingHand);

@@ -74,14 +74,6 @@ pub(super) fn cost_bar(ui: &mut Ui, width: f32, what: &str, [dark, bright]: &[St
     color_bar(ui, width, &name, theme::viridis, &[(0.0, dark), (1.0, bright)]);
 }
 
-/// The bar of [`palette::depth`].
-pub(super) fn depth_bar(ui: &mut Ui, width: f32) {
-    let metres = [2.0, 5.0, 10.0, 20.0, 40.0, 80.0];
-    let words = ["2", "5", "10", "20", "40", "80 m"];
-    let ticks: Vec<(f64, &str)> = metres.into_iter().map(palette::depth_share).zip(words).collect();
-    color_bar(ui, width, "depth, m", theme::turbo, &ticks);
-}
-
 /// A square of a colour.
 pub(super) fn swatch(ui: &mut Ui, color: Color32) {
     let (rect, _) = ui.allocate_exact_size(Vec2::splat(10.0), Sense::hover());
@@ -129,27 +121,25 @@ pub(super) fn stretches(curve: &[Option<[f64; 2]>]) -> impl Iterator<Item = Vec<
     known.map(|stretch| stretch.iter().copied().flatten().collect())
 }
 
-/// Paints a mark of a radius \[points\] with a dark rim, in the shapes that proofs have.
-pub(super) fn paint_mark(painter: &Painter, thing: Thing, at: Pos2, radius: f32) {
+/// Paints a mark of a radius \[points\] in its shape and colour, with a dark rim.
+pub(crate) fn paint_mark(painter: &Painter, thing: Thing, at: Pos2, radius: f32) {
     let color = theme::rgb(thing.color());
-    for (width, color) in [(4.5, Color32::BLACK), (2.5, color)] {
-        let stroke = Stroke::new(width, color);
+    for stroke in [Stroke::new(5.0, Color32::BLACK), Stroke::new(2.5, color)] {
         match thing {
             Thing::Reference => {
                 painter.circle_stroke(at, radius, stroke);
             }
             Thing::Truth => {
-                let arm = radius + 0.5 * (width - 2.5);
-                painter.hline(at.x - arm..=at.x + arm, at.y, stroke);
-                painter.vline(at.x, at.y - arm..=at.y + arm, stroke);
+                painter.hline(at.x - radius..=at.x + radius, at.y, stroke);
+                painter.vline(at.x, at.y - radius..=at.y + radius, stroke);
             }
             Thing::Result(_) => {
-                let corners = [(0.0, -1.0), (1.0, 0.0), (0.0, 1.0), (-1.0, 0.0)];
-                let corners = corners.map(|(x, y)| at + radius * vec2(x, y));
+                let corners = [vec2(0.0, -1.0), vec2(1.0, 0.0), vec2(0.0, 1.0), vec2(-1.0, 0.0)];
+                let corners = corners.map(|corner| at + radius * corner);
                 painter.add(Shape::closed_line(corners.to_vec(), stroke));
             }
             Thing::Dot(_) => {
-                painter.circle_filled(at, 0.5 * radius + 0.5 * (width - 2.5), color);
+                painter.circle_stroke(at, 3.0 / 7.0 * radius, stroke);
             }
             Thing::Words => {}
         }

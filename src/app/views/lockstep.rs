@@ -8,7 +8,7 @@ use super::View;
 use super::images::ImagesView;
 use super::legend::method_name;
 use super::surface::SurfaceView;
-use crate::app::{Command, ViewContext, theme};
+use crate::app::{ViewContext, lecture, theme};
 use crate::event::PoseScored;
 use crate::method::Method;
 use crate::session::Span;
@@ -55,7 +55,7 @@ fn axis(ui: &mut Ui, context: &ViewContext<'_>, step: usize, last: usize) {
     let slider = Slider::new(&mut wanted, 0..=last).smart_aim(false);
     let slider = ui.add(slider).labelled_by(label.id);
     if slider.changed() {
-        context.send(Command::StepTogether(Some(wanted)));
+        context.send(move |app| app.state.options.lockstep = Some(wanted));
     }
     if slider.has_focus() {
         slider.surrender_focus();
@@ -64,7 +64,7 @@ fn axis(ui: &mut Ui, context: &ViewContext<'_>, step: usize, last: usize) {
     let is_on = context.options.lockstep.is_some();
     let leave = ui.add_enabled(is_on, egui::Button::new("Leave"));
     if leave.on_hover_text("Back to the cursor of the run").clicked() {
-        context.send(Command::StepTogether(None));
+        context.send(|app| app.state.options.lockstep = None);
     }
 }
 
@@ -97,14 +97,15 @@ impl LockstepView {
         let lines = 2.0 * ui.text_style_height(&egui::TextStyle::Body);
         ui.allocate_ui(vec2(ui.available_width(), lines), |ui| {
             ui.set_min_height(lines);
-            let told = RichText::new(here.told().unwrap_or_default());
+            let told =
+                RichText::new(lecture::latest(here.run, span, here.cursor).unwrap_or_default());
             ui.add(Label::new(told.weak()).wrap());
         });
         let (images, surface) = self.panels.entry(method).or_default();
         ui.push_id(method.name(), |ui| {
             // A hybrid is seen in the pictures of the part that is at work.
             let searches = here.latest::<PoseScored>().is_some();
-            if searches || context.direct_methods().contains(&method) {
+            if searches || context.setup.direct_methods().contains(&method) {
                 surface.ui(ui, &here);
             } else {
                 images.ui(ui, &here);

@@ -4,7 +4,7 @@ use egui::style::ScrollAnimation;
 use egui::{Align, Label, RichText, ScrollArea, Sense, Ui, Vec2};
 
 use super::View;
-use crate::app::{Command, ViewContext};
+use crate::app::ViewContext;
 use crate::event::Event;
 use crate::narration;
 
@@ -58,7 +58,7 @@ impl View for LogView {
                         ui.scroll_to_rect_animation(line.rect, middle, ScrollAnimation::none());
                     }
                     if line.on_hover_text(format!("Step {at}")).clicked() {
-                        context.send(Command::MoveCursor(at));
+                        context.send(move |app| app.state.move_cursor(at));
                     }
                 });
             }

@@ -5,7 +5,7 @@ use std::ops::RangeInclusive;
 use egui::{Align, Button, ComboBox, DragValue, Id, Layout, RichText, ScrollArea, TextEdit, Ui};
 
 use super::View;
-use crate::app::{Command, ViewContext};
+use crate::app::ViewContext;
 use crate::describe::{Described, Domain, Value};
 use crate::image::Degradation;
 use crate::params::Params;
@@ -29,11 +29,11 @@ impl View for ParametersView {
             });
             if context.options.wants_filter {
                 response.request_focus();
-                context.send(Command::FilterFocused);
+                context.send(|app| app.state.options.wants_filter = false);
             }
             let help = "All parameters to their defaults";
             if ui.button("Reset all").on_hover_text(help).clicked() {
-                context.send(Command::ResetParams);
+                context.send(|app| app.state.reset_params());
             }
         });
         let area = ScrollArea::vertical().id_salt("list").auto_shrink(false);
@@ -51,7 +51,12 @@ impl ParametersView {
         let rows = all(&degradation, params);
         let default = Params::default();
         let defaults = all(&Degradation::default(), &default);
-        let other = context.other_run().map_or(&default, |run| &run.params);
+        // A beside the present run, and the other way round.
+        let kept = context.state.kept.as_ref().map(|kept| &kept.run.params);
+        let other = match kept {
+            Some(_) if !context.is_present() => &context.state.run().params,
+            kept => kept.unwrap_or(&default),
+        };
         let others = all(&Degradation::default(), other);
         let filter = self.filter.to_lowercase();
         let is_meant = |row: &Described| {
@@ -74,7 +79,7 @@ impl ParametersView {
                     && !degradation.is_none()
                     && ui.small_button("As taken").on_hover_text(help).clicked()
                 {
-                    context.send(Command::Degrade(Degradation::default()));
+                    context.send(|app| app.state.degrade(Degradation::default()));
                 }
             }
             let Some(value) = edited(ui, name, row, &default.value) else {
@@ -83,9 +88,9 @@ impl ParametersView {
             let mut wanted = degradation;
             if group != PHOTO {
                 let key = row.key.clone();
-                context.send(Command::SetParam { key, value });
+                context.send(move |app| app.state.set_param(&key, &value));
             } else if wanted.set(name, &value).is_ok() {
-                context.send(Command::Degrade(wanted));
+                context.send(move |app| app.state.degrade(wanted));
             }
         }
         if group.is_empty() {

@@ -6,7 +6,7 @@ use egui::{Color32, Rect, Role, ScrollArea, Sense, Ui, WidgetInfo, pos2, vec2};
 
 use super::View;
 use super::in_sight::bring_to_the_middle;
-use crate::app::{Command, ViewContext, theme};
+use crate::app::{ViewContext, theme};
 use crate::event::Side;
 use crate::localize::QueryResult;
 use crate::method::Method;
@@ -28,15 +28,15 @@ impl View for QueriesView {
         let field = egui::TextEdit::singleline(&mut self.typed).hint_text("Filter");
         let field = ui.add(field.desired_width(f32::INFINITY));
         field.widget_info(|| WidgetInfo::labeled(Role::TextInput, true, "Filter queries"));
-        let failed = context.results.keys().filter(|query| context.has_failed(**query));
+        let failed = context.state.results.keys().filter(|query| context.state.has_failed(**query));
         let failed = failed.count();
-        let words = format!("{failed} of {} wrong", context.results.len());
+        let words = format!("{failed} of {} wrong", context.state.results.len());
         let only = ui.checkbox(&mut self.only_failures, words);
         only.on_hover_text("Only queries where at least one method is wrong or found no pose");
         let frames = context.setup.queries.frames();
         let is_shown = |query: &usize| {
             frames[*query].contains(self.typed.trim())
-                && (!self.only_failures || context.has_failed(*query))
+                && (!self.only_failures || context.state.has_failed(*query))
         };
         let offered = context.setup.offered.iter().copied();
         let shown: Vec<usize> = offered.filter(is_shown).collect();
@@ -76,26 +76,26 @@ fn row(ui: &mut Ui, context: &ViewContext<'_>, query: usize, height: f32) {
         painter.rect_filled(rect, 2.0, ground);
     }
     let (picture, below) = rect.split_top_bottom_at_y(rect.bottom() - NAME);
-    if let Some(texture) = context.queries.thumbnail(Side::Query, query) {
+    if let Some(texture) = context.state.frame_picture(Side::Query, query) {
         let size = texture.size_vec2();
         let room = picture.shrink(2.0);
         let place = Rect::from_center_size(room.center(), size * (room.size() / size).min_elem());
         let whole = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
         painter.image(texture.id(), place, whole, Color32::WHITE);
     }
-    let results = context.results.get(&query).map_or(&[][..], Vec::as_slice);
+    let results = context.state.results.get(&query).map_or(&[][..], Vec::as_slice);
     let marks: Vec<_> = grades(context, results).collect();
     let color =
         if is_here { ui.visuals().selection.stroke.color } else { ui.visuals().text_color() };
     let left = pos2(below.left() + 4.0, below.center().y);
-    painter.text(left, egui::Align2::LEFT_CENTER, name, theme::caption(), color);
+    painter.text(left, egui::Align2::LEFT_CENTER, name, theme::CAPTION, color);
     let mut right = below.right() - 4.0;
     for (glyph, color, _) in marks.iter().rev() {
         let at = pos2(right, below.center().y);
         // On the ground of what is selected the shape alone says the grade.
         let color = if is_here { ui.visuals().selection.stroke.color } else { *color };
-        right = painter.text(at, egui::Align2::RIGHT_CENTER, glyph, theme::caption(), color).left()
-            - 1.0;
+        right =
+            painter.text(at, egui::Align2::RIGHT_CENTER, glyph, theme::CAPTION, color).left() - 1.0;
     }
     let words: Vec<&str> = marks.iter().map(|(.., words)| words.as_str()).collect();
     let response = match words.as_slice() {
@@ -103,7 +103,7 @@ fn row(ui: &mut Ui, context: &ViewContext<'_>, query: usize, height: f32) {
         words => response.on_hover_text(words.join("\n")),
     };
     if response.clicked() {
-        context.send(Command::SelectQuery(query));
+        context.send(move |app| app.state.select_query(query));
     }
 }
 
@@ -120,7 +120,7 @@ fn grades<'a>(
         let error = result.error.filter(|_| shows_truth);
         let error = error.map_or(String::new(), |error| format!(", {error}"));
         let words = format!("{}: {grade}{error}", result.method.label());
-        (grade.glyph(), theme::grade(&context.visuals(), grade), words)
+        (grade.glyph(), theme::grade(&context.state.ctx.global_style().visuals, grade), words)
     })
 }
 

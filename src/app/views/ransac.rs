@@ -1,4 +1,4 @@
-//! MLESAC: every hypothesis, the best so far, and the test of the result.
+//! MLESAC: the support of every hypothesis, the best so far, and the test of the result.
 
 mod trials;
 mod verdict;
@@ -7,19 +7,22 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use egui::{Color32, Ui};
-use egui_plot::{GridInput, GridMark, Line, LineStyle, Plot, PlotPoint, PlotUi, Points, VLine};
+use egui_plot::{Line, Plot, PlotPoint, Points, VLine};
 
 use super::legend::name_picture;
-use super::memo::{Memo, Same};
 use super::{View, part_with};
-use crate::app::{Command, ViewContext, theme};
+use crate::app::memo::{Memo, Same};
+use crate::app::{ViewContext, theme};
 use crate::event::HypothesisTried;
 use crate::method::Method;
 use crate::session::{Loaded, Span};
 
-use trials::{Series, Trials};
+use trials::Trials;
 
-/// Likelihood and inliers by hypothesis, the sample at the cursor, and the test of the result.
+/// Height of the plot \[points\].
+const HEIGHT: f32 = 180.0;
+
+/// Inliers by hypothesis, the sample at the cursor, and the test of the result.
 #[derive(Default)]
 pub struct RansacView {
     /// The trials of a run among some of its records.
@@ -39,7 +42,7 @@ impl View for RansacView {
                 return;
             };
             head(ui, context, span, trials);
-            plots(ui, context, trials);
+            plot(ui, context, trials);
             verdict::ui(ui, context, span, cursor, trials);
         });
     }
@@ -83,64 +86,37 @@ fn head(ui: &mut Ui, context: &ViewContext<'_>, span: &Span, trials: &Trials) {
     });
 }
 
-fn plots(ui: &mut Ui, context: &ViewContext<'_>, trials: &Trials) {
-    let group = ui.make_persistent_id("trials");
-    let plot = |name: &str, height: f32| {
-        Plot::new(name.to_owned())
-            .height(height)
-            .link_axis(group, [true, false])
-            .allow_scroll(false)
-            .show_x(false)
-            .show_y(false)
-            .y_axis_min_width(62.0)
-            .y_axis_label(name.to_owned())
-    };
-    let needed = plot("trials needed", 110.0)
+/// Inliers over trials. A click goes to the nearest trial.
+fn plot(ui: &mut Ui, context: &ViewContext<'_>, trials: &Trials) {
+    let strong = ui.visuals().strong_text_color();
+    // Bands would fill the corners of steps.
+    let best = Line::new("best", trials.best_support.clone()).allow_band(false).allow_hover(false);
+    let answer = Plot::new("inliers")
+        .height(HEIGHT)
+        .allow_scroll(false)
+        .show_x(false)
+        .show_y(false)
         .x_axis_label("trial")
-        .y_grid_spacer(decades)
-        .y_axis_formatter(|mark, _| format!("{:.0}", 10_f64.powf(mark.value)));
-    let plots = [
-        ("log likelihood", plot("log likelihood", 130.0), &trials.likelihood),
-        ("inliers", plot("inliers", 130.0), &trials.inliers),
-        ("trials needed", needed, &trials.needed_series),
-    ];
-    for (name, plot, series) in plots {
-        let answer = plot.show(ui, |plot| draw(plot, trials, series));
-        let response = &answer.response;
-        name_picture(response, format!("{name} by trial, {} trials", trials.made()));
-        if let (true, Some(at)) = (response.clicked(), response.interact_pointer_pos()) {
-            let distance = |[trial, value]: [f64; 2]| {
-                let point = PlotPoint::new(trial, value);
-                answer.transform.position_from_point(&point).distance_sq(at)
-            };
-            if let Some(record) = trials.nearest(series, distance) {
-                context.send(Command::MoveCursor(record));
+        .y_axis_label("inliers")
+        .show(ui, |plot| {
+            if let Some(trial) = trials.at_cursor() {
+                let cursor = VLine::new("cursor", trial.index as f64).color(strong);
+                plot.vline(cursor.width(1.0).allow_hover(false));
             }
+            let points = Points::new("hypotheses", trials.support.clone());
+            let points = points.color(theme::method(Method::FB)).radius(1.6);
+            plot.points(points.allow_hover(false));
+            plot.line(best.color(theme::ESTIMATE).width(1.5));
+        });
+    let response = &answer.response;
+    name_picture(response, format!("inliers by trial, {} trials", trials.made()));
+    if let (true, Some(at)) = (response.clicked(), response.interact_pointer_pos()) {
+        let distance = |[trial, value]: [f64; 2]| {
+            let point = PlotPoint::new(trial, value);
+            answer.transform.position_from_point(&point).distance_sq(at)
+        };
+        if let Some(record) = trials.nearest(distance) {
+            context.send(move |app| app.state.move_cursor(record));
         }
     }
-}
-
-fn draw(plot: &mut PlotUi<'_>, trials: &Trials, series: &Series) {
-    let visuals = plot.ctx().global_style().visuals.clone();
-    // Bands would fill the corners of steps.
-    let line = |name: &'static str, points: &[[f64; 2]]| {
-        Line::new(name, points.to_vec()).allow_band(false).allow_hover(false)
-    };
-    if let Some(trial) = trials.at_cursor() {
-        let cursor = VLine::new("cursor", trial.index as f64).color(visuals.strong_text_color());
-        plot.vline(cursor.width(1.0).allow_hover(false));
-    }
-    let points = Points::new("hypotheses", series.points.clone()).color(theme::method(Method::FB));
-    plot.points(points.radius(1.6).allow_hover(false));
-    plot.line(line("best", &series.best).color(theme::ESTIMATE).width(1.5));
-    let made = line("made", &series.made).color(visuals.weak_text_color());
-    plot.line(made.style(LineStyle::dashed_loose()));
-}
-
-/// Lines at 1, 10, 100 …, for logarithms to base ten.
-fn decades(input: GridInput) -> Vec<GridMark> {
-    let (from, to) = input.bounds;
-    (from.ceil().max(0.0) as i32..=to.floor().min(12.0) as i32)
-        .map(|decade| GridMark { value: f64::from(decade), step_size: 1.0 })
-        .collect()
 }

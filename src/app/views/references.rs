@@ -3,9 +3,9 @@
 use egui::{ComboBox, DragValue, Image, RichText, ScrollArea, Sense, Ui, Vec2, vec2};
 
 use super::View;
-use super::memo::Memo;
 use super::queries::dots;
-use crate::app::{Command, ReferencePick, ViewContext};
+use crate::app::memo::Memo;
+use crate::app::{ReferencePick, ViewContext};
 use crate::event::Side;
 use crate::fusion::Fusion;
 use crate::geometry::PoseError;
@@ -70,7 +70,7 @@ fn choice(ui: &mut Ui, context: &ViewContext<'_>) {
         let ways = WAYS.map(|(name, way)| (name, ReferencePick::By(way.with_count(count.max(1)))));
         for (name, pick) in ways.into_iter().chain([("by hand", ReferencePick::ByHand)]) {
             if ui.selectable_label(name == present, name).clicked() {
-                context.send(Command::PickReferences(pick));
+                context.send(move |app| app.state.pick_references(pick));
             }
         }
     });
@@ -81,7 +81,7 @@ fn choice(ui: &mut Ui, context: &ViewContext<'_>) {
         let response = ui.add(drag).on_hover_text("How many references");
         if wanted != count && (!response.dragged() || response.drag_stopped()) {
             let pick = ReferencePick::By(selection.with_count(wanted));
-            context.send(Command::PickReferences(pick));
+            context.send(move |app| app.state.pick_references(pick));
         }
     }
 }
@@ -95,13 +95,13 @@ fn numbers(ui: &mut Ui, context: &ViewContext<'_>) {
     let drag = DragValue::new(&mut wanted).range(1.0..=500.0).suffix(" m");
     let response = ui.add(drag.update_while_editing(false));
     if is_done(&response.labelled_by(label.id)) && wanted != radius_m {
-        context.send(Command::SetRadius(wanted));
+        context.send(move |app| app.state.set_radius(wanted));
     }
     let mut wanted = seed;
     let label = ui.label("Seed");
     let drag = DragValue::new(&mut wanted).update_while_editing(false);
     if is_done(&ui.add(drag).labelled_by(label.id)) && wanted != seed {
-        context.send(Command::SetSeed(wanted));
+        context.send(move |app| app.state.set_seed(wanted));
     }
 }
 
@@ -114,7 +114,8 @@ fn fusions(ui: &mut Ui, context: &ViewContext<'_>) {
         if response.on_hover_text(fusion.about).clicked() {
             // In the order of the registry.
             let is_wanted = |other: &Fusion| present.contains(other) != (*other == fusion);
-            context.send(Command::SetFusions(Fusion::all().filter(is_wanted).collect()));
+            let wanted = Fusion::all().filter(is_wanted).collect();
+            context.send(|app| app.state.set_fusions(wanted));
         }
     }
 }
@@ -129,11 +130,11 @@ fn row(ui: &mut Ui, context: &ViewContext<'_>, frame: usize) {
     if checkbox.changed() {
         frames.retain(|other| *other != frame);
         frames.extend(is_used.then_some(frame));
-        context.send(Command::SetReferences(frames));
+        context.send(|app| app.state.set_references(frames));
     }
-    match context.queries.thumbnail(Side::Reference, frame) {
+    match context.state.frame_picture(Side::Reference, frame) {
         Some(texture) => {
-            ui.add(Image::new(texture).fit_to_exact_size(THUMBNAIL).alt_text(name));
+            ui.add(Image::new(&texture).fit_to_exact_size(THUMBNAIL).alt_text(name));
         }
         None => {
             let (rect, _) = ui.allocate_exact_size(THUMBNAIL, Sense::hover());

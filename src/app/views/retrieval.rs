@@ -6,7 +6,7 @@ use super::View;
 use super::canvas::PanZoom;
 use super::images::{PhotoPair, photo};
 use super::legend::from_truth;
-use super::mesh_painter::{MarkShape, MeshPainter};
+use super::mark_shape::MarkShape;
 use crate::app::{ViewContext, theme};
 use crate::event::ReferencesRanked;
 use crate::retrieval::{Criterion, Geometry, RankedReference};
@@ -119,17 +119,16 @@ impl RetrievalView {
             format!("{} matches with {}", matches.len(), frame.name),
         ];
         let pair = PhotoPair::show(ui, area, [&query, &reference], names, &mut self.pan_zoom);
-        let mut mesh = MeshPainter::new(ui.pixels_per_point());
+        let painter = ui.painter_at(area);
         let color = theme::state(4);
         for found in matches {
             let pixels = [&found.query_pixel, &found.reference_pixel];
             let [from, to] =
                 [0, 1].map(|side| pair.at[side].on_screen(pixels[side].cast::<f32>().into()));
-            mesh.line(from, to, 1.0, color.gamma_multiply(0.6));
-            mesh.mark(MarkShape::Ring, from, 3.0, color);
-            mesh.mark(MarkShape::Ring, to, 3.0, color);
+            painter.line_segment([from, to], (1.0, color.gamma_multiply(0.6)));
+            MarkShape::Ring.paint(&painter, from, 3.0, color);
+            MarkShape::Ring.paint(&painter, to, 3.0, color);
         }
-        mesh.paint_on(&ui.painter_at(area));
         let rank = self.selected + 1;
         pair.name(ui, ["Query".to_owned(), format!("Rank {rank}: {}", frame.name)]);
         ui.advance_cursor_after_rect(area);

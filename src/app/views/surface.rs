@@ -12,7 +12,7 @@ use egui::{ScrollArea, Ui};
 
 use super::View;
 use super::readout::Readout;
-use crate::app::{Command, ViewContext};
+use crate::app::ViewContext;
 use crate::geometry::Pose;
 use crate::grid::DenseSurface;
 
@@ -52,8 +52,8 @@ impl View for SurfaceView {
             }
         };
         // The pose under the pointer is sent when it comes and when it leaves.
-        if (pointed_at.is_some() || self.is_hovering) && context.hovered() != pointed_at {
-            context.send(Command::Hover(pointed_at));
+        if (pointed_at.is_some() || self.is_hovering) && context.state.hovered != pointed_at {
+            context.send(move |app| app.state.hovered = pointed_at);
         }
         self.is_hovering = pointed_at.is_some();
     }
@@ -136,7 +136,7 @@ impl SurfaceView {
 /// The dense map, if it is shown; it is requested in each frame.
 fn dense<'a>(context: &ViewContext<'a>, search: &Search<'_>) -> Option<&'a DenseSurface> {
     let wanted = dense::wanted(context, search)?;
-    context.send(Command::FillDenseMap(wanted));
-    let map = context.dense_map(search.method)?;
+    context.send(move |app| app.state.fill_dense_map(wanted));
+    let map = context.state.dense_map(search.method)?;
     map.surface().ok().filter(|_| *map.ask() == wanted)
 }

@@ -12,7 +12,7 @@ use super::View;
 use super::canvas::{self, PanZoom};
 use super::legend::name_picture;
 use crate::app::textures::color_image;
-use crate::app::{Command, ShownView, ViewContext};
+use crate::app::{ShownView, ViewContext};
 use crate::event::Side;
 use crate::method::Method;
 use crate::place::place;
@@ -83,7 +83,7 @@ impl SynthesisView {
             let help = "Query and picture in turn (B)";
             let blink = blink.accessible_name("Blink pictures").on_hover_text(help);
             if blink.clicked() {
-                context.send(Command::Blink);
+                context.send(move |app| app.state.options.blinking = blinks);
             }
         });
     }
@@ -141,7 +141,9 @@ impl SynthesisView {
             (_, Some(picture)) => at.paint(&painter, picture.id(), Color32::WHITE),
         }
         let words = match (shown, blinks) {
-            (None, _) => format!("query {}", context.frame_label(Side::Query, problem)),
+            (None, _) => {
+                format!("query {}", context.setup.label_of(Side::Query, &problem.query.name))
+            }
             (Some(_), true) => format!("{name} (blinking)"),
             (Some(_), false) => name,
         };
@@ -164,7 +166,7 @@ fn blinking(ui: &Ui, mode: Mode) -> Mode {
 
 /// The query in grey values, as the costs see it but for their smoothing.
 fn gray_query(ui: &Ui, context: &ViewContext<'_>, problem: &Problem) -> TextureHandle {
-    let textures = context.textures;
+    let textures = &context.state.textures;
     textures.of(ui.ctx(), "gray photo", &problem.query, |query| {
         color_image(&query.photo.gray.clone().into())
     })
@@ -189,7 +191,7 @@ fn caption(
         place(&problem.reference_from_query(&shown.pose))
     );
     ui.horizontal(|ui| {
-        if context.is_probing() {
+        if context.state.is_probing() {
             ui.spinner();
         }
         ui.add(egui::Label::new(words).wrap());
@@ -199,7 +201,7 @@ fn caption(
 /// The place of the cost between that of shuffled pixels and that of the truth; for both methods
 /// where a pose of one's own was tried.
 fn costs(ui: &mut Ui, context: &ViewContext<'_>, method: Method, shown: &ShownView) {
-    match context.looking_at().and_then(|_| context.probe()) {
+    match context.state.looking_at().and_then(|_| context.state.probe()) {
         Some(probe) => {
             for (method, comparison) in &probe.comparisons {
                 cost_bar::ui(ui, context, *method, comparison.score.cost);

@@ -106,13 +106,3 @@ pub struct JudgingArgs {
     #[arg(help_heading = "Output", hide_short_help = true)]
     pub keep_failures: Option<usize>,
 }
-
-impl JudgingArgs {
-    /// Recorded failures by default.
-    const KEPT: usize = 20;
-
-    /// The number of failures to record.
-    pub fn kept_failures(&self) -> usize {
-        self.keep_failures.unwrap_or(Self::KEPT)
-    }
-}

@@ -2,12 +2,12 @@
 
 use std::path::PathBuf;
 
-use clap::Args;
+use clap::{Args, Parser as _};
 use posescope::run::Protocol;
 use posescope::scene::CameraArgument;
 use posescope::session::{Breakpoint, Task};
 
-use super::{ConfigArgs, Given};
+use super::{Arguments, Command, ConfigArgs, Given};
 use crate::cli::failure::CliError;
 
 #[derive(Debug, Args)]
@@ -49,6 +49,17 @@ pub struct RunArgs {
     )]
     #[arg(help_heading = "Output")]
     pub surface: Option<PathBuf>,
+}
+
+impl RunArgs {
+    /// The arguments of a command line that begins with `posescope run`.
+    pub fn parse(words: impl IntoIterator<Item = String>) -> Result<Box<Self>, CliError> {
+        match Arguments::try_parse_from(words).map(|parsed| parsed.command) {
+            Ok(Some(Command::Run(args))) => Ok(args),
+            Ok(_) => unreachable!("the words begin with `run`"),
+            Err(error) => Err(CliError::Usage(error.to_string())),
+        }
+    }
 }
 
 #[cfg(feature = "app")]

@@ -46,7 +46,7 @@ pub fn plan(args: &EvalArgs, before: &Path) -> Result<PlannedRun, CliError> {
 
 /// Whether the run has a result that is wrong or has no pose.
 pub fn has_failed(before: &Path) -> Result<bool, CliError> {
-    Ok(!failed(&read_rows(before)?).is_empty())
+    Ok(read_rows(before)?.iter().any(|row| row.grade.is_failure()))
 }
 
 /// Queries with a result that is wrong or has no pose.

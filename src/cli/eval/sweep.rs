@@ -31,7 +31,7 @@ pub fn sweep(
     }
     let table = write_sweep(folder, sweep, &runs)?;
     step_summary::append(&format!("{}\n", table.to_markdown()));
-    if !terminal.is_quiet() {
+    if !terminal.is_quiet {
         output::print(&figures(&table, terminal.width()))?;
         eprintln!("Runs and curves: {}", folder.display());
     }

@@ -2,13 +2,9 @@
 
 use maud::{Markup, html};
 
-use super::words::{capital, class_of, with_code};
+use super::words::{capital, class_of};
 use crate::diagnosis::Grade;
 use crate::measure::{Bar, Overview};
-
-pub(super) fn headline(overview: &Overview) -> Markup {
-    html! { p.headline { (with_code(&overview.headline)) } }
-}
 
 /// One bar for each method, with the count in each part.
 pub(super) fn methods(overview: &Overview) -> Markup {

@@ -27,8 +27,8 @@ fn cameras(path: &Path) -> Result<BTreeMap<u32, ModelCamera>, SceneError> {
     let mut file = BinaryFile::open(path)?;
     let mut cameras = BTreeMap::new();
     for _ in 0..file.count("cameras", 48)? {
-        let id = file.u32()?;
-        let number = file.u32()?;
+        let id = u32::from_le_bytes(file.take()?);
+        let number = u32::from_le_bytes(file.take()?);
         let size = (file.u64()?, file.u64()?);
         let (model, count) = model_of_number(number).map_err(|why| file.error(why))?;
         let parameters: Vec<f64> = (0..count).map(|_| file.f64()).collect::<Result<_, _>>()?;
@@ -61,12 +61,12 @@ fn images(path: &Path, points: &Points) -> Result<Vec<ModelImage>, SceneError> {
     let mut file = BinaryFile::open(path)?;
     let mut images = Vec::new();
     for _ in 0..file.count("images", 73)? {
-        let _id = file.u32()?;
+        let _id = u32::from_le_bytes(file.take()?);
         let [qw, qx, qy, qz] = [file.f64()?, file.f64()?, file.f64()?, file.f64()?];
         let position = [file.f64()?, file.f64()?, file.f64()?];
         let camera_from_world =
             lines::pose(position, [qx, qy, qz, qw]).map_err(|why| file.error(why))?;
-        let camera = file.u32()?;
+        let camera = u32::from_le_bytes(file.take()?);
         let name = file.name()?;
         let mut observed = Vec::new();
         for _ in 0..file.count("features", 24)? {
@@ -119,10 +119,6 @@ impl BinaryFile {
             }
             _ => Err(self.error(format!("{N} more bytes expected, the file is cut off"))),
         }
-    }
-
-    fn u32(&mut self) -> Result<u32, SceneError> {
-        self.take().map(u32::from_le_bytes)
     }
 
     fn u64(&mut self) -> Result<u64, SceneError> {

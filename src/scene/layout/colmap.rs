@@ -4,18 +4,14 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use nalgebra::{Point2, Point3};
 
 use super::{Drive, DriveWriter, Layout, Shot, joined, make_folder, write, write_image};
 use crate::scene::SceneError;
 
-pub(super) const LAYOUT: Layout = Layout {
-    name: "colmap",
-    place: str::to_owned,
-    create: |root, name, drive| Ok(Box::new(Writer::create(root, name, drive)?)),
-};
+pub(super) const LAYOUT: Layout = Layout { name: "colmap", place: str::to_owned, create };
 
 /// The most points per frame: a photo has some thousand features.
 const MOST_POINTS: usize = 2000;
@@ -30,16 +26,19 @@ struct Writer {
     observed: Mutex<BTreeMap<usize, Vec<Observation>>>,
 }
 
-impl Writer {
-    fn create(root: &Path, name: &str, drive: Drive) -> Result<Self, SceneError> {
-        let folder = root.join(name);
-        make_folder(&folder.join("images"))?;
-        make_folder(&folder.join("sparse/0"))?;
-        Ok(Self { folder, drive, observed: Mutex::default() })
-    }
+fn create(root: &Path, name: &str, drive: Drive) -> Result<DriveWriter, SceneError> {
+    let folder = root.join(name);
+    make_folder(&folder.join("images"))?;
+    make_folder(&folder.join("sparse/0"))?;
+    let writer = Arc::new(Writer { folder, drive, observed: Mutex::default() });
+    let finished = Arc::clone(&writer);
+    Ok(DriveWriter {
+        frame: Box::new(move |shot| writer.frame(shot)),
+        finish: Box::new(move || finished.finish()),
+    })
 }
 
-impl DriveWriter for Writer {
+impl Writer {
     fn frame(&self, shot: &Shot<'_>) -> Result<(), SceneError> {
         let camera = &self.drive.intrinsics;
         let world_from_camera = self.drive.poses[shot.index];

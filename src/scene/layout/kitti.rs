@@ -4,48 +4,44 @@
 //! therefore also that of camera 0, which poses and `Tr` refer to. Scans are in the frame of the scanner, as in KITTI:
 //! x forward, y left, z up. Reading a scan back rounds its points by a few micrometres.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use nalgebra::{Matrix3x4, Point3, Vector3};
 
 use super::{
-    CAMERA_FROM_VELODYNE, Drive, DriveWriter, Layout, Shot, make_folder, make_frame_folder,
-    row_by_row, write, write_image,
+    CAMERA_FROM_VELODYNE, Drive, DriveWriter, Layout, make_folder, make_frame_folder, row_by_row,
+    write, write_image,
 };
 use crate::camera::Intrinsics;
 use crate::geometry::matrix_from_pose;
 use crate::scene::SceneError;
 
-pub(super) const LAYOUT: Layout = Layout {
-    name: "kitti",
-    place: |name| format!("sequences/{name}"),
-    create: |root, name, drive| Ok(Box::new(Writer::create(root, name, drive)?)),
-};
+pub(super) const LAYOUT: Layout =
+    Layout { name: "kitti", place: |name| format!("sequences/{name}"), create };
 
 const IMAGES: &str = "image_2";
 const SCANS: &str = "velodyne";
 
-struct Writer {
-    folder: PathBuf,
-    drive: Drive,
-}
-
-impl Writer {
-    fn create(root: &Path, name: &str, drive: Drive) -> Result<Self, SceneError> {
-        let folder = root.join("sequences").join(name);
-        let poses = root.join("poses");
-        make_folder(&poses)?;
-        for (kind, extension) in [(IMAGES, "png"), (SCANS, "bin")] {
-            make_frame_folder(&folder.join(kind), extension)?;
-        }
-        write(&folder.join("calib.txt"), calibration(&drive))?;
-        let lines = drive.poses.iter().map(matrix_from_pose);
-        let lines: String = lines.map(|pose| row_by_row(&pose) + "\n").collect();
-        write(&poses.join(format!("{name}.txt")), lines)?;
-        let times = drive.times_s.iter().map(|time| format!("{time:e}\n"));
-        write(&folder.join("times.txt"), times.collect::<String>().as_bytes())?;
-        Ok(Self { folder, drive })
+fn create(root: &Path, name: &str, drive: Drive) -> Result<DriveWriter, SceneError> {
+    let folder = root.join("sequences").join(name);
+    let poses = root.join("poses");
+    make_folder(&poses)?;
+    for (kind, extension) in [(IMAGES, "png"), (SCANS, "bin")] {
+        make_frame_folder(&folder.join(kind), extension)?;
     }
+    write(&folder.join("calib.txt"), calibration(&drive))?;
+    let lines = drive.poses.iter().map(matrix_from_pose);
+    let lines: String = lines.map(|pose| row_by_row(&pose) + "\n").collect();
+    write(&poses.join(format!("{name}.txt")), lines)?;
+    let times = drive.times_s.iter().map(|time| format!("{time:e}\n"));
+    write(&folder.join("times.txt"), times.collect::<String>().as_bytes())?;
+    Ok(DriveWriter::new(move |shot| {
+        let name = &drive.names[shot.index];
+        let scan = velodyne_bytes(shot.scan, &drive.scanner);
+        // The scan first: a frame with a photo is complete.
+        write(&folder.join(SCANS).join(format!("{name}.bin")), &scan)?;
+        write_image(&folder.join(IMAGES).join(format!("{name}.png")), shot.photo)
+    }))
 }
 
 fn calibration(drive: &Drive) -> String {
@@ -64,16 +60,6 @@ fn calibration(drive: &Drive) -> String {
     text
 }
 
-impl DriveWriter for Writer {
-    fn frame(&self, shot: &Shot<'_>) -> Result<(), SceneError> {
-        let name = &self.drive.names[shot.index];
-        let scan = velodyne_bytes(shot.scan, &self.drive.scanner);
-        // The scan first: a frame with a photo is complete.
-        write(&self.folder.join(SCANS).join(format!("{name}.bin")), &scan)?;
-        write_image(&self.folder.join(IMAGES).join(format!("{name}.png")), shot.photo)
-    }
-}
-
 /// A scan in the frame of its scanner, given the scanner's position in the camera's frame \[m\].
 fn velodyne_bytes(scan: &[(Point3<f32>, f32)], scanner: &Point3<f64>) -> Vec<u8> {
     let velodyne_from_camera = CAMERA_FROM_VELODYNE.transpose();
@@ -89,6 +75,7 @@ fn velodyne_bytes(scan: &[(Point3<f32>, f32)], scanner: &Point3<f64>) -> Vec<u8>
 
 #[cfg(test)]
 mod tests {
+    use super::super::Shot;
     use super::*;
     use crate::geometry::Pose;
     use crate::scene;
@@ -123,13 +110,13 @@ mod tests {
             times_s: vec![0.0, 0.1],
             ..drive(scanner)
         };
-        let writer = Writer::create(root.path(), "dusk", drive).expect("writable");
+        let writer = create(root.path(), "dusk", drive).expect("writable");
         let (width, height) = (intrinsics.width, intrinsics.height);
         let photo = RgbImage::from_fn(width, height, |x, y| image::Rgb([x as u8, y as u8, 9]));
         let points = [Point3::new(7.6, 2.85, 10.0), Point3::new(-3.1, 0.4, -41.7)];
         let scan: Vec<_> = points.into_iter().zip([0.25, 0.5]).collect();
         let shot = Shot { index: 1, photo: &photo, scan: &scan, depth: &|_| None };
-        writer.frame(&shot).expect("writable");
+        (writer.frame)(&shot).expect("writable");
 
         let folder = root.path().join("sequences/dusk");
         let argument = folder.to_str().expect("a plain path");
@@ -162,7 +149,7 @@ mod tests {
         for name in ["000003.png", "notes.png", "000003.txt"] {
             fs::write(images.join(name), b"").expect("writable");
         }
-        Writer::create(root.path(), "dusk", drive(Point3::origin())).expect("writable");
+        create(root.path(), "dusk", drive(Point3::origin())).expect("writable");
         let there = |name| images.join(name).exists();
         assert!(!there("000003.png"));
         assert!(there("notes.png") && there("000003.txt"));

@@ -10,9 +10,12 @@ use super::stream::Stream;
 use crate::cost::ExplanationKind;
 use crate::estimator::{self, Entry};
 use crate::features::FeatureState;
+use crate::geometry::Pose;
+use crate::localize::QueryResult;
 use crate::method::Method;
 use crate::palette;
 use crate::problem::Problem;
+use crate::proof::responsible;
 
 /// Ranked frames per row; car photos are wide.
 const RANKS_PER_ROW: usize = 3;
@@ -42,6 +45,33 @@ pub(super) struct Focus {
     pub(super) proven: Vec<Method>,
     /// Places that the view of the world must include, in the frame of the first reference camera \[m\].
     pub(super) places: Vec<[f64; 3]>,
+}
+
+impl Focus {
+    /// From all results of a query.
+    pub(super) fn of(
+        first: &Problem,
+        truth: Option<&Pose>,
+        results: &[QueryResult],
+        proven: &[Method],
+    ) -> Self {
+        let wrong = results.iter().filter(|result| is_wrong(result));
+        let estimates = results.iter().filter_map(|result| result.pose.as_ref()?.to_pose());
+        let in_reference = |pose: &Pose| -> [f64; 3] {
+            first.reference_from_query(pose).translation.vector.into()
+        };
+        Self {
+            wrong: wrong.filter_map(responsible).collect(),
+            proven: proven.to_vec(),
+            places: estimates.chain(truth.copied()).map(|pose| in_reference(&pose)).collect(),
+        }
+    }
+}
+
+/// Whether a result is wrong or missing, or has a failure verdict.
+pub(super) fn is_wrong(result: &QueryResult) -> bool {
+    let mut verdicts = result.diagnosis.iter();
+    result.grade.is_failure() || verdicts.any(|one| one.code.is_failure())
 }
 
 /// Sends the layout for a run.
@@ -98,11 +128,11 @@ fn root(input: &LayoutInput<'_>) -> BlueprintNode {
         words.push(document("Ranking", entities::RETRIEVAL_TABLE));
     }
     let mut left =
-        vec![(3.0, overview(viewpoints, &focus.places).into()), (2.0, BlueprintNode::Tabs(words))];
+        vec![(3.0, overview(viewpoints, &focus.places).into()), (2.0, BlueprintNode::tabs(words))];
     if has_pages {
         left.insert(0, (4.0, document("Lesson", entities::LESSON)));
     }
-    let left = BlueprintNode::Column(left);
+    let left = BlueprintNode::column(left);
     let mut rows = Vec::new();
     if shows_features(methods) {
         rows.push((1.0, feature_row()));
@@ -120,7 +150,7 @@ fn root(input: &LayoutInput<'_>) -> BlueprintNode {
     if rows.is_empty() {
         rows = equal(direct);
     } else if !direct.is_empty() {
-        rows.push((share, BlueprintNode::Tabs(direct)));
+        rows.push((share, BlueprintNode::tabs(direct)));
     }
     // The proofs come first: a recording of a failure opens on them.
     let proofs = focus.proven.iter().map(|&method| {
@@ -128,12 +158,12 @@ fn root(input: &LayoutInput<'_>) -> BlueprintNode {
         view("2D", name, entities::proof(method))
     });
     let mut tabs: Vec<BlueprintNode> = proofs.collect();
-    tabs.push(row("Methods", equal([BlueprintNode::Column(rows)])));
+    tabs.push(BlueprintNode::row("Methods", equal([BlueprintNode::column(rows)])));
     if ranked > 0 {
         tabs.push(ranks(ranked));
     }
-    let right = BlueprintNode::Tabs(tabs);
-    row("posescope", vec![(2.0, left), (3.0, right)])
+    let right = BlueprintNode::tabs(tabs);
+    BlueprintNode::row("posescope", vec![(2.0, left), (3.0, right)])
 }
 
 /// The ranked frames, the best at the top left.
@@ -144,8 +174,8 @@ fn ranks(ranked: usize) -> BlueprintNode {
     };
     let ranks: Vec<usize> = (0..ranked).collect();
     let rows = ranks.chunks(RANKS_PER_ROW);
-    let rows = rows.map(|chunk| row("ranks", equal(chunk.iter().map(frame))));
-    row("Retrieval", equal([BlueprintNode::Column(equal(rows))]))
+    let rows = rows.map(|chunk| BlueprintNode::row("ranks", equal(chunk.iter().map(frame))));
+    BlueprintNode::row("Retrieval", equal([BlueprintNode::column(equal(rows))]))
 }
 
 fn overview(viewpoints: &Viewpoints<'_>, places: &[[f64; 3]]) -> BlueprintView {
@@ -162,20 +192,20 @@ fn feature_row() -> BlueprintNode {
         format!("- $origin/{}/**", FeatureState::NAMES[0]),
         format!("- $origin/{}/**", FeatureState::NAMES[1]),
     ]);
-    let photos = BlueprintNode::Tabs(vec![photo.into(), view("2D", "Query", "query")]);
+    let photos = BlueprintNode::tabs([photo.into(), view("2D", "Query", "query")]);
     let [inliers, likelihood] =
         ["inliers", "log likelihood"].map(|what| format!("RANSAC {what} (timeline eval)"));
-    let numbers = BlueprintNode::Tabs(vec![
+    let numbers = BlueprintNode::tabs(vec![
         plot("RANSAC best", entities::RANSAC_BEST),
         plot(inliers, entities::RANSAC_INLIERS),
         plot(likelihood, entities::RANSAC_LIKELIHOOD),
     ]);
-    let funnel = BlueprintNode::Tabs(vec![
+    let funnel = BlueprintNode::tabs(vec![
         view("TextDocument", "Funnel", entities::FUNNEL_TABLE),
         view("BarChart", "Funnel chart", entities::FUNNEL),
     ]);
-    let numbers = BlueprintNode::Column(equal([numbers, funnel]));
-    row("FB", vec![(3.0, photos), (2.0, numbers)])
+    let numbers = BlueprintNode::column(equal([numbers, funnel]));
+    BlueprintNode::row("FB", vec![(3.0, photos), (2.0, numbers)])
 }
 
 /// The search of a direct method, step by step.
@@ -183,7 +213,7 @@ fn search_row(method: Method, viewpoints: &Viewpoints<'_>) -> BlueprintNode {
     let name = method.label();
     let of = |part: &str| entities::direct(method, part);
     let image = |what: &str, part: &str| view("2D", format!("{name} {what}"), of(part));
-    let comparison = BlueprintNode::Tabs(if !has_histogram(method) {
+    let comparison = BlueprintNode::tabs(if !has_histogram(method) {
         vec![image("residual", "residual"), image("weights", "weights")]
     } else {
         vec![
@@ -192,17 +222,17 @@ fn search_row(method: Method, viewpoints: &Viewpoints<'_>) -> BlueprintNode {
         ]
     });
     let query = view("2D", "Query", entities::QUERY_IMAGE);
-    let views = BlueprintNode::Tabs(vec![image("synthetic", "synthetic"), query]);
+    let views = BlueprintNode::tabs(vec![image("synthetic", "synthetic"), query]);
     let yaw = entities::yaw_curve(method);
-    let maps = BlueprintNode::Tabs(vec![
+    let maps = BlueprintNode::tabs(vec![
         map(method, "cost", viewpoints).into(),
         view("BarChart", format!("{name} yaw [°]"), yaw),
         map(method, "coverage", viewpoints).into(),
         plot(format!("{name} best"), of("best")),
         plot(format!("{name} cost (timeline eval)"), of("cost")),
     ]);
-    let views = BlueprintNode::Column(equal([views, comparison]));
-    row(&name, vec![(3.0, views), (2.0, maps)])
+    let views = BlueprintNode::column(equal([views, comparison]));
+    BlueprintNode::row(&name, vec![(3.0, views), (2.0, maps)])
 }
 
 fn view(class: &'static str, name: impl Into<String>, origin: impl Into<String>) -> BlueprintNode {
@@ -212,10 +242,6 @@ fn view(class: &'static str, name: impl Into<String>, origin: impl Into<String>)
 /// Nodes with equal shares.
 fn equal(nodes: impl IntoIterator<Item = BlueprintNode>) -> Vec<(f32, BlueprintNode)> {
     nodes.into_iter().map(|node| (1.0, node)).collect()
-}
-
-fn row(name: &str, children: Vec<(f32, BlueprintNode)>) -> BlueprintNode {
-    BlueprintNode::Row { name: name.to_owned(), children }
 }
 
 /// A surface of the grid search, seen from above.

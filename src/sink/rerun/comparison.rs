@@ -96,9 +96,7 @@ fn root(methods: &BTreeSet<Method>) -> BlueprintNode {
     });
     let poses = BlueprintView::new("3D", "Poses", entities::WORLD);
     let changes = BlueprintView::new("TextDocument", "Changes", entities::REPORT);
-    let left = BlueprintNode::Column(vec![(1.0, poses.into()), (1.0, changes.into())]);
-    BlueprintNode::Row {
-        name: "runs".to_owned(),
-        children: vec![(2.0, left), (3.0, BlueprintNode::Column(errors.collect()))],
-    }
+    let left = BlueprintNode::column(vec![(1.0, poses.into()), (1.0, changes.into())]);
+    let right = BlueprintNode::column(errors.collect());
+    BlueprintNode::row("runs", vec![(2.0, left), (3.0, right)])
 }

@@ -6,8 +6,8 @@ use rerun::Scalars;
 
 use super::encode::{Encoded, indexed, png};
 use super::entities;
-use super::event_context::EventContext;
 use super::indexed;
+use super::scene::EventContext;
 use super::stream::Stream;
 use super::surface::{self, CostRange};
 use crate::cost::{Entropies, Explanation};
@@ -99,10 +99,8 @@ impl DirectContext {
             Phase::YawCoarse | Phase::YawFine => surface::log_yaw(stream, surface, context),
         }
         let path = |part: &str| entities::direct(context.method, part);
-        stream.log_scalars(&path("cost"), &self.costs);
-        stream.log_scalars(&path("coverage"), &self.coverages);
-        self.costs.clear();
-        self.coverages.clear();
+        stream.log_scalars(&path("cost"), &mut self.costs);
+        stream.log_scalars(&path("coverage"), &mut self.coverages);
         stream.flush();
     }
 }

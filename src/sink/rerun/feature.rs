@@ -7,8 +7,7 @@ use rerun::{BarChart, Clear, LineStrips2D, Points2D, Radius, Scalars, TextDocume
 
 use super::encode::jpeg;
 use super::entities::{self, UNDECIDED};
-use super::event_context::EventContext;
-use super::scene::log_rays;
+use super::scene::{EventContext, log_rays};
 use super::stream::Stream;
 use crate::depth::LiftedMatch;
 use crate::event::{DepthsLifted, Event, FeaturesDetected, HypothesisTried, MatchesGuided, Side};
@@ -59,10 +58,8 @@ impl FeatureContext {
 
     /// Records the trials, which are collected until a stage is over.
     pub(super) fn tell_trials(&mut self, stream: &mut Stream) {
-        stream.log_scalars(entities::RANSAC_LIKELIHOOD, &self.likelihoods);
-        stream.log_scalars(entities::RANSAC_INLIERS, &self.inliers);
-        self.likelihoods.clear();
-        self.inliers.clear();
+        stream.log_scalars(entities::RANSAC_LIKELIHOOD, &mut self.likelihoods);
+        stream.log_scalars(entities::RANSAC_INLIERS, &mut self.inliers);
     }
 
     fn detected(

@@ -10,29 +10,21 @@ use crate::fusion::ShareOutcome;
 use crate::method::Method;
 use crate::palette;
 
-/// The tables of one query's fusions so far.
-#[derive(Default)]
-pub(super) struct FusionTables {
-    tables: String,
-}
-
-impl FusionTables {
-    /// Records one fusion of a method's poses.
-    pub(super) fn tell(
-        &mut self,
-        event: &ReferencesFused,
-        method: Method,
-        origin: Origin,
-        stream: &mut Stream,
-    ) {
-        let weights = event.shares.iter().map(|share| share.weight);
-        let chart = BarChart::new(weights.collect::<Vec<f64>>());
-        stream.log(&entities::fusion_weights(method), &chart);
-        self.tables += &table(event, method);
-        let document = TextDocument::from_markdown(self.tables.as_str());
-        stream.log(entities::FUSION_TABLE, &document);
-        stream.log(&entities::fusion_candidates(method), &candidates(event, origin));
-    }
+/// Records one fusion of a method's poses, and adds its table to those of the query.
+pub(super) fn tell(
+    event: &ReferencesFused,
+    method: Method,
+    origin: Origin,
+    tables: &mut String,
+    stream: &mut Stream,
+) {
+    let weights = event.shares.iter().map(|share| share.weight);
+    let chart = BarChart::new(weights.collect::<Vec<f64>>());
+    stream.log(&entities::fusion_weights(method), &chart);
+    *tables += &table(event, method);
+    let document = TextDocument::from_markdown(tables.as_str());
+    stream.log(entities::FUSION_TABLE, &document);
+    stream.log(&entities::fusion_candidates(method), &candidates(event, origin));
 }
 
 /// The query's position by each reference alone.

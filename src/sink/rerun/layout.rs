@@ -61,19 +61,28 @@ impl BlueprintView {
 
 /// A node of the layout.
 pub(super) enum BlueprintNode {
-    /// Side by side, with shares of the width.
-    Row {
-        /// The title of its tab.
-        name: String,
-        /// The nodes from left to right, with their shares of the width.
-        children: Vec<(f32, BlueprintNode)>,
-    },
-    /// Stacked, with shares of the height.
-    Column(Vec<(f32, BlueprintNode)>),
-    /// Tabs; the first one is open.
-    Tabs(Vec<BlueprintNode>),
+    /// Nodes with their shares of the width or height, and the title of the tab that they are in.
+    Container { kind: ContainerKind, name: Option<String>, children: Vec<(f32, BlueprintNode)> },
     /// A single view.
     View(Box<BlueprintView>),
+}
+
+impl BlueprintNode {
+    /// Side by side, with shares of the width, below this title.
+    pub(super) fn row(name: &str, children: Vec<(f32, Self)>) -> Self {
+        Self::Container { kind: ContainerKind::Horizontal, name: Some(name.to_owned()), children }
+    }
+
+    /// Stacked, with shares of the height.
+    pub(super) fn column(children: Vec<(f32, Self)>) -> Self {
+        Self::Container { kind: ContainerKind::Vertical, name: None, children }
+    }
+
+    /// Tabs; the first one is open.
+    pub(super) fn tabs(children: impl IntoIterator<Item = Self>) -> Self {
+        let children = children.into_iter().map(|child| (1.0, child)).collect();
+        Self::Container { kind: ContainerKind::Tabs, name: None, children }
+    }
 }
 
 impl From<BlueprintView> for BlueprintNode {
@@ -95,9 +104,9 @@ pub(super) fn send(
         .blueprint()
         .memory()?;
     stream.set_time_sequence("blueprint", 0);
-    let path = log_node(&stream, root, "root")?;
+    log_node(&stream, root, "root")?;
     let viewport = ViewportBlueprint::new()
-        .with_root_container(RootContainer(id(&path).to_be_bytes().into()))
+        .with_root_container(RootContainer(id("root").to_be_bytes().into()))
         .with_auto_layout(false)
         .with_auto_views(false);
     stream.log("viewport", &viewport)?;
@@ -121,45 +130,33 @@ pub(super) fn send(
     Ok(())
 }
 
-/// Logs a node with its children; `place` is its path in the tree. Returns that path.
+/// Logs a node with its children; `place` is its path in the tree.
 fn log_node(
     stream: &RecordingStream,
     node: &BlueprintNode,
     place: &str,
-) -> RecordingStreamResult<String> {
-    let (kind, children): (_, Vec<(f32, &BlueprintNode)>) = match node {
-        BlueprintNode::View(view) => {
-            log_view(stream, view, place)?;
-            return Ok(place.to_owned());
-        }
-        BlueprintNode::Row { children, .. } => (ContainerKind::Horizontal, shares(children)),
-        BlueprintNode::Column(children) => (ContainerKind::Vertical, shares(children)),
-        BlueprintNode::Tabs(children) => {
-            (ContainerKind::Tabs, children.iter().map(|child| (1.0, child)).collect())
-        }
+) -> RecordingStreamResult<()> {
+    let (kind, name, children) = match node {
+        BlueprintNode::View(view) => return log_view(stream, view, place),
+        BlueprintNode::Container { kind, name, children } => (*kind, name, children),
     };
     let mut contents = Vec::new();
     for (index, (_, child)) in children.iter().enumerate() {
-        let name = log_node(stream, child, &format!("{place}/{index}"))?;
-        contents.push(IncludedContent(path_of(child, &name).as_str().into()));
+        let place = format!("{place}/{index}");
+        log_node(stream, child, &place)?;
+        contents.push(IncludedContent(path_of(child, &place).as_str().into()));
     }
-    let shares: Vec<f32> = children.iter().map(|(share, _)| *share).collect();
+    let container = ContainerBlueprint::new(kind).with_contents(contents);
+    let shares = children.iter().map(|(share, _)| (*share).into());
     let container = match kind {
-        ContainerKind::Vertical => ContainerBlueprint::new(kind)
-            .with_row_shares(shares.into_iter().map(|share| RowShare(share.into()))),
-        _ => ContainerBlueprint::new(kind)
-            .with_col_shares(shares.into_iter().map(|share| ColumnShare(share.into()))),
+        ContainerKind::Vertical => container.with_row_shares(shares.map(RowShare)),
+        _ => container.with_col_shares(shares.map(ColumnShare)),
     };
-    let container = match node {
-        BlueprintNode::Row { name, .. } => container.with_display_name(Name(name.as_str().into())),
-        _ => container,
+    let container = match name {
+        Some(name) => container.with_display_name(Name(name.as_str().into())),
+        None => container,
     };
-    stream.log(path_of(node, place), &container.with_contents(contents))?;
-    Ok(place.to_owned())
-}
-
-fn shares(children: &[(f32, BlueprintNode)]) -> Vec<(f32, &BlueprintNode)> {
-    children.iter().map(|(share, child)| (*share, child)).collect()
+    stream.log(path_of(node, place), &container)
 }
 
 fn log_view(
@@ -184,7 +181,7 @@ fn log_view(
 fn path_of(node: &BlueprintNode, place: &str) -> String {
     match node {
         BlueprintNode::View(view) => view_path(place, view.class),
-        _ => format!("container/{}", uuid(place)),
+        BlueprintNode::Container { .. } => format!("container/{}", uuid(place)),
     }
 }
 

@@ -76,7 +76,7 @@ impl Recorder {
 
     /// Reserves room for the pages of a lesson in the layout.
     pub fn with_pages(self) -> Self {
-        self.tell(Recording::leave_room_for_pages);
+        self.tell(|recording| recording.has_pages = true);
         self
     }
 
@@ -91,14 +91,11 @@ impl Recorder {
     /// # Errors
     /// The first error of the whole run.
     pub fn close(mut self) -> Result<(), RecordError> {
-        self.finish().map_or(Ok(()), Recording::close)
-    }
-
-    /// Waits until everything is recorded.
-    fn finish(&mut self) -> Option<Recording> {
-        let Writer { tasks, thread } = self.writer.take()?;
+        let Some(Writer { tasks, thread }) = self.writer.take() else {
+            return Ok(());
+        };
         drop(tasks);
-        Some(thread.join().unwrap_or_else(|panic| panic::resume_unwind(panic)))
+        thread.join().unwrap_or_else(|panic| panic::resume_unwind(panic)).close()
     }
 
     fn tell(&self, task: impl FnOnce(&mut Recording) + Send + 'static) {

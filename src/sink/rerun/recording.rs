@@ -6,16 +6,13 @@ use std::sync::Arc;
 use image::DynamicImage;
 use rerun::{StateChange, TextDocument, TextLog, TextLogLevel, ViewCoordinates};
 
-use super::blueprint::Focus;
+use super::blueprint::{Focus, is_wrong};
 use super::direct::DirectContext;
 use super::encode::jpeg;
-use super::event_context::EventContext;
 use super::feature::FeatureContext;
-use super::fusion::FusionTables;
-use super::scene::{self, Origin, PlacedCamera};
-use super::story;
+use super::scene::{self, EventContext, Origin, PlacedCamera};
 use super::stream::Stream;
-use super::{Identity, RecordError, Targets, blueprint, entities, report, retrieval};
+use super::{Identity, RecordError, Targets, blueprint, entities, fusion, report, retrieval};
 use crate::event::{Event, ReferencesFused, ReferencesRanked, Stage};
 use crate::geometry::Pose;
 use crate::localize::{PoseReport, QueryResult};
@@ -44,7 +41,7 @@ pub(super) struct Recording {
     origin: Option<Origin>,
     is_laid_out: bool,
     /// Whether there are pages of a lesson.
-    has_pages: bool,
+    pub(super) has_pages: bool,
     query: CurrentQuery,
     /// The number of each estimator's hypotheses in earlier runs.
     evals: BTreeMap<Method, i64>,
@@ -62,7 +59,8 @@ struct CurrentQuery {
     stages: Vec<Stage>,
     /// The estimators whose stages are open, outermost first.
     estimators: Vec<ActiveEstimator>,
-    fusion: FusionTables,
+    /// The tables of the fusions so far, as Markdown.
+    fusions: String,
     /// The records for proofs, by reference and estimator.
     records: BTreeMap<(usize, Method), Vec<Record>>,
     /// Methods with a proof.
@@ -103,11 +101,6 @@ impl Recording {
             query: CurrentQuery::default(),
             evals: BTreeMap::new(),
         })
-    }
-
-    /// Reserves room in the layout for the pages of a lesson.
-    pub(super) fn leave_room_for_pages(&mut self) {
-        self.has_pages = true;
     }
 
     /// Whether the recording has failed.
@@ -157,7 +150,7 @@ impl Recording {
             return;
         }
         if let Some(first) = problems.first() {
-            self.send_layout(story::focus(first, truth.as_ref(), results, proven));
+            self.send_layout(Focus::of(first, truth.as_ref(), results, proven));
         }
     }
 
@@ -182,7 +175,7 @@ impl Recording {
         let (Some(problem), Some(estimator)) = (query.problem(), proof::responsible(result)) else {
             return;
         };
-        if !story::is_wrong(result) || query.proven.contains(&result.method) {
+        if !is_wrong(result) || query.proven.contains(&result.method) {
             return;
         }
         let records = query.records.get(&(query.reference, estimator));
@@ -209,15 +202,13 @@ impl Recording {
     }
 
     fn estimate(&mut self, result: &QueryResult) {
-        let Some(method) = self.query.method else {
+        let (Some(method), Some(problem), Some(origin)) =
+            (self.query.method, self.query.problem(), self.origin)
+        else {
             return;
         };
-        let (Some(problem), Some(origin)) = (self.query.problem(), self.origin) else {
-            return;
-        };
-        let pose = result.pose.as_ref().and_then(PoseReport::to_pose);
         let owner = entities::estimate(method);
-        match pose {
+        match result.pose.as_ref().and_then(PoseReport::to_pose) {
             Some(pose) => {
                 let camera = PlacedCamera {
                     owner: &owner,
@@ -311,21 +302,17 @@ impl Recording {
         self.stream.advance();
         let words = narration::sentence(&Event::from(event.clone())).unwrap_or_default();
         self.say(&format!("{}: {words}", method.name()), TextLogLevel::INFO);
-        let tables = &mut self.query.fusion;
-        tables.tell(event, method, origin, &mut self.stream);
+        let tables = &mut self.query.fusions;
+        fusion::tell(event, method, origin, tables, &mut self.stream);
     }
 
     fn ranked(&mut self, event: &ReferencesRanked) {
         let (Some(problem), Some(origin)) = (self.query.problems.first(), self.origin) else {
             return;
         };
-        let context = retrieval::RankingContext {
-            query: &problem.query,
-            truth: self.query.truth.as_ref(),
-            origin,
-        };
         self.stream.advance();
-        retrieval::tell(event, &context, &mut self.stream);
+        let truth = self.query.truth.as_ref();
+        retrieval::tell(event, &problem.query, truth, origin, &mut self.stream);
         let words = narration::sentence(&Event::from(event.clone())).unwrap_or_default();
         let path = narration::stages(&self.query.stages);
         self.say(&format!("{path}: {words}"), TextLogLevel::INFO);

@@ -51,29 +51,24 @@ pub(super) fn markdown(
 /// The failures in sentences: primary verdict, other verdicts and remedies of each method.
 fn story(results: &[QueryResult]) -> String {
     let mut text = String::new();
-    for result in results.iter().filter(|result| !result.diagnosis.is_empty()) {
-        text += &failure(result);
+    for result in results {
+        let Some(primary) = result.diagnosis.first() else {
+            continue;
+        };
+        let worth = match &result.error {
+            Some(error) => format!("{} off", error.translation()),
+            None => result.grade.to_string(),
+        };
+        let (first, rest) = first_sentence(&primary.text);
+        let rest = [rest, primary.code.name()].join(" ");
+        let name = result.method_name();
+        text += &format!("### {name}: {worth}\n\n**{first}** {}\n\n", rest.trim());
         for paragraph in result.paragraphs() {
             text += &format!("- {paragraph}\n");
         }
         text += "\n";
     }
     text
-}
-
-/// Method and error, and the primary verdict: its first sentence, the rest, its code.
-fn failure(result: &QueryResult) -> String {
-    let worth = match &result.error {
-        Some(error) => format!("{} off", error.translation()),
-        None => result.grade.to_string(),
-    };
-    let name = result.method_name();
-    let Some(primary) = result.diagnosis.first() else {
-        return format!("### {name}: {worth}\n\n");
-    };
-    let (first, rest) = first_sentence(&primary.text);
-    let rest = [rest, primary.code.name()].join(" ");
-    format!("### {name}: {worth}\n\n**{first}** {}\n\n", rest.trim())
 }
 
 fn errors(results: &[QueryResult]) -> String {
@@ -218,16 +213,19 @@ mod tests {
             "error": {"translation_m": 12.5, "rotation_deg": 1.0, "max_euler_deg": 1.0}
         });
         let mut result: QueryResult = serde_json::from_value(result).expect("a result");
-        assert_eq!(failure(&result), "### mi: 12.500 m off\n\n");
+        assert_eq!(story(std::slice::from_ref(&result)), "");
         result.diagnosis = vec![Diagnosis {
             code: Code::D3,
             text: "The search missed it: cost 0.9. The right cell is 5th.".to_owned(),
             evidence: Default::default(),
         }];
+        let text = story(&[result]);
+        let (failure, advice) = text.split_once("- try: ").expect("advice");
         assert_eq!(
-            failure(&result),
+            failure,
             "### mi: 12.500 m off\n\n**The search missed it: cost 0.9.** The right cell is 5th. D3\n\n"
         );
+        assert!(advice.ends_with("\n\n"));
     }
 
     #[test]

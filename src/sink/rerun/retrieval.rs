@@ -1,7 +1,6 @@
 //! Records retrieval: the ranked frames with the query, scores and verified matches.
 
 use image::imageops::thumbnail;
-use nalgebra::Point2;
 use rerun::{LineStrips2D, Points2D, Points3D, Radius, TextDocument};
 
 use super::encode::jpeg;
@@ -11,6 +10,7 @@ use super::stream::Stream;
 use crate::event::ReferencesRanked;
 use crate::geometry::Pose;
 use crate::image::Photo;
+use crate::narration::{score, verified};
 use crate::palette;
 use crate::picture;
 use crate::problem::Query;
@@ -19,25 +19,23 @@ use crate::retrieval::{Criterion, Geometry, RankedReference, ReferenceRanking, V
 /// The greatest width of a canvas \[px\]: ten of them are as large as one photo of full size.
 const CANVAS_WIDTH: u32 = 480;
 
-/// The context of a ranking.
-pub(super) struct RankingContext<'a> {
-    pub(super) query: &'a Query,
-    /// The true pose of the query, if known.
-    pub(super) truth: Option<&'a Pose>,
-    pub(super) origin: Origin,
-}
-
-/// Records a ranking.
-pub(super) fn tell(event: &ReferencesRanked, context: &RankingContext<'_>, stream: &mut Stream) {
+/// Records a ranking; `truth` is the true pose of the query, if known.
+pub(super) fn tell(
+    event: &ReferencesRanked,
+    query: &Query,
+    truth: Option<&Pose>,
+    origin: Origin,
+    stream: &mut Stream,
+) {
     let ranking = &event.ranking;
-    let document = TextDocument::from_markdown(table(ranking, context.truth));
+    let document = TextDocument::from_markdown(table(ranking, truth));
     stream.log(entities::RETRIEVAL_TABLE, &document);
-    stream.log(entities::RETRIEVAL_PLACES, &places(ranking, context.origin));
+    stream.log(entities::RETRIEVAL_PLACES, &places(ranking, origin));
     let pictured = ranking.pictured().iter().zip(event.photos.iter());
     for (rank, (reference, photo)) in pictured.enumerate() {
         // The frame is still in the table.
         let Some(photo) = photo else { continue };
-        let photo_pair = PhotoPair::of(&context.query.photo, photo);
+        let photo_pair = PhotoPair::of(&query.photo, photo);
         let path = entities::rank(rank);
         stream.log_image(&path, jpeg(&photo_pair.picture.clone().into()));
         let is_chosen = rank < ranking.chosen;
@@ -83,18 +81,10 @@ impl PhotoPair {
         [((x + 0.5) * across) as f32, ((y + 0.5) * down) as f32]
     }
 
-    fn of_query(&self, pixel: &Point2<f64>) -> [f32; 2] {
-        self.shown(pixel.x, pixel.y)
-    }
-
-    fn of_reference(&self, pixel: &Point2<f64>) -> [f32; 2] {
-        self.shown(pixel.x, pixel.y + self.top)
-    }
-
     fn matches(&self, matches: &[VerifiedMatch]) -> LineStrips2D {
         let ends = |found: &VerifiedMatch| {
-            let below = self.of_reference(&found.reference_pixel);
-            [self.of_query(&found.query_pixel), below]
+            let (above, below) = (&found.query_pixel, &found.reference_pixel);
+            [self.shown(above.x, above.y), self.shown(below.x, below.y + self.top)]
         };
         LineStrips2D::new(matches.iter().map(ends))
             .with_colors([super::color(palette::TRUTH)])
@@ -139,19 +129,7 @@ fn places(ranking: &ReferenceRanking, origin: Origin) -> Points3D {
 fn label(ranking: &ReferenceRanking, rank: usize, reference: &RankedReference) -> String {
     let score = score(ranking.criterion, reference.ranked.score);
     let place = rank + 1;
-    let geometry = match &reference.ranked.geometry {
-        Geometry::Verified(found) => format!(", {} inliers", found.inliers),
-        Geometry::Refused => ", not verified".to_owned(),
-        Geometry::Unchecked => String::new(),
-    };
-    format!("{place}. {}: {score}{geometry}", reference.name)
-}
-
-fn score(criterion: Criterion, score: f32) -> String {
-    match criterion {
-        Criterion::Words => format!("{score:.3}"),
-        Criterion::Matches => format!("{score:.0} matches"),
-    }
+    format!("{place}. {}: {score}{}", reference.name, verified(&reference.ranked.geometry))
 }
 
 fn table(ranking: &ReferenceRanking, truth: Option<&Pose>) -> String {
@@ -216,10 +194,10 @@ mod tests {
         let photo_pair = PhotoPair::of(&photo, &photo);
         // 960 × (300 + 4 + 300) at half the size.
         assert_eq!(photo_pair.picture.dimensions(), (480, 302));
-        assert_eq!(photo_pair.of_query(&Point2::new(-0.5, -0.5)), [0.0, 0.0]);
-        assert_eq!(photo_pair.of_query(&Point2::new(959.5, 299.5)), [480.0, 150.0]);
-        assert_eq!(photo_pair.of_reference(&Point2::new(-0.5, -0.5)), [0.0, 152.0]);
-        assert_eq!(photo_pair.of_reference(&Point2::new(959.5, 299.5)), [480.0, 302.0]);
+        assert_eq!(photo_pair.shown(-0.5, -0.5), [0.0, 0.0]);
+        assert_eq!(photo_pair.shown(959.5, 299.5), [480.0, 150.0]);
+        assert_eq!(photo_pair.shown(-0.5, photo_pair.top - 0.5), [0.0, 152.0]);
+        assert_eq!(photo_pair.shown(959.5, photo_pair.top + 299.5), [480.0, 302.0]);
         // A small photo is not blown up.
         let small = Photo::from_gray(GrayImage::new(96, 30));
         let photo_pair = PhotoPair::of(&small, &small);

@@ -12,6 +12,7 @@ use super::stream::Stream;
 use crate::camera::Intrinsics;
 use crate::geometry::Pose;
 use crate::image::Photo;
+use crate::method::Method;
 use crate::palette::{self, Rgb};
 use crate::picture;
 use crate::problem::{Problem, ReferenceTuple};
@@ -40,6 +41,20 @@ impl Origin {
             Quaternion::from_xyzw(rotation),
         )
     }
+}
+
+/// The context of a recorded event.
+pub(super) struct EventContext<'a> {
+    /// The position of the reference among those of the query.
+    pub(super) reference: usize,
+    /// The problem being solved.
+    pub(super) problem: &'a Problem,
+    /// The emitting estimator; inside a hybrid, the one that it runs.
+    pub(super) method: Method,
+    /// The estimator's hypotheses in earlier runs, after which the timeline `eval` continues.
+    pub(super) evals: i64,
+    /// The place drawn at (0, 0, 0).
+    pub(super) origin: Origin,
 }
 
 /// Records the query's photo, and the references' cameras with their photos and names.

@@ -11,7 +11,6 @@ use super::entities::{
 };
 use super::file::RecordingFile;
 use super::layout::{self, BlueprintNode};
-use super::targets::OpenTargets;
 use super::{Identity, RecordError, Targets};
 
 /// Nothing is flushed by time or size. The run determines the chunks, so two recordings of one run are equal chunk by
@@ -48,7 +47,7 @@ struct Now {
 
 impl Stream {
     pub(super) fn open(targets: &Targets, identity: &Identity) -> Result<Self, RecordError> {
-        let OpenTargets { sinks, file } = targets.open()?;
+        let (sinks, file) = targets.open()?;
         let id = identity.recording_id();
         let recording = RecordingStreamBuilder::new(APPLICATION_ID)
             .recording_id(id.as_str())
@@ -142,8 +141,10 @@ impl Stream {
         self.keep(logged.map_err(|error| unrecordable(path, &error)));
     }
 
-    /// Records one number per hypothesis in one batch. They have no step: thousands would share the same one.
-    pub(super) fn log_scalars(&mut self, path: &str, rows: &[(i64, f64)]) {
+    /// Records one number per hypothesis in one batch, which is empty then. They have no step: thousands would share
+    /// the same one.
+    pub(super) fn log_scalars(&mut self, path: &str, rows: &mut Vec<(i64, f64)>) {
+        let rows = std::mem::take(rows);
         if rows.is_empty() || self.is_broken() {
             return;
         }

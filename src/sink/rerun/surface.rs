@@ -9,7 +9,7 @@ use rerun::{
 };
 
 use super::entities;
-use super::event_context::EventContext;
+use super::scene::EventContext;
 use super::stream::Stream;
 use crate::grid::{Lattice, Offset, Phase, ScoredLattice};
 use crate::palette::{self, Rgb};
@@ -143,12 +143,8 @@ pub(super) fn log_yaw(stream: &mut Stream, surface: &ScoredLattice, context: &Ev
     let color = if is_fine { palette::ESTIMATE } else { palette::REFERENCE };
     let chart =
         BarChart::new(vector(gains)).with_abscissa(vector(angles)).with_color(super::color(color));
-    let path = entities::yaw_curve(context.method);
-    if is_fine {
-        stream.log(&format!("{path}/fine"), &chart);
-    } else {
-        stream.log(&path, &chart);
-    }
+    let part = if is_fine { "/fine" } else { "" };
+    stream.log(&(entities::yaw_curve(context.method) + part), &chart);
 }
 
 fn vector(values: Vec<f64>) -> TensorData {

@@ -31,6 +31,27 @@ impl Targets {
     pub fn file(path: &Path) -> Self {
         Self { save: Some(path.to_owned()), ..Self::default() }
     }
+
+    /// Whether there is no target at all.
+    pub fn is_none(&self) -> bool {
+        self.save.is_none() && self.connect.is_none() && !self.spawn
+    }
+
+    /// Opens all targets.
+    pub(super) fn open(&self) -> Result<OpenTargets, RecordError> {
+        let mut sinks: Vec<Box<dyn LogSink>> = Vec::new();
+        let file = self.save.as_deref().map(RecordingFile::create).transpose()?;
+        if let Some(file) = &file {
+            sinks.push(Box::new(file.clone()));
+        }
+        if let Some(url) = &self.connect {
+            sinks.push(Box::new(connect(url)?));
+        }
+        if self.spawn {
+            sinks.push(Box::new(spawn()?));
+        }
+        Ok((sinks, file))
+    }
 }
 
 /// The data that the stable id of a recording is derived from.
@@ -106,39 +127,8 @@ impl Identity {
     }
 }
 
-/// Open targets.
-pub(super) struct OpenTargets {
-    /// The sinks for every message.
-    pub(super) sinks: Vec<Box<dyn LogSink>>,
-    /// The file among them, which also reports its errors.
-    pub(super) file: Option<RecordingFile>,
-}
-
-impl Targets {
-    /// Whether there is no target at all.
-    pub fn is_none(&self) -> bool {
-        self.save.is_none() && self.connect.is_none() && !self.spawn
-    }
-
-    /// Opens all targets.
-    pub(super) fn open(&self) -> Result<OpenTargets, RecordError> {
-        let mut sinks: Vec<Box<dyn LogSink>> = Vec::new();
-        let file = match &self.save {
-            Some(path) => Some(RecordingFile::create(path)?),
-            None => None,
-        };
-        if let Some(file) = &file {
-            sinks.push(Box::new(file.clone()));
-        }
-        if let Some(url) = &self.connect {
-            sinks.push(Box::new(connect(url)?));
-        }
-        if self.spawn {
-            sinks.push(Box::new(spawn()?));
-        }
-        Ok(OpenTargets { sinks, file })
-    }
-}
+/// The sinks of all targets, and the file among them, which also reports its errors.
+pub(super) type OpenTargets = (Vec<Box<dyn LogSink>>, Option<RecordingFile>);
 
 fn connect(url: &str) -> Result<Viewer, RecordError> {
     let url = if url.is_empty() { DEFAULT_CONNECT_URL } else { url };

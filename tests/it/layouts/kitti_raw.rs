@@ -15,7 +15,10 @@ use super::{CAMERA_FROM_VELODYNE, joined, make_folder, write};
 pub const LAYOUT: Layout = Layout {
     name: "kitti-raw",
     place: |name| format!("{name}/{name}_drive_0001_sync"),
-    create: |root, name, drive| Ok(Box::new(Writer::create(root, name, drive))),
+    create: |root, name, drive| {
+        let writer = Writer::create(root, name, drive);
+        Ok(DriveWriter::new(move |shot| writer.frame(shot)))
+    },
 };
 
 /// Radius of the earth in the devkit's projection \[m\].
@@ -101,7 +104,7 @@ fn timestamp(time_s: f64) -> String {
     time.format("%Y-%m-%d %H:%M:%S%.9f").to_string()
 }
 
-impl DriveWriter for Writer {
+impl Writer {
     fn frame(&self, shot: &Shot<'_>) -> Result<(), SceneError> {
         let name = stem(shot.index);
         let file = |path: String| self.drive_folder.join(path);

@@ -16,7 +16,10 @@ use super::{joined, make_folder, write};
 pub const LAYOUT: Layout = Layout {
     name: "robotcar",
     place: |name| name.to_owned(),
-    create: |root, name, drive| Ok(Box::new(Writer::create(root, name, drive))),
+    create: |root, name, drive| {
+        let writer = Writer::create(root, name, drive);
+        Ok(DriveWriter::new(move |shot| writer.frame(shot)))
+    },
 };
 
 /// From x right, y down, z forward to the axes of the car: x forward, y right, z down; and so from the
@@ -149,7 +152,7 @@ impl Writer {
     }
 }
 
-impl DriveWriter for Writer {
+impl Writer {
     fn frame(&self, shot: &Shot<'_>) -> Result<(), SceneError> {
         let time = microseconds(self.drive.times_s[shot.index]);
         let raw = raw_photo(shot.photo);

@@ -21,7 +21,7 @@ pub(super) fn ui(ui: &mut Ui, state: &AppState) {
     if is_compared {
         settings(ui, state);
     }
-    match state.shown_result(span).filter(|_| state.has_come(span)) {
+    match state.outcome(span) {
         Some(result) => {
             let other = state.other_result(&result);
             fields(ui, state, &result, other.as_ref(), is_compared);

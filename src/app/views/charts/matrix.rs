@@ -5,7 +5,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use egui::{Button, Color32, Grid, RichText, ScrollArea, Ui};
 
 use super::Chosen;
-use crate::app::{Command, VerdictChange, ViewContext, theme};
+use crate::app::command::Command;
+use crate::app::{VerdictChange, ViewContext, theme};
 use crate::diagnosis::Code;
 use crate::localize::QueryResult;
 use crate::measure::{Migration, verdict_name};
@@ -56,14 +57,14 @@ pub(super) fn ui(ui: &mut Ui, context: &ViewContext<'_>, results: &[Chosen<'_>],
             .map(|(method, own)| (method.label(), tally(own.into_iter(), condition, ok)))
             .collect(),
         Columns::Now => {
-            if !context.has_results_before() {
+            if context.state.known().before.is_none() {
                 ui.weak(
                     "Nothing to compare with. Open two runs with --before, or click Keep results as A in Batch, \
                      change a setting and run all queries again",
                 );
                 return;
             }
-            let migrations = context.migrations();
+            let migrations = context.state.migrations();
             if migrations.is_empty() {
                 ui.weak("A has no result in common with these: scenes, queries, methods and settings differ");
                 return;
@@ -143,9 +144,10 @@ fn tally<'a>(
             row,
             column,
             is_chosen: false,
-            command: Command::FilterResults(format!(
-                "method = {method} and code = {filter}{scenes}"
-            )),
+            command: Box::new(move |app| {
+                app.state.options.results_filter =
+                    format!("method = {method} and code = {filter}{scenes}");
+            }),
         }
     };
     cells.map(cell).collect()
@@ -170,7 +172,9 @@ fn migration(context: &ViewContext<'_>, one: &Migration, [ok, wrong]: [Color32; 
         text,
         words: format!("{change}: {}", one.count),
         is_chosen,
-        command: Command::FilterVerdictChange((!is_chosen).then_some(change)),
+        command: Box::new(move |app| {
+            app.state.options.verdict_change = (!is_chosen).then_some(change);
+        }),
     }
 }
 
@@ -238,7 +242,7 @@ fn number(ui: &mut Ui, context: &ViewContext<'_>, cell: Cell) {
     let help = format!("{}. Click to show them", cell.words);
     if answer.on_hover_text(help).clicked() {
         context.send(cell.command);
-        context.send(Command::ShowView("batch"));
+        context.send(|app| app.state.show_view("batch"));
     }
 }
 

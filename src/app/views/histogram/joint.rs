@@ -34,7 +34,7 @@ pub(super) fn ui(
 ) {
     let cost = estimator::find(method).and_then(Entry::cost);
     let sees = cost.map_or("value", |cost| cost.sees);
-    let texture = context.textures.of(ui.ctx(), "joint histogram", shown, |_| {
+    let texture = context.state.textures.of(ui.ctx(), "joint histogram", shown, |_| {
         let picture = picture::joint_histogram(histogram).into();
         crate::app::textures::color_image(&picture)
     });

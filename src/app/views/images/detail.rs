@@ -2,17 +2,16 @@
 
 use std::sync::Arc;
 
-use egui::{Button, Color32, Grid, Rect, Sense, TextureHandle, Ui, UiBuilder, Vec2, vec2};
+use egui::{Button, Color32, Grid, Painter, Rect, Sense, TextureHandle, Ui, UiBuilder, Vec2, vec2};
 use nalgebra::Point2;
 
 use super::marks::{color, draw_truth, mark, position};
 use super::truth::TrueMatch;
+use crate::app::memo::{Memo, Same};
 use crate::app::views::canvas::Placement;
 use crate::app::views::features::{FeatureProgress, UNDECIDED, error_px, name};
 use crate::app::views::legend::name_picture;
-use crate::app::views::memo::{Memo, Same};
-use crate::app::views::mesh_painter::MeshPainter;
-use crate::app::{Command, ViewContext, theme};
+use crate::app::{ViewContext, theme};
 use crate::features::{FeatureState, Keypoint};
 use crate::palette;
 use crate::problem::{Problem, ReferenceTuple};
@@ -118,10 +117,9 @@ impl Detail {
         let scales = HALF_PATCH_SCALES.max(LEAST_HALF_PATCH_PX / least.max(0.1));
         let [query_photo, reference_photo] = subject.photos;
         let at = patch(ui, "query patch", query, scales, query_photo);
-        let mut mesh = MeshPainter::new(ui.pixels_per_point());
         if let Some(truth) = &subject.truth {
-            draw_truth(&mut mesh, &at, &subject.problem.query.intrinsics, truth);
-            mesh.paint_on(&at.painter(ui.painter()));
+            let painter = at.painter(ui.painter());
+            draw_truth(&painter, &at, &subject.problem.query.intrinsics, truth);
         }
         let Some(reference) = reference else {
             ui.weak("Nothing to match");
@@ -129,17 +127,17 @@ impl Detail {
         };
         let at = patch(ui, "reference patch", reference, scales, reference_photo);
         let tuple = &subject.problem.reference;
-        self.draw_lidar(&mut mesh, tuple, &reference.pixel(), &at);
+        let painter = at.painter(ui.painter());
+        self.draw_lidar(&painter, tuple, &reference.pixel(), &at);
         let radius = subject.depth_radius_px as f32 * at.scale;
         let middle = at.on_screen(position(reference));
-        mesh.ring(middle, radius, 1.0, Color32::WHITE.gamma_multiply(0.8));
-        mesh.paint_on(&at.painter(ui.painter()));
+        painter.circle_stroke(middle, radius, (1.0, Color32::WHITE.gamma_multiply(0.8)));
     }
 
     /// Draws the LiDAR points around a pixel in the colours of their depths.
     fn draw_lidar(
         &mut self,
-        mesh: &mut MeshPainter,
+        painter: &Painter,
         tuple: &Arc<ReferenceTuple>,
         pixel: &Point2<f64>,
         at: &Placement,
@@ -149,10 +147,10 @@ impl Detail {
         let radius = (0.35 * at.scale).clamp(1.5, 4.0);
         for (rank, (pixel, depth_m)) in seen.iter().enumerate() {
             let place = at.on_screen(pixel.cast::<f32>().into());
-            mesh.disc(place, radius + 0.8, Color32::from_black_alpha(150));
-            mesh.disc(place, radius, theme::rgb(palette::depth(*depth_m)));
+            painter.circle_filled(place, radius + 0.8, Color32::from_black_alpha(150));
+            painter.circle_filled(place, radius, theme::rgb(palette::depth(*depth_m)));
             if rank == 0 {
-                mesh.ring(place, radius + 2.0, 1.2, Color32::WHITE);
+                painter.circle_stroke(place, radius + 2.0, (1.2, Color32::WHITE));
             }
         }
     }
@@ -164,20 +162,18 @@ fn numbers(ui: &mut Ui, context: &ViewContext<'_>, subject: &Subject<'_>) {
     let kind = state.map_or(UNDECIDED, |state| state.index());
     ui.horizontal(|ui| {
         let (rect, _) = ui.allocate_exact_size(Vec2::splat(14.0), Sense::hover());
-        let mut mesh = MeshPainter::new(ui.pixels_per_point());
-        mesh.mark(mark(kind), rect.center(), 4.5, color(kind));
-        mesh.paint_on(ui.painter());
+        mark(kind).paint(ui.painter(), rect.center(), 4.5, color(kind));
         ui.strong(format!("Feature {}: {}", subject.feature, name(kind)));
         let close = ui.add(Button::new("×").small()).on_hover_text("Close");
         if close.accessible_name("Close feature").clicked() {
-            context.send(Command::SelectFeature(None));
+            context.send(|app| app.state.options.selected_feature = None);
         }
     });
     if let Some(FeatureState::NotUnique { rival }) = state {
         let help = "The reference feature resembles this query feature more; click to select it";
         let link = ui.link(format!("Nearer to query feature {rival}"));
         if link.on_hover_text(help).clicked() {
-            context.send(Command::SelectFeature(Some(rival)));
+            context.send(move |app| app.state.options.selected_feature = Some(rival));
         }
     }
     let grid = Grid::new("facts").num_columns(2).min_row_height(0.0);
@@ -210,17 +206,16 @@ fn patch(
     let nothing = theme::rgb(palette::NOTHING);
     ui.painter().rect_filled(rect, 0.0, nothing);
     at.paint(ui.painter(), photo.id(), Color32::WHITE);
-    let mut mesh = MeshPainter::new(ui.pixels_per_point());
+    let painter = ui.painter().with_clip_rect(rect.intersect(ui.clip_rect()));
     let (middle, scale) = (rect.center(), keypoint.scale * at.scale);
     let turn = egui::emath::Rot2::from_angle(keypoint.angle);
     for (width, color) in [(3.0, Color32::from_black_alpha(120)), (1.4, Color32::WHITE)] {
-        mesh.ring(middle, scale.max(2.0), width, color);
+        painter.circle_stroke(middle, scale.max(2.0), (width, color));
         for arm in [Vec2::RIGHT, Vec2::LEFT, Vec2::UP, Vec2::DOWN] {
             let arm = turn * (scale * arm);
-            mesh.line(middle + 2.5 * arm, middle + 10.0 * arm, width, color);
+            painter.line_segment([middle + 2.5 * arm, middle + 10.0 * arm], (width, color));
         }
     }
-    mesh.paint_on(&ui.painter().with_clip_rect(rect.intersect(ui.clip_rect())));
     at
 }
 

@@ -5,7 +5,6 @@ use egui::{Align2, Role, Sense, Stroke, Ui, WidgetInfo, pos2, vec2};
 use super::marks::{color, mark};
 use crate::app::theme;
 use crate::app::views::features::{KINDS, UNDECIDED, name};
-use crate::app::views::mesh_painter::MeshPainter;
 
 /// Height of the chips \[points\].
 pub(super) const HEIGHT: f32 = 38.0;
@@ -57,17 +56,15 @@ fn chip(ui: &mut Ui, kind: usize, count: usize, width: f32, is_shown: bool) -> e
     painter.rect(rect, 3.0, fill, stroke, egui::StrokeKind::Inside);
     let left = rect.left() + 8.0;
     let (upper, lower) = (rect.top() + 12.0, rect.bottom() - 10.0);
-    let mut mesh = MeshPainter::new(ui.pixels_per_point());
     // Pale colours are hard to see on their own tints.
     let mark_color = color(kind).lerp_to_gamma(visuals.strong_text_color(), 0.3);
-    mesh.mark(mark(kind), pos2(left + 4.0, upper), 4.0, mark_color);
-    mesh.paint_on(&painter);
+    mark(kind).paint(&painter, pos2(left + 4.0, upper), 4.0, mark_color);
     let write = |at, words: String, font| {
         painter.text(at, Align2::LEFT_CENTER, words, font, text);
     };
-    write(pos2(left + 13.0, upper), count.to_string(), theme::body());
+    write(pos2(left + 13.0, upper), count.to_string(), theme::BODY);
     if rect.width() >= NAMED_WIDTH {
-        write(pos2(left, lower), name(kind).to_owned(), theme::caption());
+        write(pos2(left, lower), name(kind).to_owned(), theme::CAPTION);
     }
     response.on_hover_text(format!(
         "{label}\n{}\nClick to show or hide, right-click to show these alone",

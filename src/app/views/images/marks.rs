@@ -1,13 +1,13 @@
 //! How features are marked: those of a state, and where the ground truth has them.
 
-use egui::Color32;
+use egui::{Color32, Painter};
 use nalgebra::Point2;
 
 use super::truth::TrueMatch;
 use crate::app::theme;
 use crate::app::views::canvas::Placement;
 use crate::app::views::features::UNDECIDED;
-use crate::app::views::mesh_painter::{MarkShape, MeshPainter};
+use crate::app::views::mark_shape::MarkShape;
 use crate::camera::Intrinsics;
 use crate::features::Keypoint;
 
@@ -35,7 +35,7 @@ pub(super) fn position(keypoint: &Keypoint) -> [f32; 2] {
 
 /// The epipolar line, and where the true pose sees the lifted point.
 pub(super) fn draw_truth(
-    mesh: &mut MeshPainter,
+    painter: &Painter,
     at: &Placement,
     camera: &Intrinsics,
     truth: &TrueMatch,
@@ -43,11 +43,11 @@ pub(super) fn draw_truth(
     let place = |pixel: &Point2<f64>| at.on_screen(pixel.cast::<f32>().into());
     let shade = Color32::from_black_alpha(140);
     if let Some([from, to]) = truth.line.and_then(|line| line.within(camera)) {
-        mesh.line(place(&from), place(&to), 3.5, shade);
-        mesh.line(place(&from), place(&to), 1.8, theme::TRUTH);
+        painter.line_segment([place(&from), place(&to)], (3.5, shade));
+        painter.line_segment([place(&from), place(&to)], (1.8, theme::TRUTH));
     }
     if let Some(pixel) = &truth.place {
-        mesh.disc(place(pixel), 8.0, shade);
-        mesh.mark(MarkShape::Plus, place(pixel), 6.0, theme::TRUTH);
+        painter.circle_filled(place(pixel), 8.0, shade);
+        MarkShape::Plus.paint(painter, place(pixel), 6.0, theme::TRUTH);
     }
 }

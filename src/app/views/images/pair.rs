@@ -13,24 +13,23 @@ use crate::image::Photo;
 use crate::picture;
 
 /// A photo on the graphics card.
-pub(in crate::app::views) fn photo(
-    ui: &Ui,
-    context: &ViewContext<'_>,
-    source: &Arc<Photo>,
-) -> TextureHandle {
-    context.textures.of(ui.ctx(), "photo", source, |photo| color_image(&picture::photo(photo)))
+pub(crate) fn photo(ui: &Ui, context: &ViewContext<'_>, source: &Arc<Photo>) -> TextureHandle {
+    context
+        .state
+        .textures
+        .of(ui.ctx(), "photo", source, |photo| color_image(&picture::photo(photo)))
 }
 
 /// Where the query's and the reference's photo are, and what the pointer does there.
-pub(in crate::app::views) struct PhotoPair {
-    pub(in crate::app::views) at: [Placement; 2],
+pub(crate) struct PhotoPair {
+    pub(crate) at: [Placement; 2],
     pub(super) over: [Response; 2],
 }
 
 impl PhotoPair {
     /// Shows both photos as large as they can be. Both show the part that was zoomed into; a double click shows
     /// them whole. `names` are for assistive technology.
-    pub(in crate::app::views) fn show(
+    pub(crate) fn show(
         ui: &Ui,
         area: Rect,
         photos: [&TextureHandle; 2],
@@ -54,7 +53,7 @@ impl PhotoPair {
     }
 
     /// Writes captions into the corners of the photos.
-    pub(in crate::app::views) fn name(&self, ui: &Ui, captions: [String; 2]) {
+    pub(crate) fn name(&self, ui: &Ui, captions: [String; 2]) {
         for (at, caption) in self.at.iter().zip(captions) {
             let corner = at.visible().min + vec2(4.0, 4.0);
             canvas::tag(&at.painter(ui.painter()), corner, &caption, Color32::WHITE);

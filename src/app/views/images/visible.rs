@@ -1,12 +1,12 @@
 //! Where features are on the screen, and which of them is pointed at.
 
-use egui::{Color32, Pos2};
+use egui::{Color32, Painter, Pos2};
 
 use super::marks::{color, mark, position};
 use crate::app::theme;
 use crate::app::views::canvas::Placement;
 use crate::app::views::features::{FeatureProgress, INLIER, KINDS, UNDECIDED};
-use crate::app::views::mesh_painter::{MarkShape, MeshPainter};
+use crate::app::views::mark_shape::MarkShape;
 
 /// How near the pointer must be \[points\].
 const REACH: f32 = 6.0;
@@ -91,7 +91,7 @@ impl VisibleFeatures {
     }
 
     /// Lines and marks: inliers thick, the others faint.
-    pub(super) fn draw(&self, mesh: &mut MeshPainter, strength: f32) {
+    pub(super) fn draw(&self, painter: &Painter, strength: f32) {
         for shown in &self.all {
             let (width, line_strength) = match shown.kind {
                 INLIER => (2.2, 1.0),
@@ -100,35 +100,35 @@ impl VisibleFeatures {
             };
             let color = shown.color.gamma_multiply(strength);
             if let Some([from, to]) = shown.line() {
-                mesh.line(from, to, width, color.gamma_multiply(line_strength));
+                painter.line_segment([from, to], (width, color.gamma_multiply(line_strength)));
             }
             let radius = if shown.kind == INLIER { 4.0 } else { 2.3 };
             for end in shown.ends.into_iter().flatten() {
-                mesh.mark(mark(shown.kind), end, radius, color);
+                mark(shown.kind).paint(painter, end, radius, color);
             }
         }
     }
 
     /// One feature once more, to stand out from all others.
-    pub(super) fn draw_accent(&self, mesh: &mut MeshPainter, feature: usize) {
+    pub(super) fn draw_accent(&self, painter: &Painter, feature: usize) {
         let Some(shown) = self.all.iter().find(|shown| shown.feature == feature) else {
             return;
         };
         if let Some([from, to]) = shown.line() {
-            mesh.line(from, to, 4.5, Color32::from_black_alpha(170));
-            mesh.line(from, to, 2.2, shown.color);
+            painter.line_segment([from, to], (4.5, Color32::from_black_alpha(170)));
+            painter.line_segment([from, to], (2.2, shown.color));
         }
         for end in shown.ends.into_iter().flatten() {
-            mesh.disc(end, 8.7, Color32::from_black_alpha(170));
-            mesh.ring(end, 7.7, 1.6, Color32::WHITE);
-            mesh.mark(mark(shown.kind), end, 4.0, shown.color);
+            painter.circle_filled(end, 8.7, Color32::from_black_alpha(170));
+            painter.circle_stroke(end, 7.7, (1.6, Color32::WHITE));
+            mark(shown.kind).paint(painter, end, 4.0, shown.color);
         }
     }
 
     /// The reference keypoints that no shown match has.
     pub(super) fn draw_unmatched(
         &self,
-        mesh: &mut MeshPainter,
+        painter: &Painter,
         progress: &FeatureProgress<'_>,
         at: &Placement,
         strength: f32,
@@ -142,7 +142,7 @@ impl VisibleFeatures {
         for (keypoint, is_matched) in progress.reference.iter().zip(&self.is_matched) {
             let place = at.on_screen(position(keypoint));
             if !is_matched && at.visible().contains(place) {
-                mesh.mark(mark, place, radius, color);
+                mark.paint(painter, place, radius, color);
             }
         }
     }

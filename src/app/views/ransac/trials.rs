@@ -1,4 +1,4 @@
-//! The trials as curves, with no more points than a plot can show.
+//! The support of the trials as curves, with no more points than a plot can show.
 
 use crate::event::{Event, HypothesisTried};
 use crate::robust::Trial;
@@ -10,10 +10,10 @@ const STRETCHES: usize = 400;
 /// The trials up to the cursor.
 #[derive(Default)]
 pub(super) struct Trials {
-    pub(super) likelihood: Series,
-    pub(super) inliers: Series,
-    /// Logarithm to base ten of the trials needed by the best.
-    pub(super) needed_series: Series,
+    /// The support of some hypotheses: `[trial, inliers]`.
+    pub(super) support: Vec<[f64; 2]>,
+    /// That of the best so far, refined, as steps.
+    pub(super) best_support: Vec<[f64; 2]>,
     /// Samples for which the solver had no pose.
     pub(super) without_pose: usize,
     /// The best trial: that whose hypothesis was refined last.
@@ -23,65 +23,33 @@ pub(super) struct Trials {
     records: Vec<usize>,
 }
 
-/// One number of every hypothesis.
-#[derive(Default)]
-pub(super) struct Series {
-    /// Some of the hypotheses: `[trial, value]`.
-    pub(super) points: Vec<[f64; 2]>,
-    /// That of the best so far, as steps.
-    pub(super) best: Vec<[f64; 2]>,
-    /// Logarithm to base ten of the trials made, by trial, beside those needed.
-    pub(super) made: Vec<[f64; 2]>,
-}
-
 impl Trials {
     /// The trials among records, the first of which is at `start` in its run.
     pub(super) fn read(records: &[Record], start: usize) -> Self {
         let mut all = Self::default();
-        let [mut likelihoods, mut inliers] = [Vec::new(), Vec::new()];
+        let mut support = Vec::new();
         for (at, record) in records.iter().enumerate() {
             let Event::HypothesisTried(HypothesisTried { trial }) = &record.event else {
                 continue;
             };
             let x = trial.index as f64;
             match &trial.hypothesis {
-                Some(hypothesis) => {
-                    likelihoods.push([x, hypothesis.score.log_likelihood]);
-                    inliers.push([x, hypothesis.score.inliers as f64]);
-                }
+                Some(hypothesis) => support.push([x, hypothesis.score.inliers as f64]),
                 None => all.without_pose += 1,
             }
             if trial.is_best {
                 all.best = Some(*trial);
                 if let Some(best) = &trial.best {
-                    step(&mut all.likelihood.best, x, best.score.log_likelihood);
-                    step(&mut all.inliers.best, x, best.score.inliers as f64);
+                    step(&mut all.best_support, x, best.score.inliers as f64);
                 }
-            }
-            if trial.is_best || all.last.is_none() {
-                let needed = (trial.trials_needed.max(1) as f64).log10();
-                step(&mut all.needed_series.best, x, needed);
             }
             all.records.push(start + at);
             all.last = Some(*trial);
         }
-        if let Some(last) = &all.last {
-            let x = last.index as f64;
-            let curves =
-                [&mut all.likelihood.best, &mut all.inliers.best, &mut all.needed_series.best];
-            for curve in curves {
-                if let Some(&[_, value]) = curve.last() {
-                    curve.push([x, value]);
-                }
-            }
-            const STEPS: usize = 100;
-            all.needed_series.made = (0..=STEPS)
-                .map(|step| x * step as f64 / STEPS as f64)
-                .map(|x| [x, (x + 1.0).log10()])
-                .collect();
+        if let (Some(last), Some(&[_, value])) = (&all.last, all.best_support.last()) {
+            all.best_support.push([last.index as f64, value]);
         }
-        all.likelihood.points = thinned(&likelihoods);
-        all.inliers.points = thinned(&inliers);
+        all.support = thinned(&support);
         all
     }
 
@@ -100,14 +68,10 @@ impl Trials {
         self.last.as_ref()
     }
 
-    /// The record of the trial whose point is nearest by `distance`; without points the corners of the line count.
-    pub(super) fn nearest(
-        &self,
-        series: &Series,
-        distance: impl Fn([f64; 2]) -> f32,
-    ) -> Option<usize> {
-        let points = if series.points.is_empty() { &series.best } else { &series.points };
-        let nearest = points.iter().min_by(|a, b| distance(**a).total_cmp(&distance(**b)))?;
+    /// The record of the trial whose point is nearest by `distance`.
+    pub(super) fn nearest(&self, distance: impl Fn([f64; 2]) -> f32) -> Option<usize> {
+        let points = self.support.iter();
+        let nearest = points.min_by(|a, b| distance(**a).total_cmp(&distance(**b)))?;
         self.records.get(nearest[0] as usize).copied()
     }
 }

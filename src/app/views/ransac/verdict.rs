@@ -3,8 +3,8 @@
 use egui::{Grid, RichText, Ui};
 
 use super::trials::Trials;
+use crate::app::ViewContext;
 use crate::app::views::features::{FeatureProgress, residual_px};
-use crate::app::{Command, ViewContext};
 use crate::depth::LiftedMatch;
 use crate::event::{ConsensusJudged, DepthsLifted, PoseRefined};
 use crate::features::Keypoint;
@@ -76,7 +76,8 @@ fn sample(ui: &mut Ui, context: &ViewContext<'_>, span: &Span, cursor: usize, tr
             };
             let help = "Select this feature";
             if ui.link(format!("match {index}")).on_hover_text(help).clicked() {
-                context.send(Command::SelectFeature(Some(lifted.query)));
+                let feature = Some(lifted.query);
+                context.send(move |app| app.state.options.selected_feature = feature);
             }
             row(ui, context, &features, lifted, trial);
             ui.end_row();

@@ -2,16 +2,15 @@
 
 use nalgebra::{Point2, Point3};
 
-use super::gpu::Line;
-use super::scene_geometry::{SceneGeometry, spot};
+use super::scene_geometry::SceneGeometry;
+use super::view_camera::Line;
 use crate::app::views::features::FeatureProgress;
 use crate::app::views::legend;
-use crate::app::views::surface::search::Search;
 use crate::app::{ViewContext, theme};
 use crate::camera::Intrinsics;
 use crate::estimator;
+use crate::event::ViewRendered;
 use crate::geometry::{Pose, PoseError};
-use crate::grid::Offset;
 use crate::method::Method;
 use crate::palette;
 use crate::place::place;
@@ -98,7 +97,7 @@ impl SceneCamera {
         let up = 0.35 * (corners[0] - corners[3]);
         let roof = middle + up;
         let line = |from: Point3<f64>, to: Point3<f64>| Line {
-            ends: [spot(&from), spot(&to)],
+            ends: [from, to],
             color: theme::rgb(self.thing.color()),
             width: self.kind.look().1,
         };
@@ -114,11 +113,7 @@ impl SceneCamera {
 }
 
 /// Every camera at the cursor; those that matter most come last.
-pub(super) fn cameras(
-    context: &ViewContext<'_>,
-    geometry: &SceneGeometry,
-    search: Option<&Search<'_>>,
-) -> Vec<SceneCamera> {
+pub(super) fn cameras(context: &ViewContext<'_>, geometry: &SceneGeometry) -> Vec<SceneCamera> {
     let Some(problem) = context.problem() else {
         return Vec::new();
     };
@@ -159,12 +154,12 @@ pub(super) fn cameras(
             all.push(camera(CameraKind::Estimate(method), pose));
         }
     }
-    all.extend(best_so_far(context, search).map(|(method, reference_from_query)| {
+    all.extend(best_so_far(context).map(|(method, reference_from_query)| {
         let pose = problem.world_from_query(&reference_from_query);
         camera(CameraKind::BestSoFar(method), pose)
     }));
-    all.extend(context.hovered().map(|pose| camera(CameraKind::Pointer, pose)));
-    all.extend(context.camera().map(|pose| camera(CameraKind::Hand, pose)));
+    all.extend(context.state.hovered.map(|pose| camera(CameraKind::Pointer, pose)));
+    all.extend(context.state.camera.map(|pose| camera(CameraKind::Hand, pose)));
     all
 }
 
@@ -175,14 +170,13 @@ fn estimate(context: &ViewContext<'_>, method: Method) -> Option<Pose> {
 }
 
 /// The best pose so far of the estimator at the cursor, in the reference camera's frame, until its end.
-fn best_so_far(context: &ViewContext<'_>, search: Option<&Search<'_>>) -> Option<(Method, Pose)> {
+fn best_so_far(context: &ViewContext<'_>) -> Option<(Method, Pose)> {
     let span = context.span()?;
     if span.result.is_some() && context.cursor + 1 >= span.records.end {
         return None;
     }
-    // The search may be of another part of the run.
-    let search = search.filter(|search| search.span.part == span.part);
-    let by_search = search.and_then(|search| search.way.last()).map(Offset::reference_from_camera);
+    let view: Option<&ViewRendered> = context.run.latest_in(span, context.cursor);
+    let by_search = view.map(|view| view.offset.reference_from_camera());
     let by_features = || FeatureProgress::of(context, span, context.cursor).reference_from_query;
     Some((span.part.method()?, by_search.or_else(by_features)?))
 }

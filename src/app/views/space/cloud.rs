@@ -3,7 +3,7 @@
 use egui::Color32;
 use nalgebra::Point3;
 
-use super::gpu::{Points, Spot};
+use super::picture::Spot;
 use super::scene_geometry::SceneGeometry;
 use crate::problem::ReferenceTuple;
 use crate::render::{self, RenderParams};
@@ -13,9 +13,9 @@ pub(super) fn points(
     geometry: &SceneGeometry,
     reference: &ReferenceTuple,
     params: &RenderParams,
-) -> Points {
+) -> Vec<Spot> {
     let spots = colored(reference, params).into_iter();
-    Points::new(spots.map(|(point, color)| Spot { at: geometry.spot(&point.cast()), color }))
+    spots.map(|(point, color)| Spot { at: geometry.spot(&point.cast()), color }).collect()
 }
 
 /// All points of the scan: those that the photo shows in its colours, the others grey.

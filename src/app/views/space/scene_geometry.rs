@@ -1,18 +1,18 @@
 //! The frame that the scene is drawn in, and where things are in it.
 
-use nalgebra::{Point2, Point3, Unit, Vector3};
+use nalgebra::{Point2, Point3};
 
 use crate::app::ViewContext;
 use crate::geometry::Pose;
 
 /// How far below the reference camera the ground is drawn \[m\]: about where it is for a car's
 /// camera.
-pub(super) const GROUND_M: f64 = 1.6;
+const GROUND_M: f64 = 1.6;
 
 /// The scene's frame, seen from the world and from the reference at the cursor.
 ///
 /// It is that of the first reference camera, so that it stays while the cursor moves, and so that
-/// single precision suffices for what is drawn.
+/// single precision suffices for the cloud.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct SceneGeometry {
     pub(super) scene_from_world: Pose,
@@ -36,18 +36,18 @@ impl SceneGeometry {
 
     /// A place in the reference camera's frame, as it is drawn.
     pub(super) fn spot(&self, in_reference: &Point3<f64>) -> [f32; 3] {
-        spot(&(self.scene_from_reference * in_reference))
+        (self.scene_from_reference * in_reference).coords.cast::<f32>().into()
     }
 
-    /// A place on the ground, raised by some metres.
-    pub(super) fn on_ground(&self, right_m: f64, forward_m: f64, above_m: f64) -> Point3<f64> {
-        self.scene_from_reference * Point3::new(right_m, GROUND_M - above_m, forward_m)
+    /// A place on the ground.
+    pub(super) fn on_ground(&self, right_m: f64, forward_m: f64) -> Point3<f64> {
+        self.scene_from_reference * Point3::new(right_m, GROUND_M, forward_m)
     }
 
     /// The place on the ground straight below another.
     pub(super) fn below(&self, in_scene: &Point3<f64>) -> Point3<f64> {
         let place = self.scene_from_reference.inverse() * in_scene;
-        self.on_ground(place.x, place.z, 0.0)
+        self.on_ground(place.x, place.z)
     }
 
     /// The circle on the ground that an overview shows: its middle and its radius \[m\]. It contains all
@@ -82,12 +82,7 @@ impl SceneGeometry {
             }
         };
         let radius_m = radius_m * height_over_width.max(1.0);
-        (self.on_ground(middle.x, middle.y, 0.0), radius_m)
-    }
-
-    /// What is straight up, seen from the reference camera.
-    pub(super) fn up(&self) -> Unit<Vector3<f64>> {
-        self.scene_from_reference.rotation * -Vector3::y_axis()
+        (self.on_ground(middle.x, middle.y), radius_m)
     }
 
     /// A camera's pose in the reference camera's frame.
@@ -108,11 +103,6 @@ impl SceneGeometry {
         let steps = [1.0, 2.0, 5.0, 10.0].map(|step| step * tens);
         steps.into_iter().find(|step| *step >= wanted).unwrap_or(10.0 * tens)
     }
-}
-
-/// A place in the scene as the graphics card takes it.
-pub(super) fn spot(in_scene: &Point3<f64>) -> [f32; 3] {
-    in_scene.coords.cast::<f32>().into()
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! The camera that the pane shows the scene through: an eye in the scene, and its projection.
 
-use egui::{Pos2, Vec2, pos2};
+use egui::{Color32, Pos2, Vec2, pos2};
 use nalgebra::{Point3, Unit, Vector3};
 
 use crate::camera::Intrinsics;
@@ -55,22 +55,28 @@ impl ViewCamera {
 
     /// Where a point of the scene is seen; `None` where it is not in front of the eye.
     pub(super) fn project(&self, point: &Point3<f64>) -> Option<Pos2> {
-        self.project_from_eye(&self.in_eye(point))
+        let seen = self.scene_from_eye.inverse_transform_point(point);
+        (seen.z >= NEAR_M).then(|| self.in_pane(&seen))
     }
 
-    /// A point of the scene in the frame of the eye.
-    pub(super) fn in_eye(&self, point: &Point3<f64>) -> Point3<f64> {
-        self.scene_from_eye.inverse_transform_point(point)
+    /// Where a line is seen: the part of it that is in front of the eye.
+    pub(super) fn segment(&self, line: &Line) -> Option<[Pos2; 2]> {
+        let [a, b] = line.ends.map(|end| self.scene_from_eye.inverse_transform_point(&end));
+        // What is behind the eye has no place in the pane.
+        let cut = |end: Point3<f64>, other: Point3<f64>| {
+            let share = (NEAR_M - end.z) / (other.z - end.z);
+            if end.z < NEAR_M { end + share * (other - end) } else { end }
+        };
+        let is_seen = a.z.max(b.z) >= NEAR_M;
+        is_seen.then(|| [cut(a, b), cut(b, a)].map(|end| self.in_pane(&end)))
     }
 
-    /// Where a point in the frame of the eye is seen.
-    pub(super) fn project_from_eye(&self, point: &Point3<f64>) -> Option<Pos2> {
-        (point.z >= NEAR_M).then(|| {
-            pos2(
-                (self.focal[0] * point.x / point.z + self.centre[0]) as f32,
-                (self.focal[1] * point.y / point.z + self.centre[1]) as f32,
-            )
-        })
+    /// The place in the pane of a point in the frame of the eye.
+    fn in_pane(&self, seen: &Point3<f64>) -> Pos2 {
+        pos2(
+            (self.focal[0] * seen.x / seen.z + self.centre[0]) as f32,
+            (self.focal[1] * seen.y / seen.z + self.centre[1]) as f32,
+        )
     }
 
     /// The direction in which a place of the pane looks, in the scene.
@@ -85,23 +91,16 @@ impl ViewCamera {
             direction: self.scene_from_eye.rotation * Unit::new_normalize(in_eye),
         }
     }
+}
 
-    /// The projection as the graphics card takes it, column by column.
-    ///
-    /// The depth is `NEAR_M / z`: 1 at the near plane, 0 at infinity, so that a floating-point
-    /// depth buffer is equally sharp everywhere.
-    pub(super) fn clip_from_scene(&self) -> [[f32; 4]; 4] {
-        let (across, down) = (f64::from(self.size.x), f64::from(self.size.y));
-        let eye_from_scene = self.scene_from_eye.inverse().to_homogeneous();
-        #[rustfmt::skip]
-        let clip_from_eye = nalgebra::Matrix4::new(
-            2.0 * self.focal[0] / across, 0.0, 2.0 * self.centre[0] / across - 1.0, 0.0,
-            0.0, -2.0 * self.focal[1] / down, 1.0 - 2.0 * self.centre[1] / down, 0.0,
-            0.0, 0.0, 0.0, NEAR_M,
-            0.0, 0.0, 1.0, 0.0,
-        );
-        (clip_from_eye * eye_from_scene).cast::<f32>().into()
-    }
+/// A stroke from one place of the scene to another.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Line {
+    /// Both ends \[m\].
+    pub(super) ends: [Point3<f64>; 2],
+    pub(super) color: Color32,
+    /// Width in egui's points.
+    pub(super) width: f32,
 }
 
 /// A half line in the scene.
@@ -111,28 +110,9 @@ pub(super) struct Ray {
     pub(super) direction: Unit<Vector3<f64>>,
 }
 
-impl Ray {
-    /// Where the ray meets a plane; `None` where it does so behind its origin, in a flat angle or
-    /// beyond all that is of interest.
-    pub(super) fn meets(
-        &self,
-        in_plane: &Point3<f64>,
-        normal: &Unit<Vector3<f64>>,
-    ) -> Option<Point3<f64>> {
-        /// Sine of the least angle between ray and plane.
-        const FLATTEST: f64 = 0.01;
-        const FARTHEST_M: f64 = 1000.0;
-        let towards = normal.dot(&self.direction);
-        let distance = normal.dot(&(in_plane - self.origin)) / towards;
-        let is_sound = towards.abs() > FLATTEST && (0.0..FARTHEST_M).contains(&distance);
-        is_sound.then(|| self.origin + distance * self.direction.into_inner())
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::Vector4;
     use proptest::prelude::*;
 
     const KITTI: Intrinsics =
@@ -140,15 +120,6 @@ mod tests {
 
     fn pose(shift: [f64; 3], turn: [f64; 3]) -> Pose {
         Pose::new(shift.into(), turn.into())
-    }
-
-    /// Where the matrix puts a point, in points of the pane, and its depth.
-    fn by_matrix(view_camera: &ViewCamera, point: &Point3<f64>) -> (Pos2, f32) {
-        let matrix = nalgebra::Matrix4::from(view_camera.clip_from_scene());
-        let clip = matrix * Vector4::from(point.to_homogeneous().cast::<f32>());
-        let [x, y] = [clip.x / clip.w, clip.y / clip.w];
-        let at = pos2(0.5 * (x + 1.0) * view_camera.size.x, 0.5 * (1.0 - y) * view_camera.size.y);
-        (at, clip.z / clip.w)
     }
 
     proptest! {
@@ -171,56 +142,51 @@ mod tests {
                 0.5 * size.x + scale * (pixel.x as f32 + 0.5 - 620.5),
                 0.5 * size.y + scale * (pixel.y as f32 + 0.5 - 188.0),
             );
-            let (seen, _) = by_matrix(&view_camera, &(scene_from_camera * in_camera));
+            let seen = view_camera.project(&(scene_from_camera * in_camera)).expect("in front");
             // Half a pixel of the photo; far outside of the pane single precision is coarser.
             let near = 0.5 * scale * (1.0 + 1e-3 * (expected - size.to_pos2()).length() / scale);
             prop_assert!((seen - expected).length() < near, "{seen:?} {expected:?}");
-            let straight = view_camera.project(&(scene_from_camera * in_camera)).expect("in front");
-            prop_assert!((straight - expected).length() < near);
         }
 
         /// A ray goes through all that is seen where it begins.
         #[test]
-        fn a_ray_meets_the_ground_where_the_ground_is_seen(
-            x in -20.0..20.0, z in -20.0..20.0,
+        fn a_ray_goes_through_what_is_seen_there(
+            x in -20.0..20.0, y in -5.0..5.0, z in -20.0..20.0,
             turn in -3.0..3.0_f64, down in 0.2..1.4_f64, height in 2.0..30.0_f64,
         ) {
             let eye = Pose::translation(1.0, -height, -3.0)
                 * crate::geometry::yaw(turn)
                 * nalgebra::UnitQuaternion::from_axis_angle(&Vector3::x_axis(), -down);
             let view_camera = ViewCamera::centred(eye, 0.9, Vec2::new(640.0, 480.0));
-            let ground = Point3::new(x, 1.6, z);
-            if let Some(at) = view_camera.project(&ground)
+            let seen = Point3::new(x, y, z);
+            if let Some(at) = view_camera.project(&seen)
                 && egui::Rect::from_min_size(Pos2::ZERO, view_camera.size).contains(at)
-                && let Some(met) = view_camera.ray(at).meets(&Point3::new(0.0, 1.6, 0.0), &Vector3::y_axis())
             {
-                let far = (ground - view_camera.ray(at).origin).norm();
-                prop_assert!((met - ground).norm() < 1e-3 * far, "{met} {ground}");
+                let Ray { origin, direction } = view_camera.ray(at);
+                let along = direction.dot(&(seen - origin));
+                let off = (origin + along * direction.into_inner() - seen).norm();
+                prop_assert!(off < 1e-3 * along, "{off} {along}");
             }
         }
-
     }
 
     #[test]
-    fn a_ray_that_leaves_the_ground_or_grazes_it_meets_nothing() {
-        let ground = Point3::new(0.0, 1.6, 0.0);
-        let up = Vector3::y_axis();
-        let ray = |x: f64, y: f64, z: f64| Ray {
-            origin: Point3::origin(),
-            direction: Unit::new_normalize(Vector3::new(x, y, z)),
+    fn a_line_from_behind_the_eye_is_seen_as_far_as_it_is_in_front() {
+        let eye = pose([1.0, -2.0, -5.0], [-0.2, 0.3, 0.1]);
+        let view_camera = ViewCamera::centred(eye, 0.9, Vec2::new(320.0, 240.0));
+        let line = |a: [f64; 3], b: [f64; 3]| Line {
+            ends: [a, b].map(|end| eye * Point3::from(end)),
+            color: Color32::WHITE,
+            width: 1.0,
         };
-        assert!(ray(0.0, 1.0, 1.0).meets(&ground, &up).is_some());
-        assert_eq!(ray(0.0, -1.0, 1.0).meets(&ground, &up), None);
-        assert_eq!(ray(0.0, 1e-4, 1.0).meets(&ground, &up), None);
-        assert_eq!(ray(0.0, 0.0, 1.0).meets(&ground, &up), None);
-    }
-
-    #[test]
-    fn nearer_things_have_the_greater_depth() {
-        let view_camera = ViewCamera::centred(Pose::identity(), 1.0, Vec2::new(100.0, 100.0));
-        let depth = |z: f64| by_matrix(&view_camera, &Point3::new(0.0, 0.0, z)).1;
-        assert!((depth(NEAR_M) - 1.0).abs() < 1e-6);
-        assert!(depth(1.0) > depth(1.001) && depth(900.0) > depth(901.0));
-        assert!(depth(1e6) > 0.0);
+        let [from, to] =
+            view_camera.segment(&line([-1.0, 0.5, -3.0], [1.0, 0.2, 4.0])).expect("is seen");
+        let end = view_camera.project(&(eye * Point3::new(1.0, 0.2, 4.0))).expect("in front");
+        assert!((to - end).length() < 1e-3);
+        // A place on it that is in front lies between.
+        let middle = view_camera.project(&(eye * Point3::new(0.5, 0.275, 2.25))).expect("in front");
+        let off = (middle - to).normalized().dot((from - to).normalized());
+        assert!(off > 0.999 && (from - to).length() > (middle - to).length());
+        assert_eq!(view_camera.segment(&line([-1.0, 0.5, -3.0], [1.0, 0.2, -4.0])), None);
     }
 }

@@ -4,19 +4,16 @@ use egui::Ui;
 
 use super::scale::number;
 use super::search::Search;
-use crate::app::{Command, DenseAsk, DenseMap, ViewContext};
+use crate::app::{DenseAsk, DenseMap, ViewContext};
 use crate::geometry::PoseError;
 use crate::grid::{DenseSurface, MAX_CELLS};
 
 /// The map to fill, if it is shown, for the present run.
 pub(super) fn wanted(context: &ViewContext<'_>, search: &Search<'_>) -> Option<DenseAsk> {
     let is_wanted = context.options.shows_dense_map && context.is_present();
-    let params = &context.run.params.surface;
     Some(DenseAsk {
         method: search.method,
         reference: search.span.part.reference().filter(|_| is_wanted)?,
-        step_m: params.step_m,
-        yaw_step_deg: params.yaw_step_deg,
         least_covered: search.least_covered,
     })
 }
@@ -30,7 +27,7 @@ pub(super) fn ui(ui: &mut Ui, context: &ViewContext<'_>, search: &Search<'_>) {
         ui.weak("The dense map is filled for the present run, B, only");
         return;
     }
-    let known = context.dense_map(search.method);
+    let known = context.state.dense_map(search.method);
     ui.horizontal_wrapped(|ui| {
         match known.map(progress) {
             Some(Ok(words)) => ui.weak(words),
@@ -86,6 +83,6 @@ pub(super) fn switch(ui: &mut Ui, context: &ViewContext<'_>) {
         "Score every position with every heading, and show the lowest cost at each position (F)";
     let switch = ui.toggle_value(&mut shown, "Dense").on_hover_text(help);
     if switch.clicked() {
-        context.send(Command::ShowDenseMap);
+        context.send(move |app| app.state.options.shows_dense_map = shown);
     }
 }

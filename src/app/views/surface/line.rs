@@ -6,7 +6,7 @@ use egui_plot::{Line, LineStyle, Plot, PlotPoint, Points, VLine};
 use super::scale::number;
 use super::search::Search;
 use crate::app::views::legend::{at_points, name_picture, plot_shape, result, stretches};
-use crate::app::{Command, CostAlong, CostLine, ViewContext, theme};
+use crate::app::{CostAlong, CostLine, ViewContext, theme};
 use crate::geometry::Pose;
 use crate::proof::Thing;
 
@@ -34,9 +34,9 @@ pub(super) fn ui(
     search: &Search<'_>,
     line: CostLine,
 ) -> Option<Pose> {
-    let along = context.cost_along(line.method);
+    let along = context.state.cost_along(line.method);
     let Some(along) = along.filter(|along| along.line == line) else {
-        context.send(Command::TraceLine(line));
+        context.send(move |app| app.state.trace_line(line));
         ui.weak("Computing the cost from the result to the truth");
         return None;
     };
@@ -52,10 +52,8 @@ struct Profile {
     /// Distance of the truth: in m, or in ° where the poses differ by their heading alone.
     length: f64,
     unit: &'static str,
-    /// Distance, rising, and cost; no cost where too little is covered, and before it is known.
+    /// Distance, rising, and cost; no cost where too little is covered.
     costs: Vec<(f64, Option<f64>)>,
-    /// Whether all of them are known.
-    is_complete: bool,
     step_m: f64,
 }
 
@@ -76,14 +74,7 @@ impl Profile {
             let cost = score.and_then(|score| score.eligible_cost(least_covered));
             (share * length, cost)
         });
-        Self {
-            line,
-            length,
-            unit,
-            costs: costs.collect(),
-            is_complete: along.is_complete(),
-            step_m,
-        }
+        Self { line, length, unit, costs: costs.collect(), step_m }
     }
 
     /// The cost at a distance that was tried.
@@ -103,17 +94,11 @@ impl Profile {
     fn words(&self) -> String {
         let far = format!("{:.2} {}", self.length, self.unit);
         let (Some(result), Some(truth)) = (self.at(0.0), self.at(self.length)) else {
-            return if self.is_complete {
-                format!("{far} apart; one of the two poses covers too few pixels")
-            } else {
-                format!("{far} apart")
-            };
+            return format!("{far} apart; one of the two poses covers too few pixels");
         };
         let (from, to) = (number(result), number(truth));
         let costs = format!("Cost {from} at the result, {to} at the truth, {far} away");
-        let Some(highest) = self.highest().filter(|_| self.is_complete) else {
-            return costs;
-        };
+        let highest = self.highest().unwrap_or(result.max(truth));
         if self.unit == "m" && self.length < self.step_m {
             let step_m = self.step_m;
             return format!("{costs}: nearer than the steps of the search, {step_m} m");
@@ -189,7 +174,7 @@ fn draw(
     let PlotPoint { x: way, .. } = answer.transform.value_from_position(at);
     let pose = profile.line.pose(way / profile.length.max(f64::MIN_POSITIVE));
     if answer.response.clicked() {
-        context.send(Command::TakeCamera(Some(pose)));
+        context.send(move |app| app.state.camera = Some(pose));
     }
     Some(pose)
 }
@@ -227,10 +212,5 @@ mod tests {
         assert!(slope.contains("falls from the result to the truth"), "{slope}");
         let preferred = profile(&[0.3, 0.4, 0.5]).words();
         assert!(preferred.contains("the cost prefers the result"), "{preferred}");
-        // An incomplete curve says nothing of what is between.
-        let mut early = profile(&[0.5, 0.4, 0.3]);
-        early.is_complete = false;
-        let early = early.words();
-        assert!(early.ends_with("4.00 m away"), "{early}");
     }
 }

@@ -7,7 +7,7 @@ use super::marks::{MapMark, MarkKind, fanned, heading, place};
 use super::scale::{BELOW_FLOOR, Scale, number};
 use super::search::{Search, Searched, cell_of};
 use crate::app::views::legend::{cost_bar, name_picture, swatch};
-use crate::app::{Command, ViewContext, theme};
+use crate::app::{ViewContext, theme};
 use crate::geometry::Pose;
 use crate::grid::{DenseSurface, Lattice, Offset, ScoredLattice};
 use crate::proof::Thing;
@@ -107,8 +107,8 @@ impl CostMap {
         overlay(ui, shown, &answer.transform, pointed_at);
         let cell = pointed_at?;
         let pose = shown.search.pose(&cell.offset);
-        if takes_camera && context.camera() != Some(pose) {
-            context.send(Command::TakeCamera(Some(pose)));
+        if takes_camera && context.state.camera != Some(pose) {
+            context.send(move |app| app.state.camera = Some(pose));
         }
         Some((pose, readout(shown, &cell)))
     }
@@ -214,7 +214,7 @@ fn plot(
     let narrow = |axis: AxisHints<'static>, thickness| {
         axis.min_thickness(thickness)
             .label_spacing(egui::Rangef::new(24.0, 40.0))
-            .tick_label_font(theme::small())
+            .tick_label_font(theme::SMALL)
             .formatter(|mark, _| format!("{}", (1000.0 * mark.value).round() / 1000.0))
     };
     let right = narrow(AxisHints::new_x(), LOWER_AXIS).label(small(ui, "right [m]"));
@@ -251,7 +251,7 @@ fn plot(
 }
 
 fn small(ui: &Ui, text: &str) -> egui::RichText {
-    egui::RichText::new(text).font(theme::small()).color(ui.visuals().weak_text_color())
+    egui::RichText::new(text).font(theme::SMALL).color(ui.visuals().weak_text_color())
 }
 
 /// How many positions of a lattice are scored, in words.

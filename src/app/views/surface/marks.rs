@@ -7,7 +7,7 @@ use egui::{Color32, Painter, Pos2, Rect, Stroke, Ui, Vec2, vec2};
 use super::scale::number;
 use super::search::{Minimum, Search};
 use crate::app::views::legend;
-use crate::app::{Command, ViewContext, theme};
+use crate::app::{ViewContext, theme};
 use crate::geometry::Pose;
 use crate::grid::{DenseSurface, Offset, Phase};
 use crate::method::Method;
@@ -73,7 +73,7 @@ impl MapMark {
             let kind = MarkKind::Thing(legend::result(context, &pose));
             add(kind, pose, "FB's result", near(&pose));
         }
-        if let Some(pose) = context.camera() {
+        if let Some(pose) = context.state.camera {
             let kind = MarkKind::Thing(Thing::Dot(palette::UNDECIDED));
             add(kind, pose, "camera in hand", near(&pose));
         }
@@ -149,13 +149,13 @@ fn minima(search: &Search<'_>) -> Vec<(Minimum, String)> {
     let Some(searched) = search.last(Phase::PositionCoarse) else {
         return Vec::new();
     };
-    let Some(lowest) = searched.minimum(search.least_covered) else {
+    let Some(lowest) = searched.minimum() else {
         return Vec::new();
     };
     let so_far = if searched.is_complete { "" } else { " so far" };
     let mut minima = vec![(lowest, format!(", {}{so_far}", number(lowest.cost)))];
     if searched.is_complete && searched.surface.flat_cost().is_none() {
-        let local = searched.surface.local_minima_with(search.least_covered);
+        let local = searched.surface.local_minima();
         let others = local.into_iter().filter(|(cell, _)| *cell != lowest.cell);
         minima.extend(others.take(MINIMA - 1).filter_map(|(cell, cost)| {
             let offset = searched.surface.lattice.offset(cell)?;
@@ -174,7 +174,7 @@ fn best_so_far(search: &Search<'_>) -> Option<(Pose, Option<f64>, String)> {
         return Some((pose, step.score.cost, note));
     }
     let fine = search.last(Phase::PositionFine)?;
-    let minimum = fine.minimum(search.least_covered)?;
+    let minimum = fine.minimum()?;
     let pose = search.pose(&minimum.offset);
     Some((pose, Some(minimum.cost), String::new()))
 }
@@ -238,7 +238,8 @@ pub(super) fn legend(ui: &mut Ui, context: &ViewContext<'_>, marks: &[MapMark]) 
             pointed_at = Some(mark.pose);
         }
         if response.clicked() {
-            context.send(Command::TakeCamera(Some(mark.pose)));
+            let pose = mark.pose;
+            context.send(move |app| app.state.camera = Some(pose));
         }
     }
     pointed_at

@@ -13,11 +13,11 @@ use crate::session::Run;
 const LEAST_DIFFERENCE: f64 = 1e-9;
 
 /// The colour of a cell below the coverage floor.
-pub(in crate::app::views) const BELOW_FLOOR: Color32 = Color32::from_gray(110);
+pub(super) const BELOW_FLOOR: Color32 = Color32::from_gray(110);
 
 /// The ends of the colours.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(in crate::app::views) struct Scale {
+pub(super) struct Scale {
     /// Lowest and highest cost of the positions above the coverage floor.
     costs: Option<(f64, f64)>,
     /// Greatest coverage.
@@ -27,7 +27,7 @@ pub(in crate::app::views) struct Scale {
 impl Scale {
     /// The scale of every position that the method scored, after the cursor too: a step must not
     /// change what a colour means.
-    pub(in crate::app::views) fn of(run: &Run, search: &Search<'_>) -> Self {
+    pub(super) fn of(run: &Run, search: &Search<'_>) -> Self {
         let records = run.records().get(search.span.records.clone()).unwrap_or_default();
         let scored = records.iter().filter_map(|record| match &record.event {
             Event::PoseScored(scored) if !scored.phase.is_yaw() => Some(&scored.score),
@@ -61,7 +61,7 @@ impl Scale {
     }
 
     /// The colour of a cost; grey where it is no number.
-    pub(in crate::app::views) fn cost(&self, cost: f64) -> Color32 {
+    pub(super) fn cost(&self, cost: f64) -> Color32 {
         match self.costs {
             Some((least, greatest)) if !cost.is_nan() => {
                 theme::viridis(merit(least, greatest, cost))
@@ -76,7 +76,7 @@ impl Scale {
     }
 
     /// The highest and the lowest cost: the dark and the bright end.
-    pub(in crate::app::views) fn cost_ends(&self) -> Option<[String; 2]> {
+    pub(super) fn cost_ends(&self) -> Option<[String; 2]> {
         let (least, greatest) = self.costs?;
         Some([number(greatest), number(least)])
     }
@@ -93,7 +93,7 @@ fn merit(least: f64, greatest: f64, cost: f64) -> f64 {
 }
 
 /// A cost with four decimals where it is small, fewer where it is large.
-pub(in crate::app::views) fn number(cost: f64) -> String {
+pub(super) fn number(cost: f64) -> String {
     match cost.abs() {
         large if large >= 1000.0 => format!("{cost:.1}"),
         large if large >= 10.0 => format!("{cost:.2}"),

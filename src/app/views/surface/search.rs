@@ -12,17 +12,15 @@ use crate::problem::Problem;
 use crate::session::Span;
 
 /// What a direct method has recorded of its search.
-pub(in crate::app::views) struct Search<'a> {
-    pub(in crate::app::views) method: Method,
+pub(super) struct Search<'a> {
+    pub(super) method: Method,
     pub(super) problem: &'a Problem,
     /// The part of the run that it is read from: the method's own, or the hybrid's.
-    pub(in crate::app::views) span: &'a Span,
+    pub(super) span: &'a Span,
     /// Pixels covered at the reference pose, which all coverages are shares of.
     pub(super) covered_at_reference: u32,
     /// Pixels that a hypothesis must cover to be eligible: the coverage floor.
     pub(super) least_covered: u32,
-    /// Where the search stood: at the reference, and at each best so far.
-    pub(in crate::app::views) way: Vec<Offset>,
     /// The lattices, in the order of the search; the last one may be incomplete.
     pub(super) lattices: Vec<Searched>,
     /// The hypothesis of the cursor, while a lattice is being searched.
@@ -33,9 +31,9 @@ pub(in crate::app::views) struct Search<'a> {
 }
 
 /// A lattice with the scores so far.
-pub(in crate::app::views) struct Searched {
+pub(super) struct Searched {
     /// Cells without a score are not tried yet, or no hypotheses.
-    pub(in crate::app::views) surface: Arc<ScoredLattice>,
+    pub(super) surface: Arc<ScoredLattice>,
     pub(super) tried: usize,
     /// Whether its minimum is known.
     pub(super) is_complete: bool,
@@ -43,7 +41,7 @@ pub(in crate::app::views) struct Searched {
 
 impl<'a> Search<'a> {
     /// The search of `method` on the reference at the cursor; `None` before its first view.
-    pub(in crate::app::views) fn at(context: &ViewContext<'a>, method: Method) -> Option<Self> {
+    pub(super) fn at(context: &ViewContext<'a>, method: Method) -> Option<Self> {
         let (span, cursor) = part_with::<PoseScored>(context, method)?;
         let problems = &context.run.loaded.as_deref()?.problems;
         let problem = problems.get(span.part.reference()?)?;
@@ -61,58 +59,49 @@ impl<'a> Search<'a> {
             span,
             covered_at_reference,
             least_covered,
-            way: vec![start.offset],
             lattices: Vec::new(),
             hypothesis: None,
             assessed: None,
             steps: Vec::new(),
         };
         let mut centre = Offset::default();
-        let mut filling: Option<Filling> = None;
+        // An unfinished lattice reports single hypotheses; their cells follow from the parameters.
+        let mut single: Vec<&PoseScored> = Vec::new();
         for event in events {
             match event {
-                Event::ViewRendered(view) => search.way.push(view.offset),
-                Event::PoseScored(scored) => {
-                    // An unfinished lattice reports single hypotheses; their cells follow from the
-                    // parameters.
-                    let radius_m = problem.uncertainty_radius_m;
-                    if filling.is_none() {
-                        let lattice = Lattice::new(scored.phase, centre, radius_m, params);
-                        filling = lattice.ok().map(Filling::new);
-                    }
-                    if let Some(filling) = &mut filling {
-                        filling.take(scored);
-                    }
-                    search.hypothesis = Some(scored);
-                }
+                Event::PoseScored(scored) => single.push(scored),
                 Event::PhaseSearched(searched) => {
-                    filling = None;
-                    search.hypothesis = None;
+                    single.clear();
                     centre = searched.best.unwrap_or(centre);
                     let surface = Arc::clone(&searched.surface);
-                    search.lattices.push(Searched {
-                        tried: surface.scores.iter().flatten().count(),
-                        surface,
-                        is_complete: true,
-                    });
+                    let tried = surface.scores.iter().flatten().count();
+                    search.lattices.push(Searched { surface, tried, is_complete: true });
                 }
                 Event::MinimumAssessed(assessed) => search.assessed = Some(assessed),
                 Event::DescentStepped(step) => search.steps.push(step),
                 _ => {}
             }
         }
-        if search.lattices.is_empty() && filling.is_none() && search.assessed.is_none() {
-            // The parameters say where it will search: an empty map, to point at.
-            let radius_m = problem.uncertainty_radius_m;
-            let coarse = Lattice::new(Phase::PositionCoarse, centre, radius_m, params);
-            filling = coarse.ok().map(Filling::new);
-        }
-        search.lattices.extend(filling.map(|filling| filling.done(least_covered)));
+        search.hypothesis = single.last().copied();
+        // Before the first hypothesis the parameters say where it will search: an empty map, to point at.
+        let is_new = search.lattices.is_empty() && search.assessed.is_none();
+        let first = single.first().map(|scored| scored.phase);
+        let phase = first.or(is_new.then_some(Phase::PositionCoarse));
+        let radius_m = problem.uncertainty_radius_m;
+        let lattice = phase.and_then(|phase| Lattice::new(phase, centre, radius_m, params).ok());
+        search.lattices.extend(lattice.map(|lattice| {
+            let mut scores = vec![None; lattice.cells()];
+            for ((cell, offset), scored) in lattice.hypotheses().zip(&single) {
+                scores[cell] = (offset == scored.offset).then_some(scored.score);
+            }
+            let surface = Arc::new(ScoredLattice { lattice, scores, least_covered });
+            Searched { surface, tried: single.len(), is_complete: false }
+        }));
         Some(search)
     }
 
     /// The lattices of positions, in the order in which they are drawn.
-    pub(in crate::app::views) fn positions(&self) -> impl DoubleEndedIterator<Item = &Searched> {
+    pub(super) fn positions(&self) -> impl DoubleEndedIterator<Item = &Searched> {
         self.lattices.iter().filter(|searched| !searched.phase().is_yaw())
     }
 
@@ -147,13 +136,13 @@ impl<'a> Search<'a> {
 }
 
 impl Searched {
-    pub(in crate::app::views) fn phase(&self) -> Phase {
+    pub(super) fn phase(&self) -> Phase {
         self.surface.lattice.phase
     }
 
     /// The eligible cell of lowest cost.
-    pub(super) fn minimum(&self, least_covered: u32) -> Option<Minimum> {
-        let cell = self.surface.minimum_with(least_covered)?;
+    pub(super) fn minimum(&self) -> Option<Minimum> {
+        let cell = self.surface.minimum()?;
         Some(Minimum {
             cell,
             offset: self.surface.lattice.offset(cell)?,
@@ -170,52 +159,8 @@ pub(super) struct Minimum {
     pub(super) cost: f64,
 }
 
-/// A lattice whose scores come in one by one.
-struct Filling {
-    lattice: Lattice,
-    cells: Vec<(usize, Offset)>,
-    tried: usize,
-    scores: Vec<Option<crate::render::Score>>,
-}
-
-impl Filling {
-    fn new(lattice: Lattice) -> Self {
-        Self {
-            cells: lattice.hypotheses().collect(),
-            tried: 0,
-            scores: vec![None; lattice.cells()],
-            lattice,
-        }
-    }
-
-    fn take(&mut self, scored: &PoseScored) {
-        if let Some(&(cell, offset)) = self.cells.get(self.tried)
-            && offset == scored.offset
-        {
-            self.scores[cell] = Some(scored.score);
-        }
-        self.tried += 1;
-    }
-
-    fn done(self, least_covered: u32) -> Searched {
-        Searched {
-            tried: self.tried,
-            is_complete: false,
-            surface: Arc::new(ScoredLattice {
-                lattice: self.lattice,
-                scores: self.scores,
-                least_covered,
-            }),
-        }
-    }
-}
-
 /// The cell that a position lies in.
-pub(in crate::app::views) fn cell_of(
-    lattice: &Lattice,
-    right_m: f64,
-    forward_m: f64,
-) -> Option<usize> {
+pub(super) fn cell_of(lattice: &Lattice, right_m: f64, forward_m: f64) -> Option<usize> {
     let index = |value: f64, count: usize| {
         let index = (value / lattice.step).round() + (count / 2) as f64;
         (0.0 <= index && index < count as f64).then_some(index as usize)

@@ -42,8 +42,8 @@ impl SliceAxis {
     }
 
     /// The slice of a lattice through its minimum; nothing where it is not eligible.
-    fn curve(self, searched: &Searched, least_covered: u32) -> Vec<Option<[f64; 2]>> {
-        let Some(Minimum { offset: through, .. }) = searched.minimum(least_covered) else {
+    fn curve(self, searched: &Searched) -> Vec<Option<[f64; 2]>> {
+        let Some(Minimum { offset: through, .. }) = searched.minimum() else {
             return Vec::new();
         };
         let is_on_slice = |offset: &Offset| match self {
@@ -52,10 +52,9 @@ impl SliceAxis {
             Self::Yaw => true,
         };
         let cells = searched.surface.lattice.hypotheses();
-        let cells = cells.filter(|(_, offset)| is_on_slice(offset)).map(|(cell, offset)| {
-            let cost = searched.surface.scores[cell]?.eligible_cost(least_covered)?;
-            Some([self.of(&offset), cost])
-        });
+        let cells = cells
+            .filter(|(_, offset)| is_on_slice(offset))
+            .map(|(cell, offset)| Some([self.of(&offset), searched.surface.eligible_cost(cell)?]));
         cells.collect()
     }
 }
@@ -85,7 +84,7 @@ fn marks(ui: &Ui, context: &ViewContext<'_>, search: &Search<'_>) -> Vec<LineMar
     let strong = ui.visuals().strong_text_color();
     let truth = context.truth().map(|pose| search.offset(pose));
     let hypothesis = search.hypothesis.map(|scored| scored.offset);
-    let camera = context.camera().map(|pose| search.offset(&pose));
+    let camera = context.state.camera.map(|pose| search.offset(&pose));
     let [dashed, dotted] = [LineStyle::dashed_loose(), LineStyle::dotted_loose()];
     let marks = [
         ("╎ truth", theme::TRUTH, dashed, truth),
@@ -117,8 +116,7 @@ fn slice(
                 plot.vline(line.style(*style).allow_hover(false));
             }
             for (phase, width) in axis.phases().into_iter().zip([1.0, 2.5]) {
-                let searched = search.last(phase);
-                let curve = searched.map(|searched| axis.curve(searched, search.least_covered));
+                let curve = search.last(phase).map(|searched| axis.curve(searched));
                 let curve = curve.unwrap_or_default();
                 for (index, stretch) in stretches(&curve).enumerate() {
                     let line = Line::new(search.method.label(), stretch).width(width);
@@ -149,12 +147,15 @@ mod tests {
             let cost = if offset == lowest { 1.0 } else { 2.0 };
             scores[cell] = Some(Score { cost: Some(cost), covered: 9 });
         }
-        let surface = Arc::new(ScoredLattice { lattice, scores, least_covered: 5 });
-        let searched = Searched { tried: 5, surface, is_complete: true };
-        let curve = |axis: SliceAxis| axis.curve(&searched, 5);
+        let curve_above = |axis: SliceAxis, least_covered| {
+            let (lattice, scores) = (lattice.clone(), scores.clone());
+            let surface = Arc::new(ScoredLattice { lattice, scores, least_covered });
+            axis.curve(&Searched { tried: 5, surface, is_complete: true })
+        };
+        let curve = |axis| curve_above(axis, 5);
         let column = [[-1.0, 1.0], [0.0, 2.0], [1.0, 2.0]].map(Some);
         assert_eq!(curve(SliceAxis::Forward), column);
         assert_eq!(curve(SliceAxis::Right), [Some([0.0, 1.0])]);
-        assert_eq!(SliceAxis::Forward.curve(&searched, 10), []);
+        assert_eq!(curve_above(SliceAxis::Forward, 10), []);
     }
 }

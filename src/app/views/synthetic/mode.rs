@@ -26,15 +26,14 @@ pub(super) enum Mode {
     Residual,
     /// What each pixel has to say in the cost.
     Weights,
-    Coverage,
 }
 
 /// Width of a legend \[points\].
 const LEGEND: f32 = 260.0;
 
 impl Mode {
-    pub(super) const ALL: [Self; 6] =
-        [Self::Query, Self::View, Self::Blend, Self::Residual, Self::Weights, Self::Coverage];
+    pub(super) const ALL: [Self; 5] =
+        [Self::Query, Self::View, Self::Blend, Self::Residual, Self::Weights];
 
     pub(super) fn name(self, method: Method) -> &'static str {
         match self {
@@ -44,7 +43,6 @@ impl Mode {
             Self::Residual => "Residual",
             Self::Weights if explains(method) == Some(ExplanationKind::Weights) => "Weights",
             Self::Weights => "Shares",
-            Self::Coverage => "Coverage",
         }
     }
 
@@ -58,7 +56,6 @@ impl Mode {
                 "Which pixels the photometric cost counts, and which it ignores"
             }
             Self::Weights => "What each pixel's pair of grey values adds to mutual information",
-            Self::Coverage => "The covered pixels over the query, in the colours of their depths",
         }
     }
 
@@ -72,7 +69,7 @@ impl Mode {
         shown: &ShownView,
     ) -> Option<TextureHandle> {
         let of = |what, make: &dyn Fn(&Comparison) -> DynamicImage| {
-            let textures = context.textures;
+            let textures = &context.state.textures;
             let made = |comparison: &Comparison| color_image(&make(comparison));
             textures.of(ui.ctx(), what, &shown.comparison, made)
         };
@@ -92,12 +89,6 @@ impl Mode {
             Self::Weights => {
                 shown.comparison.explanation.as_ref()?;
                 of("synthetic/weights", &weights)
-            }
-            Self::Coverage => {
-                let query = Arc::clone(&problem.query);
-                of("synthetic/coverage", &move |made| {
-                    pictures::coverage(&query.photo.gray, &made.view).into()
-                })
             }
         };
         Some(picture)
@@ -130,10 +121,6 @@ impl Mode {
             }
             (Self::Weights, None) => {
                 ui.weak("There is no cost to explain");
-            }
-            (Self::Coverage, _) => {
-                legend::depth_bar(ui, LEGEND);
-                ui.weak("depth of the covered pixels");
             }
             _ => {
                 ui.weak(self.about(method));

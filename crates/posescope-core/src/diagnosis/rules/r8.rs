@@ -4,7 +4,7 @@ use super::*;
 
 pub(super) const RULE: Rule = Rule {
     title: "a wrong pose was accepted",
-    advice: "lower fb.ratio; does the cloud belong to the photo?",
+    advice: "check that camera and cloud belong to the photos; then try another fb.ratio",
     applies_to: Family::MATCHING,
     test: Test::Method(test),
     proof: Proof::Matches,
@@ -42,14 +42,20 @@ impl fmt::Display for Accepted {
             f,
             "A wrong pose was accepted: {inliers} matches agree on it, {off} off, {true_inliers} of them true. "
         )?;
-        // A pose on true matches points at the cloud, one on false matches at the photos.
-        if 2 * true_inliers >= *inliers && 2 * wrong_depth > *supports_truth {
+        // A pose on true matches points at their depths or their spread, one on false matches at the photos.
+        let is_on_true_ones = 2 * true_inliers >= *inliers;
+        if is_on_true_ones && 2 * wrong_depth > *supports_truth {
             write!(
                 f,
                 "Of the true matches, {wrong_depth} have a wrong depth, {supports_truth} the right one."
             )
+        } else if is_on_true_ones {
+            f.write_str("They are too few or too close together to fix it.")
         } else {
-            write!(f, "Something moved or looks alike; the truth explains {supports_truth}.")
+            write!(
+                f,
+                "The truth explains {supports_truth}: something looks alike or moved, or the camera is not as stated."
+            )
         }
     }
 }
@@ -67,7 +73,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn false_matches_point_at_the_photos_and_true_ones_without_depths_at_the_cloud() {
+    fn false_matches_point_at_the_photos_and_true_ones_at_their_depths_or_their_spread() {
         let said = |true_inliers, wrong_depth| {
             let accepted = Accepted {
                 error: PoseError { translation_m: 3.0, rotation_deg: 0.0, max_euler_deg: 0.0 },
@@ -79,9 +85,9 @@ mod tests {
             };
             accepted.to_string()
         };
-        let alike = "Something moved or looks alike; the truth explains 21.";
+        let elsewhere = "The truth explains 21: something looks alike or moved, or the camera is not as stated.";
         assert!(said(14, 18).ends_with("18 have a wrong depth, 21 the right one."));
-        assert!(said(14, 10).ends_with(alike));
-        assert!(said(3, 27).ends_with(alike));
+        assert!(said(14, 10).ends_with("They are too few or too close together to fix it."));
+        assert!(said(3, 27).ends_with(elsewhere));
     }
 }

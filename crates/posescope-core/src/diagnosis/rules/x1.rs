@@ -13,7 +13,7 @@ use crate::stats::median;
 use crate::trace::Trace;
 
 pub(super) const RULE: Rule = Rule {
-    title: "a calibration or the ground truth is suspect",
+    title: "a calibration, a pose convention or the ground truth is suspect",
     advice: "check calibration, pose convention and units; `posescope doctor` does",
     applies_to: Family::ALL,
     needs_truth: false,
@@ -40,6 +40,9 @@ fn test(case: &Case<'_>) -> Option<Diagnosis> {
                 .or_else(|| truth_by_matches(case, matches))
         }
         Family::Grid | Family::Given => {
+            if let Some(found) = given_pose(case) {
+                return Some(found);
+            }
             let search = case.search?;
             search.result_cost?;
             poses(case).or_else(|| camera_by_fb(case)).or_else(|| truth_by_cost(case, search))
@@ -112,6 +115,39 @@ fn poses(case: &Case<'_>) -> Option<Diagnosis> {
 evidence!(Poses { reading: &'static str, error: PoseError, error_as_stated: PoseError } =>
     "The scene's poses are suspect: read as {reading}, the estimate is {} off. As stated it is {} \
      off.",
+    metres(error.translation_m), metres(error_as_stated.translation_m)
+);
+
+/// The pose of another system agrees with the truth if it is read in another way.
+fn given_pose(case: &Case<'_>) -> Option<Diagnosis> {
+    /// How much nearer to the truth the other reading must be.
+    const TIMES: f64 = 10.0;
+    const AGREEING_DEG: f64 = 2.0;
+    let (Family::Given, Ok(pose), Some(truth)) =
+        (case.family, &case.subject.outcome.pose, case.subject.truth)
+    else {
+        return None;
+    };
+    let error_as_stated = case.subject.error()?;
+    let scaled = |by: f64| {
+        let translation = Translation3::from(pose.translation.vector * by);
+        Pose::from_parts(translation, pose.rotation)
+    };
+    let readings = [
+        ("camera_from_world (inverted)", pose.inverse()),
+        ("millimetres", scaled(1e-3)),
+        ("kilometres", scaled(1e3)),
+    ];
+    readings.into_iter().find_map(|(reading, pose)| {
+        let error = PoseError::between(&pose, truth);
+        let agrees = error.rotation_deg < AGREEING_DEG
+            && TIMES * error.translation_m < error_as_stated.translation_m;
+        agrees.then(|| RULE.found(&GivenPose { reading, error, error_as_stated }))
+    })
+}
+
+evidence!(GivenPose { reading: &'static str, error: PoseError, error_as_stated: PoseError } =>
+    "The pose of this system is in another convention: read as {reading}, it is {} off, not {}.",
     metres(error.translation_m), metres(error_as_stated.translation_m)
 );
 
