@@ -18,14 +18,14 @@
 struct Readme;
 
 pub use posescope_core::{
-    Cloud, Cost, Direct, Estimator, Failure, History, InputError, IntensityPair, Intrinsics,
-    Method, Outcome, Params, Photo, Pose, Problem, Query, ReferenceTuple, Trace, inner_scene,
-    localize_by, localize_traced,
+    Cloud, Cost, Direct, Estimator, Failure, History, InputError, Intrinsics, Method, Outcome,
+    Params, Photo, Pose, Problem, Query, ReferenceTuple, Trace, inner_scene, localize_by,
+    localize_traced,
 };
 pub use posescope_core::{
     camera, cloud, cost, depth, describe, diagnosis, estimator, event, features, foreign, fusion,
-    geometry, grid, history, image, judge, localize, memo, method, params, problem, render,
-    retrieval, robust, solver, text, trace,
+    geometry, grid, history, image, localize, method, params, problem, render, retrieval, robust,
+    solver, text, trace,
 };
 
 #[cfg(feature = "app")]

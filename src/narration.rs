@@ -102,10 +102,7 @@ pub(crate) fn sentence(event: &Event) -> Option<String> {
         Event::CandidatesJudged(event) => judged(event),
         Event::ReferencesFused(event) => fused(event),
         Event::ReferencesRanked(event) => ranked(event),
-        Event::HypothesisTried(_)
-        | Event::PoseScored(_)
-        | Event::StageStarted(_)
-        | Event::StageEnded(_) => return None,
+        _ => return None,
     })
 }
 

@@ -146,6 +146,7 @@ fn evidence(comparison: &Comparison) -> Option<Vec<f64>> {
             };
             pairs.iter().zip(&weights.counted).map(of_pair).collect()
         }
+        _ => return None,
     })
 }
 

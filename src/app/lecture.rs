@@ -130,5 +130,6 @@ fn about(stage: Stage) -> &'static str {
             "How good is the minimum? It is compared with its rivals and with shuffled pixels."
         }
         Stage::Fuse => "The poses from all references become one.",
+        _ => stage.name(),
     }
 }

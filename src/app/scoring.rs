@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use super::worker::{Answers, Worker};
 use crate::estimator;
 use crate::geometry::Pose;
-use crate::grid::{DenseSurface, GridParams, LatticeTooLarge};
+use crate::grid::{DenseSurface, LatticeTooLarge};
 use crate::method::Method;
 use crate::params::Params;
 use crate::problem::Problem;
@@ -196,11 +196,9 @@ pub struct DenseMap {
 
 impl DenseMap {
     fn new(ask: DenseAsk, problem: &Problem, params: &Params) -> Self {
-        let grid = GridParams {
-            coarse_step_m: params.surface.step_m,
-            yaw_step_deg: params.surface.yaw_step_deg,
-            ..params.grid.clone()
-        };
+        let mut grid = params.grid.clone();
+        grid.coarse_step_m = params.surface.step_m;
+        grid.yaw_step_deg = params.surface.yaw_step_deg;
         let radius_m = problem.uncertainty_radius_m;
         Self {
             ask,

@@ -42,7 +42,7 @@ pub fn index(args: &IndexArgs, terminal: &Terminal) -> Result<(), CliError> {
     }
     let bar = terminal.bar(0);
     let built = Retriever::build(scene.as_ref(), &path, &request, &params, |progress| {
-        let BuildProgress { step, done, total } = progress;
+        let BuildProgress { step, done, total, .. } = progress;
         bar.set_message(step.name());
         bar.set_length(total as u64);
         bar.set_position(done as u64);

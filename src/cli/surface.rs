@@ -8,7 +8,7 @@ use image::imageops::{self, FilterType};
 use posescope::estimator;
 use posescope::geometry::{Pose, PoseError};
 use posescope::grid::{
-    DenseSurface, GridParams, LatticeTooLarge, MOST_CELLS, Offset, least_covered,
+    DenseSurface, GridParams, LatticeTooLarge, MAX_CELLS, Offset, least_covered,
 };
 use posescope::method::Method;
 use posescope::picture;
@@ -36,19 +36,13 @@ pub fn surface(args: &RunArgs, out: &Path, terminal: &Terminal) -> Result<(), Cl
                 .to_owned(),
         ));
     };
-    let problem = Problem {
-        query: queried.query(query)?,
-        reference: references.reference(references.find(reference)?)?,
-        uncertainty_radius_m: task.radius_m(),
-        prior_m: None,
-        seed: task.protocol.seed,
-        matches: None,
-    };
-    let grid = GridParams {
-        coarse_step_m: task.params.surface.step_m,
-        yaw_step_deg: task.params.surface.yaw_step_deg,
-        ..task.params.grid.clone()
-    };
+    let reference = references.reference(references.find(reference)?)?;
+    let mut problem = Problem::new(queried.query(query)?, reference, task.radius_m())
+        .map_err(|error| CliError::Usage(error.to_string()))?;
+    problem.seed = task.protocol.seed;
+    let mut grid = task.params.grid.clone();
+    grid.coarse_step_m = task.params.surface.step_m;
+    grid.yaw_step_deg = task.params.surface.yaw_step_deg;
     // A wrong folder fails before the work.
     if let Some(folder) = out.parent() {
         std::fs::create_dir_all(folder).map_err(CliError::io(folder))?;
@@ -103,7 +97,7 @@ fn too_large(error: &LatticeTooLarge) -> CliError {
         ("surface.step", "a smaller --radius")
     };
     CliError::Usage(format!(
-        "{step}: {:.0} cells, at most {MOST_CELLS} can be scored; use a larger step or {less}",
+        "{step}: {:.0} cells, at most {MAX_CELLS} can be scored; use a larger step or {less}",
         error.cells
     ))
 }

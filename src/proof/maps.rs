@@ -352,7 +352,7 @@ fn histogram(seen: Option<&Seen>) -> Option<Panel> {
             panel.has_cells = true;
             Some(panel)
         }
-        Explanation::Weights(_) => None,
+        _ => None,
     }
 }
 

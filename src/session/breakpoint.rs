@@ -305,14 +305,16 @@ impl Sink for StopAtBreakpoint {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::event::{MinimumAssessed, PoseRefined, ProjectedCloud};
+    use crate::event::{DebugEvent, MinimumAssessed, PoseRefined, ProjectedCloud};
     use crate::geometry::Pose;
     use crate::grid::Offset;
     use crate::history::History;
     use crate::trace::Trace;
 
-    fn record(event: impl Into<Event>) -> Record {
-        Record { index: 0, depth: 1, methods: Default::default(), event: event.into() }
+    fn record(event: impl DebugEvent) -> Record {
+        let mut history = History::default();
+        Trace::to(&mut history).emit(|| event).expect("nobody cancels");
+        history.records()[0].clone()
     }
 
     fn inliers(inliers: usize) -> Record {

@@ -28,7 +28,7 @@ use crate::real_pairs;
 const FITTED_ON: [Condition; 3] = [Condition::Overcast, Condition::Sun, Condition::Snow];
 
 /// The methods whose poses have a probability of their own.
-const JUDGED: &str = "fb,pm,mi,nid,fb2,mi6,robust";
+const JUDGED: &str = "fb,pm,mi,fb2,mi6,robust";
 
 /// Uncertainty of the reference's position \[m\].
 const RADIUS_M: f64 = 10.0;

@@ -163,7 +163,8 @@ impl Plan {
         truth: Pose,
     ) -> Result<Case, Failure> {
         let (query, reference) = (queries.query(query)?, references.reference(reference)?);
-        let problem = Problem::new(query, reference, self.radius_m)?;
-        Ok(Case { rows, problem: Problem { seed: self.seed, ..problem }, truth })
+        let mut problem = Problem::new(query, reference, self.radius_m)?;
+        problem.seed = self.seed;
+        Ok(Case { rows, problem, truth })
     }
 }

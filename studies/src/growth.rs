@@ -54,7 +54,8 @@ pub fn run(options: &Options) -> Result<(), Failure> {
     });
     print_table("pixels,PM (µs),MI (µs)", &rows);
     let rows = BINS.map(|bins| {
-        let cost = MutualInformation { bins, ..MutualInformation::default() };
+        let mut cost = MutualInformation::default();
+        cost.bins = bins;
         let (query, cloud) = seen_by(&cost);
         row(bins, [hypothesis(&cloud.points, &query, camera, &cost, rounds)])
     });
@@ -102,8 +103,12 @@ fn scaled(intrinsics: &Intrinsics, scale: f64) -> Intrinsics {
 /// enough.
 fn by_keypoints(rounds: usize) {
     let photos = [&PAIR.query.photo.gray, &PAIR.reference.photo.gray].map(enlarged);
-    let params =
-        |max_keypoints| SurfParams { threshold: 1.0, max_keypoints, ..SurfParams::default() };
+    let params = |max_keypoints| {
+        let mut params = SurfParams::default();
+        params.threshold = 1.0;
+        params.max_keypoints = max_keypoints;
+        params
+    };
     let most = params(KEYPOINTS[KEYPOINTS.len() - 1]);
     let [query, reference] = photos.each_ref().map(|photo| surf(photo, &most).descriptors);
     let known = query.len().min(reference.len());

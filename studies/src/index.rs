@@ -116,14 +116,14 @@ fn built(path: &Path, frames: usize, options: &Options) -> Result<[f64; 6], Fail
 }
 
 fn queried(path: &Path, frames: usize, options: &Options) -> Result<[f64; 11], Failure> {
-    let params = RetrievalParams::default();
+    let mut params = RetrievalParams::default();
     let started = Instant::now();
     let index = Index::open(path, params.checks)?;
     let opened = started.elapsed().as_secs_f64();
     let memory_open = memory_mb("RssAnon");
     let mut found = 0;
     let [by_scores, verified] = [0, params.verify].map(|verify| {
-        let params = RetrievalParams { verify, ..params };
+        params.verify = verify;
         let (mut times, mut work) = (Vec::new(), Duration::ZERO);
         found = 0;
         for query in 0..QUERIES {

@@ -4,7 +4,7 @@ use std::time::Instant;
 use posescope::features::{Features, surf};
 use posescope::geometry::PoseError;
 use posescope::params::Params;
-use posescope::retrieval::{Index, Ranked, RetrievalParams};
+use posescope::retrieval::{Index, Ranked};
 use posescope::scene::{self, IndexOptions, Retriever, Scene};
 use rayon::prelude::*;
 
@@ -98,7 +98,8 @@ fn ask(
     frames: &[usize],
 ) -> Result<Vec<Answer>, Failure> {
     let detector = params.retrieval.surf(&params.surf);
-    let unverified = RetrievalParams { verify: 0, ..params.retrieval };
+    let mut unverified = params.retrieval;
+    unverified.verify = 0;
     let features = frames.par_iter().map(|&frame| Ok(surf(&queries.photo(frame)?.gray, &detector)));
     let features: Result<Vec<Features>, scene::SceneError> = features.collect();
     let known = frames

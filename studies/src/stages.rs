@@ -24,7 +24,9 @@ pub const TRIALS: u64 = 10;
 
 /// The features that turn with the image, as those of other programs do.
 pub fn turning() -> SurfParams {
-    SurfParams { upright: false, ..SurfParams::default() }
+    let mut params = SurfParams::default();
+    params.upright = false;
+    params
 }
 
 /// What a stage does each time it is called; how good the outcome is.

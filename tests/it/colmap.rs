@@ -312,14 +312,12 @@ fn fb_localises_at_the_real_door() {
     let scene = open(&folder);
     let frame = |name| scene.find(name).expect("is there");
     let (query, reference) = (frame("DSC_0006"), frame("DSC_0005"));
-    let problem = Problem {
-        query: scene.query(query).expect("readable"),
-        reference: scene.reference(reference).expect("readable"),
-        uncertainty_radius_m: 5.0,
-        prior_m: None,
-        seed: 0,
-        matches: None,
-    };
+    let problem = Problem::new(
+        scene.query(query).expect("readable"),
+        scene.reference(reference).expect("readable"),
+        5.0,
+    )
+    .expect("a radius");
     let outcome = localize(&problem, Method::FB, &Params::default());
     let pose = outcome.pose.unwrap_or_else(|failure| panic!("{failure}"));
     let error = PoseError::between(&scene.pose(query).expect("is known"), &pose);

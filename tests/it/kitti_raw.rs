@@ -224,14 +224,12 @@ fn fb_localises_on_the_real_drive() {
     let scene = open(&folder);
     let frame = |name| scene.find(name).expect("is there");
     let (reference, query) = (frame("4"), frame("8"));
-    let problem = Problem {
-        query: scene.query(query).expect("readable"),
-        reference: scene.reference(reference).expect("readable"),
-        uncertainty_radius_m: 10.0,
-        prior_m: None,
-        seed: 0,
-        matches: None,
-    };
+    let problem = Problem::new(
+        scene.query(query).expect("readable"),
+        scene.reference(reference).expect("readable"),
+        10.0,
+    )
+    .expect("a radius");
     let outcome = localize(&problem, Method::FB, &Params::default());
     let pose = outcome.pose.unwrap_or_else(|failure| panic!("{failure}"));
     let truth = scene.pose(reference).expect("is known") * derived[&8];

@@ -26,14 +26,12 @@ fn pair(query: &str, reference: &str) -> Option<(Problem, Pose)> {
     let folder = authors_pair()?;
     let scene = scene::open(folder.to_str()?, None).unwrap_or_else(|error| panic!("{error}"));
     let frame = |name| scene.find(name).expect("is there");
-    let problem = Problem {
-        query: scene.query(frame(query)).expect("readable"),
-        reference: scene.reference(frame(reference)).expect("readable"),
-        uncertainty_radius_m: 15.0,
-        prior_m: None,
-        seed: 0,
-        matches: None,
-    };
+    let problem = Problem::new(
+        scene.query(frame(query)).expect("readable"),
+        scene.reference(frame(reference)).expect("readable"),
+        15.0,
+    )
+    .expect("a radius");
     Some((problem, scene.pose(frame(query)).expect("is known")))
 }
 

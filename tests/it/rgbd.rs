@@ -296,14 +296,12 @@ fn fb_localises_in_the_real_kitchen() {
     };
     let scene = open(&folder);
     let frame = |name| scene.find(name).expect("is there");
-    let problem = Problem {
-        query: scene.query(frame("25")).expect("readable"),
-        reference: scene.reference(frame("0")).expect("readable"),
-        uncertainty_radius_m: 2.0,
-        prior_m: None,
-        seed: 0,
-        matches: None,
-    };
+    let problem = Problem::new(
+        scene.query(frame("25")).expect("readable"),
+        scene.reference(frame("0")).expect("readable"),
+        2.0,
+    )
+    .expect("a radius");
     let outcome = localize(&problem, Method::FB, &Params::default());
     let truth = scene.pose(frame("25")).expect("is known");
     let pose = outcome.pose.unwrap_or_else(|failure| panic!("{failure}"));

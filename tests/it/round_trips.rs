@@ -182,14 +182,12 @@ fn expect_a_pose(layout: &Layout, disk: &dyn Scene) {
     if ["robotcar", "tum"].contains(&layout.name) {
         return;
     }
-    let problem = Problem {
-        query: disk.query(1).expect("is complete"),
-        reference: disk.reference(0).expect("is complete"),
-        uncertainty_radius_m: 15.0,
-        prior_m: None,
-        seed: 0,
-        matches: None,
-    };
+    let problem = Problem::new(
+        disk.query(1).expect("is complete"),
+        disk.reference(0).expect("is complete"),
+        15.0,
+    )
+    .expect("a radius");
     let outcome = localize(&problem, Method::FB, &Params::default());
     let pose = outcome.pose.unwrap_or_else(|failure| panic!("{}: {failure}", layout.name));
     let error = PoseError::between(&disk.pose(1).expect("is known"), &pose);
@@ -200,7 +198,8 @@ fn expect_a_pose(layout: &Layout, disk: &dyn Scene) {
 fn middle_error(problem: &Problem, truth: &Pose) -> (f64, f64) {
     const SEEDS: u64 = 5;
     let errors = (0..SEEDS).map(|seed| {
-        let problem = Problem { seed, ..problem.clone() };
+        let mut problem = problem.clone();
+        problem.seed = seed;
         let outcome = localize(&problem, Method::FB, &Params::default());
         let pose = outcome.pose.unwrap_or_else(|failure| panic!("{failure}"));
         PoseError::between(truth, &pose)
@@ -242,14 +241,7 @@ fn what_is_lost_on_the_way_through_robotcar_is_known_part_by_part() {
         let mut reference = (*scene.reference(frames[0]).expect("is complete")).clone();
         reference.photo = of_reference.photo.clone();
         reference.world_from_camera = street.pose(WRITTEN[0]).expect("is known");
-        let problem = Problem {
-            query,
-            reference: reference.into(),
-            uncertainty_radius_m: 15.0,
-            prior_m: None,
-            seed: 0,
-            matches: None,
-        };
+        let problem = Problem::new(query, reference, 15.0).expect("a radius");
         middle_error(&problem, &street.pose(WRITTEN[1]).expect("is known"))
     };
     let found = [(false, false), (false, true), (true, false), (true, true)]

@@ -5,7 +5,7 @@ use egui_kittest::kittest::{NodeT as _, Queryable as _};
 use posescope::app::App;
 use posescope::cost::Explanation;
 use posescope::event::{ConsensusJudged, DebugEvent, HypothesisTried, PoseScored, ViewRendered};
-use posescope::grid::{DenseSurface, GridParams, Offset, Phase};
+use posescope::grid::{DenseSurface, Offset, Phase};
 use posescope::method::Method;
 use posescope::session::{RunMode, Span};
 
@@ -488,7 +488,9 @@ fn a_dense_map_that_nobody_looks_at_stands_still_and_is_gone_on_with() {
     let state = app(&window);
     let params = &state.setup.task.params;
     let problem = &state.run().loaded.as_ref().expect("loaded").problems[0];
-    let grid = GridParams { coarse_step_m: 0.1, yaw_step_deg: 0.5, ..params.grid.clone() };
+    let mut grid = params.grid.clone();
+    grid.coarse_step_m = 0.1;
+    grid.yaw_step_deg = 0.5;
     let least_covered = whole.cheapest().least_covered;
     let mut at_once = DenseSurface::new(3.0, &grid, least_covered).expect("small");
     let estimator = posescope::estimator::entry(Method::MI).make(params);

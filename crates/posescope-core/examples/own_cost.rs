@@ -5,13 +5,11 @@ mod walls;
 
 use std::error::Error;
 
-use posescope_core::cost::Statistic;
+use posescope_core::cost::{IntensityPair, Key, Statistic, key};
 use posescope_core::geometry::PoseError;
 use posescope_core::image::{FloatImage, GrayImage, gaussian_smoothed};
-use posescope_core::memo::{Key, key};
 use posescope_core::{
-    Cloud, Cost, Direct, IntensityPair, Params, Photo, Pose, Problem, Query, ReferenceTuple, Trace,
-    localize_by,
+    Cloud, Cost, Direct, Params, Photo, Pose, Problem, Query, ReferenceTuple, Trace, localize_by,
 };
 use walls::CAMERA;
 

@@ -8,31 +8,37 @@
 //! the same name, reachable from the command line, the window and the recordings: a direct estimator
 //! is a cost with a search.
 
+mod entry;
+mod information_distance;
 mod joint_histogram;
 mod lesser_half;
 mod mutual_information;
-mod orientation;
 mod photometric;
+mod settings;
 mod statistic;
-
-use std::fmt;
 
 use rand::SeedableRng as _;
 use rand::seq::SliceRandom as _;
 use rand_pcg::Pcg64;
 
-pub use joint_histogram::{
-    Entropies, JointHistogram, LEAST_ENTROPY, MOST_BYTE_BINS, bin, byte_bin, count_pairs,
-};
-pub use lesser_half::{LesserHalf, LesserHalfFinder};
+pub use information_distance::InformationDistance;
+pub use joint_histogram::{Entropies, JointHistogram};
 pub use mutual_information::MutualInformation;
-pub use orientation::Orientation;
 pub use photometric::Photometric;
 pub use statistic::{CostOfPairs, Explanation, ExplanationKind, PhotometricWeights, Statistic};
 
-use crate::describe::{About, Describe, Field, choice};
+#[doc(hidden)]
+pub use entry::{Entry, RegisteredCost, SearchRule, Similarity};
+pub(crate) use joint_histogram::{MAX_BYTE_BINS, MIN_ENTROPY};
+#[doc(hidden)]
+pub use joint_histogram::{bin, byte_bin, count_pairs};
+#[doc(hidden)]
+pub use lesser_half::{LesserHalf, LesserHalfFinder};
+#[doc(hidden)]
+pub use settings::{CostSetting, CostSettings};
+
 use crate::image::{FloatImage, GrayImage, cubic_interpolated};
-use crate::memo::{Key, key};
+pub use crate::memo::{Key, key};
 
 /// What the query and the synthetic view show at one covered pixel.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -56,11 +62,12 @@ impl IntensityPair {
 }
 
 /// The bins of a joint histogram that both values fall into.
+#[doc(hidden)]
 pub type BinPair = Pair<u8>;
 
 /// The pairs with the synthetic values dealt out anew: what two images give that have nothing to do with
 /// each other, and the same values.
-pub fn shuffled(pairs: &[IntensityPair], seed: u64) -> Vec<IntensityPair> {
+pub(crate) fn shuffled(pairs: &[IntensityPair], seed: u64) -> Vec<IntensityPair> {
     let mut values: Vec<f32> = pairs.iter().map(|pair| pair.synthetic).collect();
     values.shuffle(&mut Pcg64::seed_from_u64(seed));
     let dealt = pairs.iter().zip(values);
@@ -91,140 +98,15 @@ pub trait Cost: Send + Sync {
         key("grey")
     }
 
-    /// What decides the cost of the covered pixels, and how. The threads, a
-    /// [device](crate::render::Device) and the explanation all follow from it.
+    /// What decides the cost of the covered pixels, and how. What scores the poses, on
+    /// threads or a graphics card, and the explanation follow from it.
     fn statistic(&self) -> Statistic<'_>;
 }
 
-/// How a direct method finds the pose of least cost.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum SearchRule {
-    /// It scans a coarse-to-fine grid, as the paper does.
-    #[default]
-    Grid,
-    /// It refines many minima of a coarse grid in six freedoms, as `mi6` does.
-    Starts,
-    /// It goes down from the reference pose by derivatives, as the methods do that the paper takes its
-    /// costs from.
-    Descent,
-}
-
-choice!(SearchRule: Grid = "grid", Starts = "starts", Descent = "descent");
-
-/// A cost whose parameters describe themselves.
-pub trait RegisteredCost: Cost + Describe + fmt::Debug {
-    /// The same cost once more.
-    fn boxed(&self) -> Box<dyn RegisteredCost>;
-}
-
-impl<C: Cost + Describe + Clone + fmt::Debug + 'static> RegisteredCost for C {
-    fn boxed(&self) -> Box<dyn RegisteredCost> {
-        Box::new(self.clone())
-    }
-}
-
-/// What two images share, as a number 0 … 1.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Similarity {
-    /// Its abbreviation: `NMI`.
-    pub name: &'static str,
-    /// What it is, in entropies H and mutual information I of query Q and synthetic view S.
-    pub formula: &'static str,
-}
-
-/// A cost's place in the registry.
-#[derive(Debug)]
-pub struct Entry {
-    /// The name of the method that searches the pose of least cost, and of the parameters' group.
-    pub name: &'static str,
-    /// One phrase.
-    pub about: &'static str,
-    /// What a value of its channel is: `grey value`.
-    pub sees: &'static str,
-    /// Whether it can be descended too: then how it is searched is a parameter, `search`.
-    pub is_smooth: bool,
-    /// What the cost is one minus of, where it is made of a joint histogram.
-    pub similarity: Option<Similarity>,
-    /// The cost with its default parameters.
-    pub make: fn() -> Box<dyn RegisteredCost>,
-}
-
-impl Entry {
-    /// How it explains itself, if it does.
-    pub fn explains(&self) -> Option<ExplanationKind> {
-        (self.make)().statistic().explains()
-    }
-}
-
 /// Every cost.
-pub const ALL: &[Entry] = &[photometric::ENTRY, mutual_information::ENTRY, orientation::ENTRY];
-
-/// A registered cost with its parameters, and how it is searched.
-#[derive(Debug)]
-pub struct CostSetting {
-    /// The cost.
-    pub cost: Box<dyn RegisteredCost>,
-    /// How its minimum is found.
-    pub search: SearchRule,
-    is_smooth: bool,
-}
-
-impl CostSetting {
-    /// The default setting of a cost.
-    pub fn new(entry: &Entry) -> Self {
-        let search = SearchRule::default();
-        Self { cost: (entry.make)(), search, is_smooth: entry.is_smooth }
-    }
-}
-
-impl Describe for CostSetting {
-    fn fields(&mut self) -> Vec<Field<'_>> {
-        let mut fields = self.cost.fields();
-        if self.is_smooth {
-            let doc = "How the pose of least cost is found: over the grid, from many starts, or from the reference \
-                       pose downhill.";
-            let about = About { name: "search", unit: "", doc };
-            fields.push(Field::choice(about, &mut self.search));
-        }
-        fields
-    }
-}
-
-impl Clone for CostSetting {
-    fn clone(&self) -> Self {
-        Self { cost: self.cost.boxed(), ..*self }
-    }
-}
-
-/// The setting of every cost, in the order of [`ALL`].
-#[derive(Clone, Debug)]
-pub struct CostSettings(Vec<CostSetting>);
-
-impl CostSettings {
-    /// Names of the groups, with their parameters.
-    pub fn groups(&mut self) -> impl Iterator<Item = (&'static str, &mut dyn Describe)> {
-        let settings = self.0.iter_mut().map(|setting| setting as &mut dyn Describe);
-        ALL.iter().map(|entry| entry.name).zip(settings)
-    }
-
-    /// The setting of a registered cost.
-    pub fn of(&self, entry: &Entry) -> Option<&CostSetting> {
-        let place = ALL.iter().position(|known| known.name == entry.name)?;
-        self.0.get(place)
-    }
-}
-
-impl Default for CostSettings {
-    fn default() -> Self {
-        Self(ALL.iter().map(CostSetting::new).collect())
-    }
-}
-
-impl PartialEq for CostSettings {
-    fn eq(&self, other: &Self) -> bool {
-        key(&self.0) == key(&other.0)
-    }
-}
+#[doc(hidden)]
+pub const ALL: &[Entry] =
+    &[photometric::ENTRY, mutual_information::ENTRY, information_distance::ENTRY];
 
 #[cfg(test)]
 mod tests {

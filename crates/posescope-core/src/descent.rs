@@ -47,7 +47,7 @@ pub struct Step {
 }
 
 /// The fewest points in view that say anything.
-pub const LEAST_POINTS: usize = 50;
+pub const MIN_POINTS: usize = 50;
 
 #[cfg(test)]
 mod tests;

@@ -9,6 +9,7 @@ use std::str::FromStr;
 
 /// What a parameter is called, measured in and good for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct About {
     /// The name within its group.
     pub name: &'static str,
@@ -113,6 +114,7 @@ fn parsed<T: FromStr>(text: &str) -> Option<T> {
 
 /// The value of a parameter.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum Value {
     /// A real number.
     Number(f64),
@@ -137,6 +139,7 @@ impl fmt::Display for Value {
 
 /// What a parameter accepts.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum Domain {
     /// Real numbers from … to.
     Number(RangeInclusive<f64>),
@@ -262,6 +265,7 @@ macro_rules! parameters {
         }
     ) => {
         $(#[$attribute])*
+        #[non_exhaustive]
         $visibility struct $name {
             $(
                 $(#[doc = $doc])*

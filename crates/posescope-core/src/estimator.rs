@@ -48,6 +48,7 @@ use crate::trace::{Cancelled, Trace};
 /// How many features passed each step of FB. Every query keypoint is in exactly one state, so
 /// each count is at most the one before it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[non_exhaustive]
 pub struct FeatureCounts {
     /// Keypoints of the query photo.
     pub query_keypoints: usize,
@@ -63,8 +64,9 @@ pub struct FeatureCounts {
     pub inliers: usize,
 }
 
-/// What the direct methods found out about their cost.
+/// The costs that a direct method found.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub struct CostSummary {
     /// Cost at the reference pose.
     pub initial: Option<f64>,
@@ -90,8 +92,9 @@ impl CostSummary {
     }
 }
 
-/// What an estimator has to say in the end. A query that cannot be localised is an answer too.
+/// The answer of an estimator. A query without a pose is an answer too.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Outcome {
     /// `world_from_camera` of the query, or why there is none.
     pub pose: Result<Pose, Failure>,
@@ -133,6 +136,7 @@ pub trait Estimator: Send + Sync {
 
     /// What scores many poses of the query by the cost that this estimator minimises; `None` if it has none of
     /// one channel.
+    #[doc(hidden)]
     fn scorer(&self, problem: &Problem) -> Option<Scorer<'_>> {
         let _ = problem;
         None
@@ -140,6 +144,7 @@ pub trait Estimator: Send + Sync {
 
     /// The synthetic view at any pose of the query, with its cost and what that was made of; `None` for an
     /// estimator that minimises no cost.
+    #[doc(hidden)]
     fn compare_at(&self, problem: &Problem, world_from_query: &Pose) -> Option<Comparison> {
         let pose = problem.reference_from_query(world_from_query);
         Some(self.scorer(problem)?.compare(&pose))
@@ -258,7 +263,7 @@ pub fn all() -> &'static [Entry] {
     &ALL
 }
 
-/// Every method, in the order of [`all`].
+/// Every method: those of the paper in its order, then the others by name.
 pub fn methods() -> impl Iterator<Item = Method> {
     all().iter().map(|entry| entry.method)
 }

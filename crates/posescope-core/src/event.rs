@@ -9,15 +9,17 @@ use std::sync::Arc;
 
 use serde::{Serialize, Serializer};
 
-use crate::depth::LiftedMatch;
+pub use crate::depth::{DepthReading, DepthsWithin, LiftedMatch};
+pub use crate::judge::{Freedoms, Refined, Start};
+pub use crate::render::{ColoredCloud, ColoredPoint, ColoringCounts};
+pub use crate::render::{Comparison, SplattedPixel, SyntheticView};
+
 use crate::features::{FeatureState, Features, Match, MatchVerdict};
 use crate::fusion::share::Share;
 use crate::geometry::Pose;
-use crate::grid::{Offset, Phase, Scored, ScoredLattice};
+use crate::grid::{Offset, Phase, Score, Scored, ScoredLattice};
 use crate::image::Photo;
-use crate::judge::{Freedoms, Refined};
 use crate::method::Method;
-use crate::render::{ColoredCloud, Comparison, Score};
 use crate::retrieval::ReferenceRanking;
 use crate::robust::{Acceptance, Counted, Trial};
 
@@ -33,6 +35,7 @@ pub enum Side {
 
 /// A named part of an estimator, which an observer can step over.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[non_exhaustive]
 pub enum Stage {
     /// A whole estimator; within the hybrid also the one it runs inside.
     Estimator(Method),
@@ -157,11 +160,13 @@ macro_rules! events {
         #[derive(Clone, Debug, Serialize)]
         #[serde(tag = "kind")]
         #[allow(missing_docs, reason = "each variant is named after the struct it holds")]
+        #[non_exhaustive]
         pub enum Event { $($name($name)),+ }
 
         /// The kinds of event, one per struct.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
         #[allow(missing_docs, reason = "each kind is named after its struct")]
+        #[non_exhaustive]
         pub enum Kind { $($name),+ }
 
         impl Event {

@@ -9,15 +9,17 @@
 
 mod average;
 mod joint;
-pub mod share;
+pub(crate) mod share;
 
 use std::fmt;
 use std::str::FromStr;
 use std::sync::Arc;
 
 pub use average::average_pose;
-pub use joint::fuse_jointly;
 pub use share::{Share, ShareOutcome, Support};
+
+#[doc(hidden)]
+pub use joint::fuse_jointly;
 
 use crate::estimator::Failure;
 use crate::event::{ReferencesFused, Stage};
@@ -27,6 +29,7 @@ use crate::trace::{Cancelled, Trace};
 
 /// A way to one pose from several references. Two are equal that have the same name.
 #[derive(Clone, Copy, Debug)]
+#[doc(hidden)]
 pub struct Fusion {
     /// The name on the command line, in results and in tables.
     pub name: &'static str,
@@ -38,10 +41,12 @@ pub struct Fusion {
 
 /// The weight of each reference, given the number of its matches: not negative, 0 leaves it out, any
 /// common factor does not matter. At least one is positive where there is a reference.
+#[doc(hidden)]
 pub type Weigh = fn(&[usize]) -> Vec<f64>;
 
 /// How several references become one pose.
 #[derive(Clone, Copy, Debug)]
+#[doc(hidden)]
 pub enum Way {
     /// The poses that they gave each for itself are averaged, by weights.
     Weighed(Weigh),
@@ -50,6 +55,7 @@ pub enum Way {
 }
 
 /// Every fusion, those of the paper in its order first.
+#[doc(hidden)]
 pub const ALL: &[Fusion] = &[
     Fusion {
         name: "maxf",
@@ -141,6 +147,7 @@ crate::serde_as_text!(Fusion);
 
 /// What one reference alone gave.
 #[derive(Clone, Debug)]
+#[doc(hidden)]
 pub struct Candidate<'a> {
     /// The reference frame's name.
     pub reference: &'a str,
@@ -165,6 +172,7 @@ pub struct Candidate<'a> {
 ///
 /// # Errors
 /// Only [`Cancelled`].
+#[doc(hidden)]
 pub fn fuse(
     name: &'static str,
     weigh: Weigh,

@@ -11,11 +11,16 @@ mod scan;
 mod scored;
 mod settle;
 
-pub use basin::Basin;
-pub use dense::DenseSurface;
-pub use lattice::{Lattice, LatticeTooLarge, MOST_CELLS};
+pub use lattice::{Lattice, LatticeTooLarge, MAX_CELLS};
 pub use scan::{Scored, scan};
 pub use scored::ScoredLattice;
+
+#[doc(hidden)]
+pub use basin::Basin;
+#[doc(hidden)]
+pub use dense::DenseSurface;
+
+pub use crate::render::Score;
 
 use nalgebra::{Translation3, Vector3};
 use serde::{Serialize, Serializer};

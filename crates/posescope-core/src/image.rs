@@ -5,6 +5,7 @@ mod degrade;
 use std::ops::Range;
 use std::path::Path;
 
+#[doc(hidden)]
 pub use degrade::{Degradation, DegradationError};
 pub use image::{GrayImage, RgbImage};
 use image::{ImageBuffer, Luma};

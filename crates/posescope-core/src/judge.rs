@@ -19,8 +19,6 @@ mod params;
 mod scorer;
 mod shrink;
 
-pub use chance::corrected_distance;
-pub use channels::{CHANNELS, ChannelImages};
 pub use params::{Channels, JudgeParams};
 pub use scorer::Judge;
 pub use shrink::{Freedoms, Refined, Shrinking, Start, moved, shrink};

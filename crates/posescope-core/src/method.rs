@@ -7,8 +7,8 @@ use std::sync::{Mutex, PoisonError};
 
 /// A method by its short name, which is the same on the command line, in results and in recordings.
 ///
-/// [`crate::estimator::all`] lists the methods. A name that is not registered is another system's
-/// ([`Self::called`]).
+/// [`methods`](crate::methods) lists those that this crate has; `"fb2".parse()` reads one. Any other
+/// name is another system's ([`Self::called`]).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Method(&'static str);
 

@@ -1,22 +1,25 @@
 //! Every parameter of every estimator, by group.
 //!
-//! The table of `posescope params`, `--set`, the configuration file and the app's sliders all follow
-//! from what the groups say of themselves ([`crate::describe`]).
+//! Each group describes its parameters: name, unit, range and meaning. [`Params::list`],
+//! [`Params::set`] and the TOML form follow from that, and so do posescope's command line and window.
 
 use std::str::FromStr;
 
 use crate::cost::CostSettings;
-use crate::descent::DescentParams;
-use crate::describe::{Describe, Described, ParamError, Value, list, set};
-use crate::estimator::{FeatureParams, GuidedParams, RobustParams, SixParams};
+use crate::describe::{Describe, list, set};
 use crate::features::SurfParams;
 use crate::grid::{GridParams, SurfaceParams};
-use crate::judge::JudgeParams;
-use crate::render::RenderParams;
 use crate::retrieval::{IndexParams, RetrievalParams};
+
+pub use crate::descent::DescentParams;
+pub use crate::describe::{About, Described, Domain, ParamError, Value};
+pub use crate::estimator::{DepthRule, FeatureParams, GuidedParams, RobustParams, SixParams};
+pub use crate::judge::{Channels, JudgeParams};
+pub use crate::render::RenderParams;
 
 /// All parameters of all estimators, by group.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub struct Params {
     /// `surf`: detector and descriptor.
     pub surf: SurfParams,
@@ -27,6 +30,7 @@ pub struct Params {
     /// `grid`: the coarse-to-fine search of the direct methods.
     pub grid: GridParams,
     /// `pm`, `mi` and so on: a group for each registered cost.
+    #[doc(hidden)]
     pub costs: CostSettings,
     /// `descent`: going down by derivatives, where `search` of a cost says so.
     pub descent: DescentParams,
@@ -59,6 +63,7 @@ impl FromStr for Params {
 
 impl Params {
     /// Calls `visit` with each group and its parameters.
+    #[doc(hidden)]
     pub fn visit_groups(&mut self, mut visit: impl FnMut(&'static str, &mut dyn Describe)) {
         visit("surf", &mut self.surf);
         visit("fb", &mut self.fb);

@@ -15,6 +15,7 @@ use crate::render::{RenderParams, VisibleCloud};
 
 /// The photo whose pose is sought.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct Query {
     /// The frame's name in its scene.
     pub name: String,
@@ -63,6 +64,7 @@ impl Query {
 
 /// A photo with known pose and the cloud registered with it: the paper's reference tuple (I_R, P_R).
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct ReferenceTuple {
     /// The frame's name in its scene.
     pub name: String,
@@ -111,6 +113,7 @@ impl ReferenceTuple {
     }
 
     /// The points that the reference camera sees, cached: all methods use them.
+    #[doc(hidden)]
     pub fn visible_cloud(&self, render: &RenderParams) -> Arc<VisibleCloud> {
         let visible = || VisibleCloud::new(&self.cloud, &self.intrinsics, render);
         self.memo.recall(render, VisibleCloud::heap_bytes, visible).value
@@ -148,6 +151,7 @@ fn check_camera(name: &str, photo: &Photo, intrinsics: &Intrinsics) -> Result<()
 ///
 /// Several references are several problems that share their query.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct Problem {
     /// The photo whose pose is sought.
     pub query: Arc<Query>,

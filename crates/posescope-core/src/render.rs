@@ -16,7 +16,7 @@ pub use depth_canvas::DepthCanvas;
 pub(crate) use device::leave_out;
 pub use device::{Device, Loaded, Tally, Workload, use_device};
 pub use points::{PointArrays, Values};
-pub use pool::MOST_AT_A_TIME;
+pub use pool::MAX_AT_A_TIME;
 pub(crate) use pool::{Pool, ShownPoints, at_a_time};
 pub use projection::ProjectionRows;
 pub use score::{Objective, Score};

@@ -40,4 +40,4 @@ pub use layout::{Description, RecordCounts};
 pub use params::{IndexParams, RetrievalParams};
 pub use ranking::{Criterion, RankedReference, ReferenceRanking};
 pub use verification::{Verification, VerifiedMatch};
-pub use vocabulary::{Clustering, Vocabulary};
+pub use vocabulary::Clustering;

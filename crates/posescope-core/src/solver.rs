@@ -8,13 +8,14 @@
 
 mod conic;
 mod loss;
-pub mod p3p;
-pub mod refine;
+mod p3p;
+mod refine;
 mod reprojection;
 
 pub use loss::{Loss, LossShape};
 pub use p3p::{MAX_SOLUTIONS, p3p};
-pub use refine::{Refinement, pose_covariance, refine};
+pub(crate) use refine::pose_covariance;
+pub use refine::{Refinement, Termination, refine};
 
 use nalgebra::{Point2, Point3};
 

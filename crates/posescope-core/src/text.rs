@@ -127,6 +127,7 @@ where
 
 /// Reads and writes a type that has `Display` and `FromStr` as a string. What `FromStr` says of a
 /// wrong one reaches the reader of the file.
+#[doc(hidden)]
 #[macro_export]
 macro_rules! serde_as_text {
     ($type:ty) => {

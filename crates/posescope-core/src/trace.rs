@@ -1,6 +1,6 @@
-//! The contract between an estimator and those who watch it.
+//! The contract between an estimator and its observers.
 //!
-//! An estimator is a straight-line function that tells what it does:
+//! An estimator is a straight-line function that emits what it does:
 //!
 //! ```
 //! use posescope_core::event::{Stage, ProjectedCloud};
@@ -16,9 +16,9 @@
 //! assert_eq!(estimate(&mut Trace::off()), Ok(3));
 //! ```
 //!
-//! The closure runs only where somebody wants that kind of event, so that building an image inside
-//! costs nothing in a run that nobody watches. A sink may block (the observer paused) or answer
-//! [`Cancelled`], which `?` carries out of the estimator. Listening never changes the answer.
+//! The closure runs only if a sink wants that kind of event, so building an image inside costs nothing
+//! in a run without a sink. A sink may block, which pauses the run, or return [`Cancelled`], which `?`
+//! carries out of the estimator. Listening never changes the answer.
 
 mod fanout;
 
@@ -43,6 +43,7 @@ pub type OpenMethods = ArrayVec<Method, MAX_METHODS>;
 
 /// One event with its place in the run.
 #[derive(Clone, Debug, serde::Serialize)]
+#[non_exhaustive]
 pub struct Record {
     /// Position among the events of the run, from 0. Events that no sink wants count too.
     pub index: u64,
@@ -56,8 +57,8 @@ pub struct Record {
     pub event: Event,
 }
 
-/// A listener of a run.
-pub trait Sink {
+/// An observer of a run.
+pub trait Sink: Send {
     /// The kinds of event this sink wants now. Stage events come in any case.
     ///
     /// Asked at the start, and again whenever the run attends to its observer.
@@ -80,7 +81,7 @@ pub trait Sink {
     }
 }
 
-/// The narrator's end: what an estimator holds.
+/// What an estimator emits its events to.
 pub struct Trace<'a> {
     observer: Option<Observer<'a>>,
 }

@@ -106,7 +106,8 @@ fn resized(points: &[ColoredPoint], count: usize) -> Vec<ColoredPoint> {
 
 /// The positions of the 10 m disc, in steps \[m\].
 fn poses(step_m: f64) -> Result<Vec<Pose>, Box<dyn Error>> {
-    let params = GridParams { coarse_step_m: step_m, ..GridParams::default() };
+    let mut params = GridParams::default();
+    params.coarse_step_m = step_m;
     let lattice = Lattice::new(Phase::PositionCoarse, Offset::default(), 10.0, &params)?;
     let hypotheses = lattice.hypotheses();
     Ok(hypotheses.map(|(_, offset)| offset.reference_from_camera()).collect())

@@ -36,9 +36,9 @@ use loaded::OnCard;
 pub use failure::GpuError;
 
 /// The fewest hypotheses for which a card is used automatically.
-const LEAST_AUTOMATIC: usize = 1024;
+const MIN_AUTOMATIC: usize = 1024;
 /// The fewest hypotheses for which a requested card is used.
-const LEAST_REQUESTED: usize = 16;
+const MIN_REQUESTED: usize = 16;
 
 /// A graphics card that scores hypotheses, opened on first use.
 pub struct Gpu {
@@ -105,7 +105,7 @@ impl fmt::Debug for Gpu {
 
 impl Device for Gpu {
     fn batch(&self, hypotheses: usize) -> Option<usize> {
-        let least = if self.is_requested { LEAST_REQUESTED } else { LEAST_AUTOMATIC };
+        let least = if self.is_requested { MIN_REQUESTED } else { MIN_AUTOMATIC };
         if hypotheses < least {
             return None;
         }

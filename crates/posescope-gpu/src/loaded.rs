@@ -13,13 +13,13 @@ use crate::kernels::{Kernel, Shape};
 use crate::slots::Batch;
 
 /// Bins per axis whose histogram a workgroup has room for.
-const MOST_BINS: usize = 60;
+const MAX_BINS: usize = 60;
 /// Places of points take 28 bits.
-const MOST_POINTS: usize = 1 << 28;
+const MAX_POINTS: usize = 1 << 28;
 /// Points times hypotheses that a card is given at once, so that no driver takes it for hung.
-const MOST_WORK: usize = 1 << 27;
+const MAX_WORK: usize = 1 << 27;
 /// The same of software.
-const MOST_WORK_OF_SOFTWARE: usize = 1 << 22;
+const MAX_WORK_OF_SOFTWARE: usize = 1 << 22;
 
 /// A query and its points on a card.
 pub(crate) struct OnCard {
@@ -39,14 +39,14 @@ impl OnCard {
         let too_small = |what: String| GpuError::TooSmall { name: card.name().to_owned(), what };
         let count = workload.points.len();
         let most_bytes = card.limits.max_storage_buffer_binding_size;
-        if count >= MOST_POINTS || 16 * count as u64 > most_bytes {
+        if count >= MAX_POINTS || 16 * count as u64 > most_bytes {
             return Err(too_small(format!("{count} points do not fit")));
         }
         let (kernel, value): (_, &dyn Fn(f32) -> u32) = match *workload.statistic {
-            Statistic::Histogram { bins, .. } if bins > MOST_BINS => {
+            Statistic::Histogram { bins, .. } if bins > MAX_BINS => {
                 return Err(too_small(format!(
                     "a joint histogram of {bins} × {bins} bins does not fit, at most \
-                     {MOST_BINS} × {MOST_BINS} do"
+                     {MAX_BINS} × {MAX_BINS} do"
                 )));
             }
             Statistic::Histogram { bins, .. } => {
@@ -103,7 +103,7 @@ impl OnCard {
     /// Hypotheses that are drawn at once.
     fn at_once(&self) -> usize {
         let card = &self.engine.card;
-        let work = if card.is_software { MOST_WORK_OF_SOFTWARE } else { MOST_WORK };
+        let work = if card.is_software { MAX_WORK_OF_SOFTWARE } else { MAX_WORK };
         let most_bytes = card.limits.max_storage_buffer_binding_size as usize;
         let by_work = work / (self.shape.points as usize).max(1);
         by_work.min(most_bytes / (4 * self.words())).clamp(1, card.most_at_a_time())
@@ -163,7 +163,7 @@ impl OnCard {
                 let places = limbs.iter().zip([0, 16, 32, 48]);
                 let sum: u128 = places.map(|(&limb, place)| u128::from(limb) << place).sum();
                 let sum = u64::try_from(sum).ok()?;
-                (sum < LesserHalf::MOST_UNITS)
+                (sum < LesserHalf::MAX_UNITS)
                     .then_some(Tally::LesserHalf { covered, half: LesserHalf { counted, sum } })
             }
             (_, counts) => Some(Tally::Counts(counts.to_vec())),

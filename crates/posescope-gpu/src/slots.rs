@@ -6,11 +6,11 @@ use crate::card::Card;
 use crate::failure::GpuError;
 
 /// Hypotheses that are drawn at a time, at most: several for each core of a large card.
-const MOST_SLOTS: u64 = 1024;
+const MAX_SLOTS: u64 = 1024;
 /// Software has a few threads.
-const MOST_SLOTS_OF_SOFTWARE: u64 = 16;
+const MAX_SLOTS_OF_SOFTWARE: u64 = 16;
 /// Memory of one of the three buffers, at most \[bytes\].
-const MOST_BYTES: u64 = 1 << 30;
+const MAX_BYTES: u64 = 1 << 30;
 
 /// The buffers of a card that are kept.
 #[derive(Default)]
@@ -84,8 +84,8 @@ impl Drawing {
     fn new(card: &Card, pixels: u64, has_errors: bool) -> Result<Self, GpuError> {
         let limits = &card.limits;
         let bytes = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
-        let most = if card.is_software { MOST_SLOTS_OF_SOFTWARE } else { MOST_SLOTS };
-        let mut count = (bytes.min(MOST_BYTES) / (4 * pixels)).min(most);
+        let most = if card.is_software { MAX_SLOTS_OF_SOFTWARE } else { MAX_SLOTS };
+        let mut count = (bytes.min(MAX_BYTES) / (4 * pixels)).min(most);
         while count > 0 {
             match Self::with(card, pixels, has_errors, count) {
                 Some(drawing) => return Ok(drawing),

@@ -10,11 +10,6 @@ pub(super) fn scene(stage: Option<Stage>) -> &'static [&'static str] {
         None => &["images"],
         Some(stage) => match stage {
             Stage::Retrieve => &["retrieval"],
-            Stage::Estimator(_)
-            | Stage::Detect
-            | Stage::Match
-            | Stage::MatchGuided
-            | Stage::DepthLift => &["images"],
             Stage::Consensus | Stage::Accept => &["images", "ransac"],
             Stage::Color => &["synthetic", "space"],
             Stage::Search(_) | Stage::SearchCoarse | Stage::RefinePlane => {
@@ -24,6 +19,8 @@ pub(super) fn scene(stage: Option<Stage>) -> &'static [&'static str] {
             Stage::Assess => &["synthetic", "surface", "histogram"],
             Stage::RefineSix | Stage::Judge => &["synthetic", "histogram", "space"],
             Stage::Fuse => &["fusion", "space"],
+            // The estimator, and the steps of FB before the consensus.
+            _ => &["images"],
         },
     }
 }

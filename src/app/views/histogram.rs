@@ -34,7 +34,7 @@ impl View for HistogramView {
                 Some(Explanation::Weights(weights)) => {
                     residuals::ui(ui, method, &shown.comparison, weights);
                 }
-                None => {
+                _ => {
                     ui.weak("This view has no cost: it covers too few pixels, or all have the same grey value");
                 }
             }

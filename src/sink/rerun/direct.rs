@@ -119,7 +119,7 @@ pub(super) fn packed(comparison: &Comparison) -> Vec<(&'static str, Encoded)> {
             let histogram = png(picture::joint_histogram(histogram));
             pictures.push(("joint_histogram", histogram));
         }
-        None => {}
+        _ => {}
     }
     pictures
 }

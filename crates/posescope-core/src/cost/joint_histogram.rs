@@ -55,7 +55,7 @@ impl JointHistogram {
 /// The entropy below which an image counts as constant \[nat\]. That of a constant comes out as 0 or, for
 /// one number of pixels in fifty, as some 1e-16, whose quotients mean nothing. The least entropy that is
 /// one, of a single pixel that differs among a million, is a thousand times as large.
-pub const LEAST_ENTROPY: f64 = 1e-9;
+pub const MIN_ENTROPY: f64 = 1e-9;
 
 /// The entropies of two images and of both together \[nat\].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -88,7 +88,7 @@ impl Entropies {
         } else {
             (self.synthetic, self.query)
         };
-        (smaller > LEAST_ENTROPY).then(|| (self.mutual_information() / larger).clamp(0.0, 1.0))
+        (smaller > MIN_ENTROPY).then(|| (self.mutual_information() / larger).clamp(0.0, 1.0))
     }
 
     /// I(Q, S) = H(Q) + H(S) − H(S, Q) \[nat\].
@@ -105,9 +105,9 @@ pub fn bin(value: f32, bins: usize) -> usize {
 }
 
 /// The most bins that a byte tells apart.
-pub const MOST_BYTE_BINS: usize = 256;
+pub const MAX_BYTE_BINS: usize = 256;
 
-/// As [`bin`], for [`MOST_BYTE_BINS`] at most.
+/// As [`bin`], for 256 bins at most.
 #[inline]
 pub fn byte_bin(value: f32, bins: usize) -> u8 {
     let scale = bins as f32 / 256.0;
@@ -269,7 +269,7 @@ mod tests {
         let mut one_differs = vec![0; 256];
         (one_differs[37], one_differs[38]) = (1_000_000, 1);
         let entropies = Entropies::of(&one_differs, 16);
-        assert!(entropies.synthetic > 1_000.0 * LEAST_ENTROPY);
+        assert!(entropies.synthetic > 1_000.0 * MIN_ENTROPY);
     }
 
     #[test]

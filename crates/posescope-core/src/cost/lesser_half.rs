@@ -17,7 +17,7 @@ const UNITS: f64 = 65_536.0;
 
 impl LesserHalf {
     /// Sums up to this number of units are exact whatever order they are added in, and so are costs.
-    pub const MOST_UNITS: u64 = 1 << 53;
+    pub const MAX_UNITS: u64 = 1 << 53;
 
     /// An error rounded to units of 2⁻¹⁶ grey values²: sums of such numbers are exact, so that the order of
     /// the pixels has no part in a cost. It moves the cost of some thousand pixels by some 10⁻⁷.
@@ -28,7 +28,7 @@ impl LesserHalf {
 
     /// Whether errors that are rounded to units and have this sum were added exactly.
     fn is_exact(sum: f64) -> bool {
-        sum < Self::MOST_UNITS as f64 / UNITS
+        sum < Self::MAX_UNITS as f64 / UNITS
     }
 
     /// The mean of the errors that count; `None` where none does.

@@ -7,6 +7,7 @@ use super::{Entropies, IntensityPair, JointHistogram};
 
 /// What of the covered pixels decides a cost, and how.
 #[derive(Clone)]
+#[non_exhaustive]
 pub enum Statistic<'a> {
     /// The joint histogram of both images.
     Histogram {
@@ -31,6 +32,7 @@ pub type CostOfPairs<'a> = Arc<dyn Fn(&[IntensityPair]) -> Option<f64> + Send + 
 
 /// What a cost was made of.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum Explanation {
     /// Which residuals counted.
     Weights(PhotometricWeights),
@@ -40,6 +42,7 @@ pub enum Explanation {
 
 /// Which kind of [`Explanation`] a cost gives.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub enum ExplanationKind {
     /// [`Explanation::Weights`].
     Weights,

@@ -5,10 +5,10 @@ use std::convert::Infallible;
 use basin::{Bfgs, CostFunction, Executor, FirstOrderState, Gradient, State as _, StepOutcome};
 
 use super::view::Slope;
-use super::{LEAST_POINTS, Step, View};
+use super::{MIN_POINTS, Step, View};
 
 /// A distance that changes by less from one step to the next is at its minimum.
-const LEAST_CHANGE: f64 = 1e-7;
+const MIN_CHANGE: f64 = 1e-7;
 
 /// NID = (H(Q,S) − I(Q;S)) / H(Q,S) of a joint histogram into which every pair of values falls smoothly:
 /// a cubic B-spline spreads each value over four bins, so that the distance has derivatives.
@@ -82,7 +82,7 @@ impl<'a> Distance<'a> {
             .map(|seen| seen.map(|(value, slope)| (Fallen::new(value, self.bins), slope)))
             .collect();
         let points = seen.iter().flatten().count();
-        if points < LEAST_POINTS {
+        if points < MIN_POINTS {
             return None;
         }
         let share = 1.0 / points as f64;
@@ -184,7 +184,7 @@ pub fn descend<E>(
         if state.param().iter().all(|x| x.is_finite()) {
             tell(Step { camera_from_reference: view.camera_after(state.param()), cost })?;
         }
-        if matches!(outcome, StepOutcome::Stopped(_)) || before - cost < LEAST_CHANGE {
+        if matches!(outcome, StepOutcome::Stopped(_)) || before - cost < MIN_CHANGE {
             return Ok(());
         }
         before = cost;

@@ -16,7 +16,7 @@ const TO_DEVIATION: f64 = 1.4826;
 const HUBER: f64 = 1.345;
 
 /// The relative reduction that the model promises below which a level is done.
-const LEAST_REDUCTION: f64 = 1e-6;
+const MIN_REDUCTION: f64 = 1e-6;
 
 /// The differences of the grey values of query and reference at each point.
 ///
@@ -83,7 +83,7 @@ pub fn descend<E>(
     let (differences, deviation) = Differences::new(view);
     let objective = RobustLeastSquares::new(differences, HuberLoss).with_scale(HUBER * deviation);
     let solver = LevenbergMarquardt::<Vec<f64>, DenseMatrix>::new()
-        .with_relative_model_reduction_tolerance(LEAST_REDUCTION);
+        .with_relative_model_reduction_tolerance(MIN_REDUCTION);
     let start = PointState::new(vec![0.0; 6]);
     let Ok(mut stepper) =
         Executor::new(objective, solver, start).max_iter(most_steps as u64).into_stepper();

@@ -21,7 +21,7 @@ use crate::problem::Problem;
 use crate::render::{ColoredCloud, Objective as _, RenderParams, Score, Scorer, leave_out};
 use crate::trace::{Cancelled, Trace};
 
-/// A direct estimator: a cost and the way to search it.
+/// A direct estimator: it searches the pose whose synthetic view has the lowest cost.
 pub struct Direct {
     method: Method,
     cost: Box<dyn Cost>,
@@ -36,6 +36,7 @@ pub struct Direct {
 
 impl Direct {
     /// The estimator that searches the pose of least registered cost.
+    #[doc(hidden)]
     pub fn new(entry: &cost::Entry, params: &Params) -> Self {
         let setting = params.costs.of(entry).cloned();
         let CostSetting { cost, search, .. } = setting.unwrap_or_else(|| CostSetting::new(entry));
@@ -52,11 +53,11 @@ impl Direct {
         }
     }
 
-    /// The estimator of a cost that is in no registry: it renders and searches as the others do, by
-    /// `params.render` and `params.grid`, and tells what it does as the method of this name.
+    /// The estimator of your own cost: it renders and searches the grid as PM and MI do, by
+    /// `params.render` and `params.grid`, and emits its events as the method `name`.
     ///
-    /// What is remembered of its scores is never taken for that of another cost, not even of one with
-    /// the same name: every estimator that is made here has a key of its own.
+    /// Its cached scores are never used for another cost, even of the same name: every estimator that
+    /// is made here has its own key.
     pub fn searching(name: &'static str, cost: Box<dyn Cost>, params: &Params) -> Self {
         static MADE: AtomicU64 = AtomicU64::new(0);
         Self {

@@ -8,12 +8,12 @@ use super::{GridParams, Offset, Phase};
 /// Scoring as many hypotheses takes ten minutes on one core, their scores 24 MB, and what a window
 /// remembers of them 200 MB. A radius of 500 m in steps of 0.05 m would be 400 million: a week, and
 /// tens of gigabytes.
-pub const MOST_CELLS: usize = 1 << 20;
+pub const MAX_CELLS: usize = 1 << 20;
 
-/// A phase of the search has more than [`MOST_CELLS`].
+/// A phase of the search has more than [`MAX_CELLS`].
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error(
-    "The search grid is too large: {} has {cells:.0} cells, at most {MOST_CELLS} are searched. {}.",
+    "The search grid is too large: {} has {cells:.0} cells, at most {MAX_CELLS} are searched. {}.",
     phase.name(),
     phase.remedy()
 )]
@@ -46,7 +46,7 @@ impl Lattice {
     /// The hypotheses of `phase` around `centre`, for an uncertainty radius \[m\].
     ///
     /// # Errors
-    /// [`LatticeTooLarge`]: more than [`MOST_CELLS`].
+    /// [`LatticeTooLarge`]: more than [`MAX_CELLS`].
     pub fn new(
         phase: Phase,
         centre: Offset,
@@ -67,7 +67,7 @@ impl Lattice {
         let steps = (half_range / step + 1e-9).floor().max(0.0);
         let side = 2.0 * steps + 1.0;
         let cells = if phase.is_yaw() { side } else { side * side };
-        if cells > MOST_CELLS as f64 {
+        if cells > MAX_CELLS as f64 {
             return Err(LatticeTooLarge { phase, cells });
         }
         let side = side as usize;

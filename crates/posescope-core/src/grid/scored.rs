@@ -4,7 +4,7 @@ use super::Lattice;
 use crate::render::Score;
 
 /// Costs that differ by less are rounded differently, and no more.
-const LEAST_DIFFERENCE: f64 = 1e-9;
+const MIN_DIFFERENCE: f64 = 1e-9;
 
 /// A lattice after scoring: the cost surface and the coverage surface.
 #[derive(Clone, Debug)]
@@ -49,7 +49,7 @@ impl ScoredLattice {
             .fold((f64::INFINITY, f64::NEG_INFINITY, 0), |(least, most, count), cost| {
                 (cost.min(least), cost.max(most), count + 1)
             });
-        (count > 1 && most - least < LEAST_DIFFERENCE).then_some((least, count))
+        (count > 1 && most - least < MIN_DIFFERENCE).then_some((least, count))
     }
 
     /// The cells that are lower than each of their neighbours, best first.

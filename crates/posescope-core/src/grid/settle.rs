@@ -6,7 +6,7 @@ use crate::render::Scorer;
 /// Costs that differ by less than this from the least one are near ties.
 const NEAR: f64 = 1e-6;
 /// Near ties that are scored again, at most: a surface may be flat.
-const MOST_NEAR: usize = 64;
+const MAX_NEAR: usize = 64;
 
 impl ScoredLattice {
     /// Where a [device](crate::render::Device) has scored, has the threads score again whatever is reported:
@@ -22,7 +22,7 @@ impl ScoredLattice {
             let costs = self.eligible_cost(cell).zip(least);
             costs.is_some_and(|(cost, least)| cost - least < NEAR)
         };
-        cells.extend((0..self.scores.len()).filter(is_near).take(MOST_NEAR));
+        cells.extend((0..self.scores.len()).filter(is_near).take(MAX_NEAR));
         cells.sort_unstable();
         cells.dedup();
         if !self.score_again(&cells, scorer) {

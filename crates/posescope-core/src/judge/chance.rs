@@ -1,6 +1,6 @@
 //! 1 − NMI, less what chance gives.
 
-use crate::cost::{Entropies, LEAST_ENTROPY};
+use crate::cost::{Entropies, MIN_ENTROPY};
 
 /// 1 − NMI of the counts of a joint histogram, `bins` × `bins`, rows the query's. `corrected` takes its
 /// chance level off the information first; `None` where both images are constant.
@@ -12,7 +12,7 @@ use crate::cost::{Entropies, LEAST_ENTROPY};
 pub fn corrected_distance(counts: &[u32], bins: usize, corrected: bool) -> Option<f64> {
     let entropies = Entropies::of(counts, bins);
     let larger = entropies.query.max(entropies.synthetic);
-    if larger <= LEAST_ENTROPY {
+    if larger <= MIN_ENTROPY {
         return None;
     }
     let by_chance = if corrected { chance_level(counts, bins) } else { 0.0 };

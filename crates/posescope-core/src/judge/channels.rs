@@ -6,16 +6,13 @@ use image::imageops::blur;
 use super::params::JudgeParams;
 use crate::image::{FloatImage, GrayImage, gaussian_smoothed};
 
-/// Their names, in the order in which they are held.
-pub const CHANNELS: [&str; 3] = ["intensity", "local contrast", "edges"];
-
 /// Standard deviations from the mean of its surroundings at which a grey value is as dark or bright as
 /// contrast goes.
-const MOST_DEVIATIONS: f32 = 2.5;
+const MAX_DEVIATIONS: f32 = 2.5;
 
 /// What is added to the standard deviation of the surroundings, so that the noise of a flat wall is no
 /// contrast \[grey value\].
-const LEAST_DEVIATION: f32 = 4.0;
+const MIN_DEVIATION: f32 = 4.0;
 
 /// The gradient at which edges are as strong as they go \[grey value per px\].
 const STRONGEST_EDGE: f32 = 60.0;
@@ -62,8 +59,8 @@ fn local_contrast(photo: &GrayImage, smoothed: &FloatImage, sigma: f64) -> Float
         let place = |pixel: u32| (pixel as f32 + 0.5) * scale - 0.5;
         let (u, v) = (place(x), place(y));
         let above = smoothed.get_pixel(x, y).0[0] - linear(&mean, u, v);
-        let deviations = above / (linear(&deviation, u, v) + LEAST_DEVIATION);
-        let share = (deviations / MOST_DEVIATIONS).clamp(-1.0, 1.0);
+        let deviations = above / (linear(&deviation, u, v) + MIN_DEVIATION);
+        let share = (deviations / MAX_DEVIATIONS).clamp(-1.0, 1.0);
         Luma([127.5 + 127.5 * share])
     })
 }

@@ -61,11 +61,6 @@ impl Judge {
             pool: Pool::default(),
         }
     }
-
-    /// Points that the reference camera sees.
-    pub fn points(&self) -> usize {
-        self.reference.values.len()
-    }
 }
 
 impl Objective for Judge {

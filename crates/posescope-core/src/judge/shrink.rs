@@ -3,7 +3,7 @@
 use nalgebra::{Translation3, UnitQuaternion, Vector3};
 
 use crate::geometry::Pose;
-use crate::render::MOST_AT_A_TIME;
+use crate::render::MAX_AT_A_TIME;
 
 /// In which directions a pose may move.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize)]
@@ -65,7 +65,7 @@ pub struct Refined {
 }
 
 /// Rounds after which a refinement ends, whatever its step: each either moves or shrinks.
-const MOST_ROUNDS: usize = 60;
+const MAX_ROUNDS: usize = 60;
 
 /// The pose moved along its own axes: right, down, forward \[m\], then turned about them \[rad\].
 pub fn moved(pose: &Pose, by: &[f64; 6]) -> Pose {
@@ -86,7 +86,7 @@ struct Walk {
 /// parabolas through those costs have their minima; it goes to the best of what it saw, and halves its
 /// step where nothing was better or the parabolas' minima are near.
 ///
-/// `costs` gives the costs of some poses, at most [`MOST_AT_A_TIME`] at a time, in their order; `None`
+/// `costs` gives the costs of some poses, at most [`MAX_AT_A_TIME`] at a time, in their order; `None`
 /// for one that has no say.
 ///
 /// # Errors
@@ -105,13 +105,13 @@ pub fn shrink<E>(
         .collect();
     let mut scored = |poses: &[Pose]| -> Result<Vec<Option<f64>>, E> {
         let mut costs = Vec::with_capacity(poses.len());
-        for some in poses.chunks(MOST_AT_A_TIME) {
+        for some in poses.chunks(MAX_AT_A_TIME) {
             costs.extend(costs_of(some)?);
         }
         Ok(costs)
     };
     let axes = plan.freedoms.axes();
-    for _ in 0..MOST_ROUNDS {
+    for _ in 0..MAX_ROUNDS {
         let mut active: Vec<&mut Walk> =
             walks.iter_mut().filter(|walk| walk.step_m >= plan.last_m).collect();
         if active.is_empty() {
@@ -219,7 +219,7 @@ mod tests {
     fn refined(truth: &Pose, start: Pose, plan: &Shrinking) -> Refined {
         let cost = valley(truth, &start);
         let costs = |poses: &[Pose]| {
-            assert!(poses.len() <= MOST_AT_A_TIME);
+            assert!(poses.len() <= MAX_AT_A_TIME);
             let costs = poses.iter().map(|pose| Some(valley(truth, pose)));
             Ok::<_, Infallible>(costs.collect())
         };

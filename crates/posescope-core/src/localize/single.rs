@@ -15,8 +15,8 @@ use crate::trace::{Cancelled, Trace};
 /// Localises the query of a problem. A query without a pose is an outcome too, which says why.
 ///
 /// The answer depends on the problem, the method and the parameters, never on the number of threads.
-/// For a method that is in no registry it is a [`Failure::Internal`]: a cost of one's own is searched
-/// by [`localize_by`].
+/// A method that this crate does not have gives a [`Failure::Internal`]. To run your own estimator or
+/// cost, call [`localize_by`].
 pub fn localize(problem: &Problem, method: Method, params: &Params) -> Outcome {
     localize_traced(problem, method, params, &mut Trace::off())
         .unwrap_or_else(|Cancelled| unreachable!("a trace that is off cancels nothing"))
@@ -61,7 +61,7 @@ pub(super) fn estimate_traced(
     }
 }
 
-/// Localises by an estimator of one's own, as [`localize_traced`] does. A panic in it is an outcome,
+/// Localises with your own estimator, as [`localize_traced`] does. A panic in it is the outcome
 /// [`Failure::Internal`].
 ///
 /// # Errors

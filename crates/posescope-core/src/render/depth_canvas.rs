@@ -4,13 +4,13 @@ use std::hint::select_unpredictable;
 
 use fearless_simd::{Level, Simd, SimdBase as _, dispatch, f32x4};
 
-use super::points::{MOST_ROWS, PointArrays, Projected, ROW_BITS, Values};
+use super::points::{MAX_ROWS, PointArrays, Projected, ROW_BITS, Values};
 use super::projection::{Eight, Projection};
 use crate::camera::Intrinsics;
 use crate::geometry::Pose;
 
 /// The most pixels, those of the margin included: 64 MB.
-const MOST_PIXELS: usize = 1 << 24;
+const MAX_PIXELS: usize = 1 << 24;
 
 /// The depth of a pixel on which no point fell.
 const NOTHING: f32 = f32::INFINITY;
@@ -41,7 +41,7 @@ impl<K: Copy + Default> DepthCanvas<K> {
     /// Whether there is a canvas for a camera: not for more than 16 million pixels, or 65,000 in a row.
     pub fn can_draw(intrinsics: &Intrinsics, splat_px: usize) -> bool {
         let sides = Self::sides(intrinsics, splat_px / 2);
-        sides[0] * sides[1] <= MOST_PIXELS && sides[0].max(sides[1]) < MOST_ROWS
+        sides[0] * sides[1] <= MAX_PIXELS && sides[0].max(sides[1]) < MAX_ROWS
     }
 
     /// An empty canvas for a camera; each point covers a square of `splat_px` (odd) pixels.
@@ -195,7 +195,7 @@ impl<K: Copy + Default> DepthCanvas<K> {
 /// Row and column of the upper left pixel of a square, the margin's counted.
 #[inline(always)]
 fn row_and_column(corner: u32) -> (usize, usize) {
-    let (row, column) = (corner >> ROW_BITS, corner & MOST_ROWS as u32);
+    let (row, column) = (corner >> ROW_BITS, corner & MAX_ROWS as u32);
     (row as usize, column as usize)
 }
 

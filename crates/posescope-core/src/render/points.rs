@@ -54,7 +54,7 @@ impl PointArrays {
 /// The bits above which a pixel's row stands, and its column below.
 pub(super) const ROW_BITS: u32 = 16;
 /// More columns or rows than any image has that is drawn on in squares.
-pub(super) const MOST_ROWS: usize = (1 << ROW_BITS) - 1;
+pub(super) const MAX_ROWS: usize = (1 << ROW_BITS) - 1;
 
 /// What is compared: for each pixel of the image the query's value, for each point that of the point.
 #[derive(Clone, Copy)]

@@ -8,7 +8,7 @@ use super::{PointArrays, Score};
 use crate::geometry::Pose;
 
 /// Hypotheses that are scored between two checkpoints, at most: enough to keep eight threads busy.
-pub const MOST_AT_A_TIME: usize = 256;
+pub const MAX_AT_A_TIME: usize = 256;
 
 /// Hypotheses that a thread scores between two checkpoints. Of a street photo of 1241 × 376 px one
 /// takes some 50 µs, so that whoever wants to stop waits a few milliseconds.
@@ -19,9 +19,9 @@ const PER_THREAD: usize = 64;
 const PER_JOB: usize = 2;
 
 /// How many hypotheses to score at a time: few enough that a run can be stopped soon, enough for all threads of
-/// the current pool. At most [`MOST_AT_A_TIME`].
+/// the current pool. At most [`MAX_AT_A_TIME`].
 pub(crate) fn at_a_time() -> usize {
-    (PER_THREAD * rayon::current_num_threads()).min(MOST_AT_A_TIME)
+    (PER_THREAD * rayon::current_num_threads()).min(MAX_AT_A_TIME)
 }
 
 /// Points with what each shows.

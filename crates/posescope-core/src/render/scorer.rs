@@ -12,7 +12,7 @@ use super::{
 };
 use crate::camera::Intrinsics;
 use crate::cost::{
-    BinPair, Cost, Entropies, Explanation, IntensityPair, LesserHalfFinder, MOST_BYTE_BINS,
+    BinPair, Cost, Entropies, Explanation, IntensityPair, LesserHalfFinder, MAX_BYTE_BINS,
     Statistic, byte_bin, count_pairs, shuffled,
 };
 use crate::geometry::Pose;
@@ -21,6 +21,7 @@ use on_device::OnDevice;
 
 /// A synthetic view beside the query, and what the cost makes of the two.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct Comparison {
     /// The view.
     pub view: SyntheticView,
@@ -88,7 +89,7 @@ impl<'a> Scorer<'a> {
     }
 
     /// How many cameras to score at a time: few enough that a run can be stopped soon, enough for all
-    /// threads of the current pool. At most [`MOST_AT_A_TIME`](super::MOST_AT_A_TIME).
+    /// threads of the current pool. At most [`MAX_AT_A_TIME`](super::MAX_AT_A_TIME).
     pub fn at_a_time(&self) -> usize {
         at_a_time()
     }
@@ -150,7 +151,7 @@ impl<'a> Scorer<'a> {
                     }),
                     pool: Pool::default(),
                 },
-                Statistic::Histogram { bins, cost } if bins <= MOST_BYTE_BINS => {
+                Statistic::Histogram { bins, cost } if bins <= MAX_BYTE_BINS => {
                     let bin = |value: f32| byte_bin(value, bins);
                     let values = values.map(bin).collect();
                     Threads::Histogram {

@@ -65,6 +65,7 @@ impl BuildStep {
 
 /// How far the building of an index is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct BuildProgress {
     /// The part of the work that is being done.
     pub step: BuildStep,
@@ -76,6 +77,7 @@ pub struct BuildProgress {
 
 /// What an index was built of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct BuildSummary {
     /// Frames in the index.
     pub frames: usize,

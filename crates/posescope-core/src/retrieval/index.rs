@@ -52,6 +52,7 @@ impl Ranked {
 
 /// What the index answers.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub struct Retrieval {
     /// The word of each feature of the query.
     pub words: Vec<Option<u32>>,

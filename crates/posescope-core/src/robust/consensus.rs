@@ -9,6 +9,7 @@ use crate::solver::Refinement;
 
 /// A pose and how well it explains the correspondences.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct Hypothesis {
     /// `camera_from_points`.
     #[serde(skip)]
@@ -20,6 +21,7 @@ pub struct Hypothesis {
 
 /// One random sample, told to the observer of [`super::mlesac()`].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct Trial {
     /// Number of the trial, from 0.
     #[serde(rename = "trial")]
@@ -38,6 +40,7 @@ pub struct Trial {
 
 /// The outcome of [`super::mlesac()`]. All of it belongs to the one refined pose.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Consensus {
     /// `camera_from_points`.
     pub pose: Pose,
@@ -58,6 +61,7 @@ pub struct Consensus {
 
 /// Why there is no consensus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum MlesacError<C> {
     /// Fewer correspondences than a sample and one to confirm it.
     #[error("{found} correspondences found, {needed} needed")]

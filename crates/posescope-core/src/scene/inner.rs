@@ -24,6 +24,7 @@
 ///     }
 /// }
 /// ```
+#[doc(hidden)]
 #[macro_export]
 macro_rules! inner_scene {
     (@ $scene:tt name) => {

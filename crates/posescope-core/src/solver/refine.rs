@@ -36,6 +36,7 @@ pub enum Termination {
 
 /// The outcome of [`refine`].
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Refinement {
     /// The refined pose `camera_from_points`.
     pub pose: Pose,

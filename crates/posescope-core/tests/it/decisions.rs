@@ -34,7 +34,8 @@ fn outcome(method: Method, problem: &Problem, params: &Params) -> Outcome {
 #[test]
 fn a_consensus_outside_the_uncertainty_radius_is_refused_unless_the_bare_rule_is_asked_for() {
     // The query is 1 m from the reference.
-    let near = Problem { uncertainty_radius_m: 0.5, prior_m: None, ..solvable() };
+    let mut near = solvable();
+    near.uncertainty_radius_m = 0.5;
     let refused = outcome(Method::FB, &near, &Params::default()).pose;
     let failure = refused.expect_err("it is twice as far as it may be");
     assert!(matches!(failure, Failure::OutsideRadius { .. }), "{failure}");
@@ -44,7 +45,8 @@ fn a_consensus_outside_the_uncertainty_radius_is_refused_unless_the_bare_rule_is
         assert!(pose.is_ok(), "{accepting}");
     }
     // Who searches no disc goes by the prior, where there is one.
-    let far_prior = Problem { prior_m: Some(20.0), ..near };
+    let mut far_prior = near;
+    far_prior.prior_m = Some(20.0);
     let pose = outcome(Method::FB, &far_prior, &Params::default()).pose;
     assert!(pose.is_ok(), "{pose:?}");
 }

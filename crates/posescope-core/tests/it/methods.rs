@@ -59,7 +59,8 @@ fn the_truth_costs_less_than_what_is_beside_it_in_any_channel_and_light() {
         for channels in
             [Channels::Intensity, Channels::Contrast, Channels::Gradient, Channels::Three]
         {
-            let params = JudgeParams { channels, ..JudgeParams::default() };
+            let mut params = JudgeParams::default();
+            params.channels = channels;
             let judge = Judge::new(&problem, &RenderParams::default(), &params, 1);
             let poses = [
                 Pose::translation(0.0, 0.0, 1.0),

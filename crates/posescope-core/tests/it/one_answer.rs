@@ -17,7 +17,6 @@ use posescope_core::localize::{
 };
 use posescope_core::method::Method;
 use posescope_core::params::Params;
-use posescope_core::problem::Problem;
 use posescope_core::scene::{Scene, SceneError};
 use posescope_core::trace::{Cancelled, Record, Sink, Trace};
 
@@ -137,12 +136,12 @@ fn points_in_view_are_fewer_than_all_where_some_are_not() {
             Ok(())
         }
     }
-    let problem = solvable();
+    let mut problem = solvable();
     let mut reference = posescope_core::problem::ReferenceTuple::clone(&problem.reference);
     let behind = reference.cloud.points.clone();
     let behind = behind.iter().map(|point| -*point);
     reference.cloud.points.extend(behind);
-    let problem = Problem { reference: Arc::new(reference), ..problem };
+    problem.reference = Arc::new(reference);
     for method in [Method::FB, FB2] {
         let mut clouds = Clouds::default();
         localize_traced(&problem, method, &Params::default(), &mut Trace::to(&mut clouds))

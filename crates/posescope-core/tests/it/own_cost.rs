@@ -1,12 +1,11 @@
 //! The ways of a library's user: one call for one query, a cost of one's own.
 
-use posescope_core::cost::Statistic;
+use posescope_core::cost::{IntensityPair, Key, Statistic, key};
 use posescope_core::event::{Stage, StageEnded, ViewRendered};
 use posescope_core::image::{FloatImage, GrayImage, gaussian_smoothed};
-use posescope_core::memo::{Key, key};
 use posescope_core::{
-    Cost, Direct, Failure, History, IntensityPair, Method, Params, Problem, Trace, estimator,
-    localize, localize_by, localize_traced,
+    Cost, Direct, Failure, History, Method, Params, Problem, Trace, estimator, localize,
+    localize_by, localize_traced,
 };
 
 use crate::conformance::remembering;

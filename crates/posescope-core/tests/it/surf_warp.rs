@@ -107,7 +107,9 @@ struct Quality {
 
 /// Features that turn with the image; upright ones would not survive the warp.
 fn turning() -> SurfParams {
-    SurfParams { upright: false, ..SurfParams::default() }
+    let mut params = SurfParams::default();
+    params.upright = false;
+    params
 }
 
 fn measure(image: &GrayImage, params: &SurfParams) -> Quality {

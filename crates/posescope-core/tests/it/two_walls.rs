@@ -38,8 +38,9 @@ pub fn problem(query: GrayImage, reference: GrayImage, cloud: Cloud) -> Problem 
     let query = Query::new("query", Photo::from_gray(query), CAMERA).expect("fits");
     let reference =
         ReferenceTuple::new("reference", Photo::from_gray(reference), CAMERA, pose, cloud);
-    let problem = Problem::new(query, reference.expect("fits"), 3.0).expect("a radius");
-    Problem { seed: 7, ..problem }
+    let mut problem = Problem::new(query, reference.expect("fits"), 3.0).expect("a radius");
+    problem.seed = 7;
+    problem
 }
 
 /// A point in every other pixel of the reference.

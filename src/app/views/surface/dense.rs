@@ -6,7 +6,7 @@ use super::scale::number;
 use super::search::Search;
 use crate::app::{DenseAsk, DenseMap, ViewContext};
 use crate::geometry::PoseError;
-use crate::grid::{DenseSurface, MOST_CELLS};
+use crate::grid::{DenseSurface, MAX_CELLS};
 
 /// The map to fill, if it is shown, for the present run.
 pub(super) fn wanted(context: &ViewContext<'_>, search: &Search<'_>) -> Option<DenseAsk> {
@@ -45,7 +45,7 @@ pub(super) fn ui(ui: &mut Ui, context: &ViewContext<'_>, search: &Search<'_>) {
 fn progress(map: &DenseMap) -> Result<String, String> {
     let surface = map.surface().map_err(|error| {
         format!(
-            "{:.0} positions are too many (at most {MOST_CELLS}). Raise surface.step",
+            "{:.0} positions are too many (at most {MAX_CELLS}). Raise surface.step",
             error.cells
         )
     })?;

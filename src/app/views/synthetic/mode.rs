@@ -135,7 +135,7 @@ fn weights(made: &Comparison) -> DynamicImage {
         Some(Explanation::JointHistogram(histogram)) => {
             pictures::contributions(&made.view, &made.pairs, histogram).into()
         }
-        None => picture::synthetic(&made.view).into(),
+        _ => picture::synthetic(&made.view).into(),
     }
 }
 

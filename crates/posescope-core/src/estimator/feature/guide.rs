@@ -25,7 +25,7 @@ const GUIDED_ROUNDS: usize = 2;
 /// Features that are sought again between two checkpoints.
 const SOUGHT_AT_A_TIME: usize = 512;
 /// Descriptors farther apart than this do not show the same thing, however alone they are.
-const MOST_DISTANCE: f32 = 0.8;
+const MAX_DISTANCE: f32 = 0.8;
 
 /// Matches features again where a pose says that they are.
 pub(in crate::estimator) struct Guide {
@@ -167,7 +167,7 @@ impl Guide {
             }
         }
         let stands_out = least < self.params.window_ratio as f32 * second;
-        nearest.filter(|_| stands_out && least < MOST_DISTANCE).map(|query| (query, least))
+        nearest.filter(|_| stands_out && least < MAX_DISTANCE).map(|query| (query, least))
     }
 }
 

@@ -13,7 +13,7 @@ use crate::render::{Device, Loaded, Score, Workload};
 /// Of so many hypotheses of a batch one is scored on the threads too.
 const CHECKED_ONE_IN: usize = 256;
 /// Hypotheses of a batch that are scored on the threads too, at least.
-const LEAST_CHECKED: usize = 4;
+const MIN_CHECKED: usize = 4;
 
 /// What a scorer has of a device.
 pub(super) struct OnDevice {
@@ -107,7 +107,7 @@ impl Scorer<'_> {
     /// The threads' scores of some of a batch: of all that the device could not decide, of its least, and of
     /// some in between.
     fn checked(&self, poses: &[Pose], scored: &[Option<Score>]) -> (Vec<usize>, Vec<Score>) {
-        let count = (poses.len() / CHECKED_ONE_IN).max(LEAST_CHECKED);
+        let count = (poses.len() / CHECKED_ONE_IN).max(MIN_CHECKED);
         let step = (poses.len() / count).max(1);
         let undecided = (0..poses.len()).filter(|&place| scored[place].is_none());
         let cost = |place: &usize| Some((scored[*place]?.cost?, *place));
