@@ -17,10 +17,12 @@ use crate::diagnosis::{MapOverlay, Proof};
 use crate::estimator::{self, Entry};
 use crate::event::{DebugEvent, Kind, KindSet};
 use crate::geometry::Pose;
+use crate::image::Photo;
 use crate::localize::{PoseReport, QueryResult};
 use crate::method::Method;
 use crate::palette::{self, Rgb};
 use crate::params::Params;
+use crate::picture;
 use crate::problem::Problem;
 use crate::trace::Record;
 
@@ -227,6 +229,11 @@ impl Panel {
             marks: Vec::new(),
             scale: None,
         }
+    }
+
+    /// A photo as it is.
+    fn photo(title: impl Into<String>, photo: &Photo) -> Self {
+        Self::new(title, picture::photo(photo).into_rgb8())
     }
 
     /// A plain ground for lines and marks.

@@ -33,14 +33,7 @@ struct Seen {
 pub(super) fn cost_map(case: &ProofCase<'_>, overlay: MapOverlay) -> Option<ProofPicture> {
     let method = responsible(case.result)?;
     let estimator = estimator::find(method)?.make(case.params);
-    let seen = |label, pose: Option<Pose>| {
-        let world_from_query = pose?;
-        Some(Seen {
-            comparison: estimator.compare_at(case.problem, &world_from_query)?,
-            label,
-            world_from_query,
-        })
-    };
+    let seen = |label, pose: Option<Pose>| Seen::at(case, estimator.as_ref(), label, pose?);
     let result = seen("result", case.pose());
     let truth = seen("truth", case.truth.copied());
     let mut beside: Vec<Panel> = Vec::new();
@@ -55,12 +48,12 @@ pub(super) fn cost_map(case: &ProofCase<'_>, overlay: MapOverlay) -> Option<Proo
         _ => {}
     }
     if beside.is_empty() {
-        beside.push(Panel::new("Query", picture::photo(&case.problem.query.photo).into_rgb8()));
+        beside.push(Panel::photo("Query", &case.problem.query.photo));
     }
     if overlay == MapOverlay::Light {
         let reference = &case.problem.reference;
         let title = format!("Reference {}", reference.name);
-        beside.push(Panel::new(title, picture::photo(&reference.photo).into_rgb8()));
+        beside.push(Panel::photo(title, &reference.photo));
     }
     for seen in result.iter().chain(&truth) {
         beside.push(view_panel(query, seen));
@@ -89,13 +82,7 @@ pub(super) fn freed_views(case: &ProofCase<'_>) -> Option<ProofPicture> {
     let reference_from_truth = case.problem.reference_from_query(truth);
     let on_plane = Offset::of(&reference_from_truth).reference_from_camera();
     let query = &case.problem.query.photo.gray;
-    let seen = |label, world_from_query: Pose| {
-        Some(Seen {
-            comparison: estimator.compare_at(case.problem, &world_from_query)?,
-            label,
-            world_from_query,
-        })
-    };
+    let seen = |label, pose: Pose| Seen::at(case, estimator.as_ref(), label, pose);
     let frozen = seen(
         "true place, with the reference's height, pitch and roll",
         case.problem.world_from_query(&on_plane),
@@ -317,6 +304,16 @@ fn cell_place(lattice: &Lattice, offset: &Offset) -> [f32; 2] {
 }
 
 impl Seen {
+    fn at(
+        case: &ProofCase<'_>,
+        estimator: &dyn Estimator,
+        label: &'static str,
+        world_from_query: Pose,
+    ) -> Option<Self> {
+        let comparison = estimator.compare_at(case.problem, &world_from_query)?;
+        Some(Self { comparison, label, world_from_query })
+    }
+
     fn words(&self) -> String {
         match self.comparison.score.cost {
             Some(cost) => format!("{}: cost {}", self.label, number(cost)),

@@ -297,9 +297,8 @@ fn depth_patch(photo: &RgbImage, one: &Matched<'_>, title: String) -> Panel {
 /// The inliers in the photo, and their points from above.
 pub(super) fn inlier_spread(case: &ProofCase<'_>) -> Option<ProofPicture> {
     let matches = Matches::of(case)?;
-    let photo = picture::photo(&case.problem.query.photo).into_rgb8();
     let title = format!("The {} inliers in the query", matches.inliers().count());
-    let mut large = Panel::new(title, photo);
+    let mut large = Panel::photo(title, &case.problem.query.photo);
     for one in matches.inliers() {
         large.mark(Thing::Dot(palette::TRUTH), place(one.query), "");
     }
@@ -311,7 +310,7 @@ pub(super) fn inlier_spread(case: &ProofCase<'_>) -> Option<ProofPicture> {
 pub(super) fn rival_inliers(case: &ProofCase<'_>) -> Option<ProofPicture> {
     let matches = Matches::of(case)?;
     let panel = |title: String, ones: &mut dyn Iterator<Item = &Matched<'_>>| {
-        let mut panel = Panel::new(title, picture::photo(&case.problem.query.photo).into_rgb8());
+        let mut panel = Panel::photo(title, &case.problem.query.photo);
         for one in ones {
             let color = if one.is_true == Some(true) { palette::TRUTH } else { palette::ESTIMATE };
             panel.mark(Thing::Dot(color), place(one.query), "");

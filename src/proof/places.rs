@@ -6,7 +6,6 @@ use super::{Panel, ProofCase, ProofPicture, Thing, is_near};
 use crate::event::{PoseRefined, ReferencesFused, ReferencesRanked};
 use crate::geometry::Pose;
 use crate::palette;
-use crate::picture;
 
 /// Side of a map \[px\], and what is left free at its border.
 const SIDE: u32 = 560;
@@ -148,16 +147,12 @@ pub(super) fn pose_map(case: &ProofCase<'_>) -> ProofPicture {
         map.camera(Thing::Dot(palette::UNDECIDED), pose, &label);
     }
     map.cameras(case, &name, result.as_ref(), truth.as_ref());
-    let photo = |photo| picture::photo(photo).into_rgb8();
     ProofPicture {
         large: map.panel,
         below: None,
         beside: vec![
-            Panel::new("Query", photo(&problem.query.photo)),
-            Panel::new(
-                format!("Reference {}", problem.reference.name),
-                photo(&problem.reference.photo),
-            ),
+            Panel::photo("Query", &problem.query.photo),
+            Panel::photo(format!("Reference {}", problem.reference.name), &problem.reference.photo),
         ],
     }
 }
@@ -193,7 +188,7 @@ pub(super) fn ranking(case: &ProofCase<'_>) -> Option<ProofPicture> {
         let away = away_m.map_or(String::new(), |away_m| format!(", {away_m:.1} m from the truth"));
         let is_taken = if rank < ranking.chosen { ", taken" } else { "" };
         let title = format!("{}. {}{away}{is_taken}", rank + 1, frame.name);
-        let mut panel = Panel::new(title, picture::photo(photo).into_rgb8());
+        let mut panel = Panel::photo(title, photo);
         if away_m.is_some_and(|away_m| away_m <= case.problem.uncertainty_radius_m) {
             let (width, height) = (panel.picture.width() as f32, panel.picture.height() as f32);
             let corners = [[0.0, 0.0], [width, 0.0], [width, height], [0.0, height], [0.0, 0.0]];
@@ -202,7 +197,7 @@ pub(super) fn ranking(case: &ProofCase<'_>) -> Option<ProofPicture> {
         beside.push(panel);
     }
     Some(ProofPicture {
-        large: Panel::new("Query", picture::photo(&case.problem.query.photo).into_rgb8()),
+        large: Panel::photo("Query", &case.problem.query.photo),
         below: None,
         beside,
     })
