@@ -146,7 +146,7 @@ fn thumbnail(scene: &dyn Scene, (_, frame): (Side, usize)) -> Option<ColorImage>
     Some(color_image(&small))
 }
 
-/// Localises all queries of a setup; one with a fault of ours is told like one that cannot be read.
+/// Localises all queries of a setup. A query whose estimator panics is reported like one whose files cannot be read.
 fn localize_all((setup, stop): (Setup, UntilStopped), emit: &mut dyn FnMut(BatchOutcome) -> bool) {
     let frames = Arc::default();
     for &query in &setup.offered {

@@ -90,7 +90,8 @@ fn draw_bars(ui: &Ui, overview: &Overview, area: Rect) {
     }
 }
 
-/// The place of a row with its name at the left, and what paints there. The whole row is said on hover.
+/// Draws the name of a row at the left, and returns where its bar goes and what paints it. Hovering shows the whole
+/// row as text.
 fn bar_row(
     ui: &Ui,
     area: Rect,

@@ -61,7 +61,7 @@ const CAMERA_SIGMA: f64 = 0.5;
 /// Octaves end before their images have a side shorter than this \[px\].
 const SMALLEST_SIDE: u32 = 16;
 /// Keypoints described between two checkpoints.
-const KEYPOINTS_AT_A_TIME: usize = 1024;
+const KEYPOINTS_AT_A_TIME: usize = 256;
 
 /// Finds the SIFT features of an image. The strongest come first; of equally strong ones, the topmost
 /// and then leftmost.
@@ -70,7 +70,7 @@ pub fn sift(image: &GrayImage, params: &SiftParams) -> SiftFeatures {
     features
 }
 
-/// Finds what [`sift`] does. `checkpoint` is called before each pass over the image and each thousand
+/// Finds what [`sift`] does. `checkpoint` is called before each pass over the image and each 256
 /// keypoints, and can stop the search.
 ///
 /// # Errors

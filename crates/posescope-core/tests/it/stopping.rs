@@ -113,8 +113,8 @@ fn between_two_looks_at_the_flag_lie_at_most_300_hypotheses_or_1000_trials() {
         let name = entry.method.name();
         let estimator = entry.make(&params);
         let moments = on_many_threads(|| moments(estimator.as_ref(), &problem, KindSet::ALL));
-        // Telling looks up too, but may tell what was worked out long before. What counts is how many
-        // hypotheses are told between two looks that nothing is told at.
+        // An event may report work that was done long before it. So only looks without an event count: between two of
+        // them, few hypotheses may be reported.
         let (mut since, mut scored, mut tried) = (0, 0, 0);
         let mut before = None;
         for pair in moments.windows(2) {
