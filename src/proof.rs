@@ -173,6 +173,14 @@ pub fn kind(result: &QueryResult) -> Proof {
     primary.map_or(Proof::DecidingStage, Diagnosis::proof)
 }
 
+/// The problem that a proof shows, of those of a result's references: the one that the verdict names, else the first.
+pub(crate) fn problem_of<'a>(result: &QueryResult, problems: &'a [Problem]) -> Option<&'a Problem> {
+    let named =
+        result.diagnosis.first().and_then(|found| found.evidence.get("reference")?.as_str());
+    let is_named = |problem: &&Problem| named == Some(problem.reference.name.as_str());
+    problems.iter().find(is_named).or(problems.first())
+}
+
 /// The estimator that a result comes from: of a hybrid the part that it took.
 pub(crate) fn responsible(result: &QueryResult) -> Option<Method> {
     let entry = estimator::find(result.method)?;

@@ -267,16 +267,19 @@ fn drawn_failure(
     params: &Params,
 ) -> Option<DrawnProof> {
     let query = localizer.queries().find(&result.query).ok()?;
-    let reference = result.references.first()?;
-    let reference = localizer.references().find(reference).ok()?;
+    // What one reference alone gave proves nothing of a fusion.
+    let count = if result.fusion.is_some() { result.references.len() } else { 1 };
+    let references = result.references.iter().take(count);
+    let references: Result<Vec<usize>, _> =
+        references.map(|name| localizer.references().find(name)).collect();
     let radius_m = match &result.setting {
         Some(setting) => setting.radius_m,
         None => run.protocol.radius_m(),
     };
     let request = Request {
         radius_m,
-        references: vec![reference].into(),
-        fusions: Vec::new(),
+        references: references.ok()?.into(),
+        fusions: result.fusion.iter().cloned().collect(),
         setting: None,
     };
     let mut witness = Witness::default();

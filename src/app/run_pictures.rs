@@ -79,7 +79,10 @@ impl RunPictures {
         for span in run.spans() {
             let Some(result) = &span.result else { continue };
             self.proofs.ask(span.part, || {
-                let problem = loaded.problems.get(span.part.reference().unwrap_or(0))?;
+                let problem = match span.part.reference() {
+                    Some(reference) => loaded.problems.get(reference)?,
+                    None => proof::problem_of(result, &loaded.problems)?,
+                };
                 // The ranking of the references belongs to no method, and proves that the right one was not found.
                 let ranking = run.span_of(Part::Retrieval).map(|span| span.records.clone());
                 let records = ranking.into_iter().chain([span.records.clone()]);

@@ -8,7 +8,7 @@ use nalgebra::{Point2, Point3};
 use super::places::from_above;
 use super::{Panel, ProofCase, ProofPicture, Thing};
 use crate::camera::Intrinsics;
-use crate::diagnosis::TRUE_MATCH_THRESHOLDS;
+use crate::diagnosis::true_match_px;
 use crate::event::{
     DepthsLifted, FeaturesClassified, FeaturesDetected, MatchesDecided, MatchesGuided, Side,
 };
@@ -68,7 +68,7 @@ impl<'a> Matches<'a> {
         let states: &'a [FeatureState] = &case.latest::<FeaturesClassified>()?.states;
         let guided = case.latest::<MatchesGuided>().map(|event| &event.matches);
         let lifted = guided.or_else(|| case.latest::<DepthsLifted>().map(|event| &event.matches));
-        let threshold_px = TRUE_MATCH_THRESHOLDS * case.params.fb.mlesac.inlier_threshold_px;
+        let threshold_px = true_match_px(case.params.fb.mlesac.inlier_threshold_px);
         let query_from_reference = case.query_from_reference();
         let camera = &case.problem.query.intrinsics;
         let matched = states.iter().enumerate().filter_map(|(at, &state)| {
@@ -122,10 +122,11 @@ pub(super) fn matches(case: &ProofCase<'_>) -> Option<ProofPicture> {
     };
     let (canvas, top) = picture::stacked(&case.problem.query.photo, &case.problem.reference.photo);
     let title = if case.truth.is_some() {
-        "Query above reference; green: true matches, orange: false inliers"
+        "green: true matches, orange: false inliers"
     } else {
-        "Query above reference; the inliers"
+        "the inliers"
     };
+    let title = format!("Query above reference {}; {title}", case.problem.reference.name);
     let mut panel = Panel::new(title, canvas.into_rgb8());
     let kinds: [LineKind; 4] = [
         (FAINT, 0.5, |one| one.point.is_some() && !one.is_inlier() && one.is_true != Some(true)),
@@ -362,7 +363,10 @@ pub(super) fn reference_cloud(case: &ProofCase<'_>) -> Panel {
     let reference = &case.problem.reference;
     let (photo, points) =
         cloud_picture(&reference.photo, &reference.intrinsics, case, &Pose::identity());
-    Panel::new(format!("The cloud on the reference photo, by depth: {points} points"), photo)
+    Panel::new(
+        format!("The cloud on reference {}, by depth: {points} points", reference.name),
+        photo,
+    )
 }
 
 /// Where the verdict names another camera: the cloud on the query's photo, seen from the truth by both.

@@ -79,7 +79,7 @@ impl Witness {
         params: &Params,
     ) -> Option<DrawnProof> {
         let picture = ProofPicture::of(&ProofCase {
-            problem: self.problems.first()?,
+            problem: proof::problem_of(result, &self.problems)?,
             records: self.history.records(),
             result,
             truth,

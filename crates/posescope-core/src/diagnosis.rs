@@ -42,7 +42,7 @@ pub use confidence::{Confidence, PoseConfidence};
 pub use evidence::Evidence;
 pub use family::Family;
 pub use fused::{diagnose_fusion, diagnose_ranking, fused_confidence};
-pub use matches::TRUE_MATCH_THRESHOLDS;
+pub use matches::true_match_px;
 pub use proof::{MapOverlay, Proof};
 pub use rules::{Code, DecidedAt, RULES, Rule, Test};
 pub use tolerance::Tolerance;

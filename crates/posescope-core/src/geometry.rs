@@ -105,6 +105,16 @@ impl PoseError {
         format!("{:.2}°", self.rotation_deg)
     }
 
+    /// The part that moves more of what is seen 10 m away, as people read it.
+    pub fn greater(&self) -> String {
+        const SEEN_AT_M: f64 = 10.0;
+        if SEEN_AT_M * self.rotation_deg.to_radians() > self.translation_m {
+            self.rotation()
+        } else {
+            self.translation()
+        }
+    }
+
     /// The greatest Euler angle as people read it.
     pub fn max_euler(&self) -> String {
         format!("{:.2}°", self.max_euler_deg)

@@ -146,9 +146,7 @@ pub(crate) fn right(ui: &mut Ui, state: &AppState, commands: &Queue, panes: &mut
         let span = state.shown_span();
         match &span.and_then(|span| state.outcome(span)) {
             Some(result) => {
-                let error = result
-                    .error
-                    .map_or(String::new(), |error| format!(" · {} off", error.translation()));
+                let error = result.off().map_or(String::new(), |off| format!(" · {off} off"));
                 ui.strong(format!("{} · {}{error}", result.query, result.method.label()));
                 let text = told(result);
                 ui.add(egui::Label::new(split(&text).0).truncate()).on_hover_text(&text);

@@ -249,8 +249,7 @@ fn name(ui: &mut Ui, state: &AppState, commands: &Queue, row: &Row<'_>, height: 
     let result = row.span.and_then(|span| state.outcome(span));
     let (grade, grade_color) = match &result {
         Some(result) => {
-            let error = result.error.map(|error| error.translation());
-            let text = error.unwrap_or_else(|| result.grade.to_string());
+            let text = result.off().unwrap_or_else(|| result.grade.to_string());
             let color = theme::grade(ui.visuals(), result.grade);
             (format!("{} {text}", result.grade.glyph()), color)
         }

@@ -119,10 +119,8 @@ fn cell(ui: &Ui, state: &AppState, commands: &Queue, rect: Rect, part: Part, spa
 /// The grade with the error, or the confidence where there is no grade.
 fn worth(ui: &Ui, result: &QueryResult) -> (String, egui::Color32) {
     let color = theme::grade(ui.visuals(), result.grade);
-    let words = match (&result.error, &result.confidence) {
-        (Some(error), _) => {
-            format!("{} {} {}", result.grade.glyph(), result.grade, error.translation())
-        }
+    let words = match (result.off(), &result.confidence) {
+        (Some(off), _) => format!("{} {} {off}", result.grade.glyph(), result.grade),
         (None, Some(known)) if result.pose.is_some() => {
             let low = if known.word == Confidence::Low { "◆ " } else { "" };
             format!("{low}{} likely right", confidence::percent(known.probability))

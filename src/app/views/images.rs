@@ -18,7 +18,7 @@ use super::View;
 use super::canvas::PanZoom;
 use super::features::{FeatureProgress, INLIER, KINDS};
 use crate::app::ViewContext;
-use crate::diagnosis::TRUE_MATCH_THRESHOLDS;
+use crate::diagnosis::true_match_px;
 use crate::problem::Problem;
 
 /// How strong features are drawn while the pointer is on another one.
@@ -148,7 +148,7 @@ fn true_match(
         &progress.query.get(feature)?.pixel(),
         &progress.reference.get(found.reference)?.pixel(),
         lifted.and_then(|lifted| lifted.point.as_ref()),
-        TRUE_MATCH_THRESHOLDS * context.run.params.fb.mlesac.inlier_threshold_px,
+        true_match_px(context.run.params.fb.mlesac.inlier_threshold_px),
     ))
 }
 

@@ -87,8 +87,8 @@ impl LockstepView {
             ui.label(format!("over after {steps} steps"));
             let result = result.shown(context.options.shows_truth);
             let mut words = format!("{} {}", result.grade.glyph(), result.grade);
-            if let Some(error) = result.error {
-                words += &format!(", {}", error.translation());
+            if let Some(off) = result.off() {
+                words += &format!(", {off}");
             }
             let color = theme::grade(ui.visuals(), result.grade);
             ui.strong(RichText::new(words).color(color));

@@ -74,8 +74,8 @@ fn failure(report: &RunReport, one: &ReportedResult, is_open: bool) -> Markup {
 /// The error, or that there is no pose.
 fn worth(result: &QueryResult) -> String {
     let glyph = result.grade.glyph();
-    match &result.error {
-        Some(error) => format!("{glyph} {} off", error.translation()),
+    match result.off() {
+        Some(off) => format!("{glyph} {off} off"),
         None => format!("{glyph} {}", result.grade),
     }
 }

@@ -172,7 +172,11 @@ impl Recording {
     /// Records the picture that proves a failure, once per method.
     fn prove(&mut self, result: &QueryResult) {
         let query = &self.query;
-        let (Some(problem), Some(estimator)) = (query.problem(), proof::responsible(result)) else {
+        let problem = match result.fusion {
+            Some(_) => proof::problem_of(result, &query.problems),
+            None => query.problem(),
+        };
+        let (Some(problem), Some(estimator)) = (problem, proof::responsible(result)) else {
             return;
         };
         if !is_wrong(result) || query.proven.contains(&result.method) {

@@ -55,10 +55,8 @@ fn story(results: &[QueryResult]) -> String {
         let Some(primary) = result.diagnosis.first() else {
             continue;
         };
-        let worth = match &result.error {
-            Some(error) => format!("{} off", error.translation()),
-            None => result.grade.to_string(),
-        };
+        let off = result.off().map(|off| format!("{off} off"));
+        let worth = off.unwrap_or_else(|| result.grade.to_string());
         let (first, rest) = first_sentence(&primary.text);
         let rest = [rest, primary.code.name()].join(" ");
         let name = result.method_name();

@@ -14,7 +14,13 @@ use crate::solver::{Correspondence, pose_covariance};
 
 /// A match is true if the keypoint is this many inlier thresholds from where the truth puts it: the
 /// truth and the depths are not exact either.
-pub const TRUE_MATCH_THRESHOLDS: f64 = 2.0;
+const TRUE_MATCH_THRESHOLDS: f64 = 2.0;
+
+/// How far the keypoint of a true match may be from where the truth puts it, for a method with this inlier threshold
+/// \[px\]. A threshold below the default may be what is wrong, and makes no match false.
+pub fn true_match_px(inlier_threshold_px: f64) -> f64 {
+    TRUE_MATCH_THRESHOLDS * inlier_threshold_px.max(MlesacParams::default().inlier_threshold_px)
+}
 
 /// How many reference keypoints with a depth, and true matches of them, were left at each stage of FB.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
@@ -110,7 +116,7 @@ impl TrueMatches {
         let query_from_reference = truth.inverse();
         let camera = &subject.problem.query.intrinsics;
         let inlier_px = matching.mlesac.inlier_threshold_px;
-        let threshold_px = TRUE_MATCH_THRESHOLDS * inlier_px;
+        let threshold_px = true_match_px(inlier_px);
         let points = lifted_keypoints(subject, matching, reference);
         let predicted: Vec<Option<Point2<f64>>> = points
             .iter()

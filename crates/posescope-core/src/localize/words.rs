@@ -12,12 +12,15 @@ impl QueryResult {
         }
     }
 
+    /// How far the pose is off: the distance, and where it is wrong for its heading, the angle.
+    pub fn off(&self) -> Option<String> {
+        let error = self.error.as_ref()?;
+        Some(if self.grade == Grade::Wrong { error.greater() } else { error.translation() })
+    }
+
     /// Query, method and error in a line, with the primary verdict.
     pub fn headline(&self) -> String {
-        let worth = match &self.error {
-            Some(error) => error.translation(),
-            None => self.grade.to_string(),
-        };
+        let worth = self.off().unwrap_or_else(|| self.grade.to_string());
         let text = format!("{} {}, {worth}", self.query, self.method_name());
         match self.verdict() {
             Some(verdict) => format!("{text}: {verdict}"),

@@ -1,6 +1,6 @@
 //! X1: the ground truth, a calibration or the units are suspect.
 
-use nalgebra::{Translation3, Vector2};
+use nalgebra::{Matrix3, Quaternion, Rotation3, Translation3, UnitQuaternion, Vector2};
 
 use super::*;
 use crate::camera::Intrinsics;
@@ -129,28 +129,83 @@ fn given_pose(case: &Case<'_>) -> Option<Diagnosis> {
         return None;
     };
     let error_as_stated = case.subject.error()?;
-    let scaled = |by: f64| {
-        let translation = Translation3::from(pose.translation.vector * by);
-        Pose::from_parts(translation, pose.rotation)
-    };
-    let readings = [
-        ("camera_from_world (inverted)", pose.inverse()),
-        ("millimetres", scaled(1e-3)),
-        ("kilometres", scaled(1e3)),
-    ];
-    readings.into_iter().find_map(|(reading, pose)| {
+    readings(pose).into_iter().find_map(|(reading, pose)| {
         let error = PoseError::between(&pose, truth);
-        let agrees = error.rotation_deg < AGREEING_DEG
-            && TIMES * error.translation_m < error_as_stated.translation_m;
+        let is_nearer = TIMES * error.translation_m < error_as_stated.translation_m;
+        // Where the place is right already, the heading decides.
+        let is_turned = TIMES * error.rotation_deg < error_as_stated.rotation_deg
+            && case.subject.tolerance.contains(&error);
+        let agrees = error.rotation_deg < AGREEING_DEG && (is_nearer || is_turned);
         agrees.then(|| RULE.found(&GivenPose { reading, error, error_as_stated }))
     })
 }
 
-evidence!(GivenPose { reading: &'static str, error: PoseError, error_as_stated: PoseError } =>
-    "The pose of this system is in another convention: read as {reading}, it is {} off, not {}.",
-    metres(error.translation_m), metres(error_as_stated.translation_m)
+/// A pose as it would be if its numbers were meant otherwise, the likeliest mistakes first.
+fn readings(pose: &Pose) -> Vec<(String, Pose)> {
+    let scaled = |by: f64| {
+        let translation = Translation3::from(pose.translation.vector * by);
+        Pose::from_parts(translation, pose.rotation)
+    };
+    let reordered = |[w, x, y, z]: [f64; 4]| {
+        let rotation = UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z));
+        Pose::from_parts(pose.translation, rotation)
+    };
+    let Quaternion { coords } = pose.rotation.into_inner();
+    let [x, y, z, w] = [coords.x, coords.y, coords.z, coords.w];
+    let mut readings = vec![
+        ("camera_from_world (inverted)".to_owned(), pose.inverse()),
+        ("millimetres".to_owned(), scaled(1e-3)),
+        ("kilometres".to_owned(), scaled(1e3)),
+        ("quaternions with w first".to_owned(), reordered([x, y, z, w])),
+        ("quaternions with w last".to_owned(), reordered([z, w, x, y])),
+    ];
+    for (axes, rotation) in axes() {
+        readings.push((format!("camera axes {axes}"), pose * rotation));
+    }
+    for (axes, rotation) in axes() {
+        readings.push((format!("world axes {axes}"), rotation * pose));
+    }
+    readings
+}
+
+/// All other right-handed orders and signs of three axes. A name says what the axes of the other system are in those
+/// of a camera here, or those of the world here in its own: the camera axes of OpenGL are `(x, -y, -z)`.
+fn axes() -> Vec<(String, UnitQuaternion<f64>)> {
+    const ORDERS: [[usize; 3]; 6] =
+        [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]];
+    let mut all = Vec::new();
+    for order in ORDERS {
+        for signs in 0..8 {
+            let sign = |row: usize| if (signs >> row) & 1 == 0 { 1.0 } else { -1.0 };
+            let mut matrix = Matrix3::zeros();
+            for (row, &column) in order.iter().enumerate() {
+                matrix[(row, column)] = sign(row);
+            }
+            if matrix.determinant() < 0.0 || matrix == Matrix3::identity() {
+                continue;
+            }
+            let name = |row: usize| {
+                let minus = if sign(row) < 0.0 { "-" } else { "" };
+                format!("{minus}{}", ["x", "y", "z"][order[row]])
+            };
+            let rotation = Rotation3::from_matrix_unchecked(matrix);
+            let axes = format!("({}, {}, {})", name(0), name(1), name(2));
+            all.push((axes, UnitQuaternion::from_rotation_matrix(&rotation)));
+        }
+    }
+    all
+}
+
+evidence!(GivenPose { reading: String, error: PoseError, error_as_stated: PoseError } =>
+    "The pose of this system is in another convention: read as {reading}, it is {} and {:.1}° off, \
+     not {} and {:.1}°.",
+    metres(error.translation_m), error.rotation_deg,
+    metres(error_as_stated.translation_m), error_as_stated.rotation_deg
 );
 
+/// Cameras of one focal length, and of one centre, differ by less \[share, px\].
+const SAME_FOCAL_LENGTH: f64 = 0.02;
+const SAME_CENTRE_PX: f64 = 8.0;
 /// Fewer matches than this stand out from no crowd.
 const FEW_MATCHES: usize = 8;
 
@@ -198,8 +253,8 @@ fn camera_by_matches(case: &Case<'_>, matches: &TrueMatches) -> Option<Diagnosis
     // What another pose explains as well says nothing against the camera.
     let is_more =
         after >= 3 * FEW_MATCHES && 2 * after > 3 * before && 5 * after > 6 * matches.inliers();
-    let is_other = (camera.fx / stated.fx - 1.0).abs() > 0.02
-        || (camera.cx - stated.cx).hypot(camera.cy - stated.cy) > 8.0;
+    let is_other = (camera.fx / stated.fx - 1.0).abs() > SAME_FOCAL_LENGTH
+        || (camera.cx - stated.cx).hypot(camera.cy - stated.cy) > SAME_CENTRE_PX;
     (is_more && is_other).then(|| {
         RULE.found(&OtherCamera {
             explained: before,
@@ -216,19 +271,27 @@ evidence!(OtherCamera {
     camera: Intrinsics,
     stated: Intrinsics,
 } =>
-    "The query camera is suspect: its stated focal length is {:.0} px. With {} it explains \
-     {explained_otherwise} matches at the truth, not {explained}.",
-    stated.fx, otherwise_stated(camera, stated)
+    "The query camera is suspect: with {} it explains {explained_otherwise} matches at the truth, not \
+     {explained}.",
+    otherwise_stated(camera, stated)
 );
 
 /// In what a camera differs from the stated one, to the pixel.
 fn otherwise_stated(camera: &Intrinsics, stated: &Intrinsics) -> String {
-    let centre = |of: &Intrinsics| format!("({:.0}, {:.0})", of.cx, of.cy);
-    if centre(camera) == centre(stated) {
-        format!("{:.0} px", camera.fx)
-    } else {
-        format!("{:.0} px and another centre", camera.fx)
+    let mut differences = Vec::new();
+    if (camera.fx / stated.fx - 1.0).abs() > SAME_FOCAL_LENGTH {
+        differences
+            .push(format!("a focal length of {:.0} px in place of {:.0} px", camera.fx, stated.fx));
     }
+    if (camera.cx - stated.cx).hypot(camera.cy - stated.cy) > SAME_CENTRE_PX {
+        let centre = |of: &Intrinsics| format!("({:.0}, {:.0}) px", of.cx, of.cy);
+        differences.push(format!(
+            "the centre at {} in place of {}",
+            centre(camera),
+            centre(stated)
+        ));
+    }
+    differences.join(" and ")
 }
 
 /// The camera of one focal length and any centre that explains most matches from a pose.
@@ -345,3 +408,40 @@ evidence!(TruthByCost { probability: f64, error: PoseError } =>
     "The ground truth is suspect: the pose is {:.0} % likely right, but {} from it.",
     100.0 * probability, metres(error.translation_m)
 );
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Poses that were written in another convention are right when they are read so.
+    #[test]
+    fn each_convention_is_undone_by_its_reading() {
+        let truth = Pose::from_parts(
+            Translation3::new(3.0, -1.0, 40.0),
+            UnitQuaternion::from_euler_angles(0.1, 0.7, -0.2),
+        );
+        let matrix = |rows: [f64; 9]| {
+            let rotation = Rotation3::from_matrix_unchecked(Matrix3::from_row_slice(&rows));
+            UnitQuaternion::from_rotation_matrix(&rotation)
+        };
+        let opengl = matrix([1.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 0.0, -1.0]);
+        let z_up = matrix([1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, -1.0, 0.0]);
+        let q = truth.rotation.into_inner().coords;
+        // w first, read as x y z w.
+        let misread = Quaternion::new(q.z, q.w, q.x, q.y);
+        let misread = Pose::from_parts(truth.translation, UnitQuaternion::from_quaternion(misread));
+        for (given, wanted) in [
+            (truth.inverse(), "camera_from_world (inverted)"),
+            (truth * opengl, "camera axes (x, -y, -z)"),
+            (z_up * truth, "world axes (x, -z, y)"),
+            (misread, "quaternions with w first"),
+        ] {
+            let right = readings(&given).into_iter().find(|(_, pose)| {
+                let error = PoseError::between(pose, &truth);
+                error.translation_m < 1e-9 && error.rotation_deg < 1e-4
+            });
+            assert_eq!(right.map(|(reading, _)| reading).as_deref(), Some(wanted));
+        }
+        assert_eq!(axes().len(), 23);
+    }
+}
