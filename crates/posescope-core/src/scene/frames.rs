@@ -21,7 +21,7 @@ const BYTES: usize = 96 << 20;
 /// No lock is held while a frame is read. Two threads that ask for the same one may both read it, and get
 /// the same.
 pub struct FrameStore {
-    frames: Recent<FrameKey, Arc<Frame>>,
+    frames: Recent<(SceneId, usize), Arc<Frame>>,
     /// Held, so that none is taken for another at the same address.
     scenes: Mutex<Vec<(Arc<dyn Scene>, SceneId)>>,
 }
@@ -29,12 +29,6 @@ pub struct FrameStore {
 /// Which scene: no two are the same within one process.
 #[derive(Clone, Copy, PartialEq, Eq)]
 struct SceneId(u64);
-
-#[derive(Clone, Copy, PartialEq, Eq)]
-struct FrameKey {
-    scene: SceneId,
-    frame: usize,
-}
 
 /// Query and reference tuple have the same photo and memo.
 struct Frame {
@@ -137,7 +131,7 @@ impl<'a> CachedScene<'a> {
     }
 
     fn frame(&self, frame: usize) -> Result<Arc<Frame>, SceneError> {
-        let key = FrameKey { scene: self.id, frame };
+        let key = (self.id, frame);
         let frames = &self.store.frames;
         if let Some(known) = frames.get(&key) {
             // It has grown since, by what was computed of it.
