@@ -56,7 +56,7 @@ pub use shown::{ShownReason, ShownView};
 pub use state::{AppState, Note};
 pub use view_context::ViewContext;
 pub use view_options::{CompareMode, Tab, ViewOptions};
-pub use window::{WindowError, has_display, open, open_lesson, window_options};
+pub use window::{WindowError, has_display, open, open_lesson};
 
 use egui::{Margin, Panel};
 use frame::Panes;

@@ -13,7 +13,7 @@ use std::sync::Arc;
 
 use image::RgbImage;
 
-use crate::diagnosis::{MapOverlay, Proof};
+use crate::diagnosis::{Diagnosis, MapOverlay, Proof};
 use crate::estimator::{self, Entry};
 use crate::event::{DebugEvent, Kind, KindSet};
 use crate::geometry::Pose;
@@ -170,7 +170,7 @@ impl ProofPicture {
 /// The kind of picture that proves what is known of a result.
 pub fn kind(result: &QueryResult) -> Proof {
     let primary = result.diagnosis.first();
-    primary.map_or(Proof::DecidingStage, |found| found.code.rule().proof)
+    primary.map_or(Proof::DecidingStage, Diagnosis::proof)
 }
 
 /// The estimator that a result comes from: of a hybrid the part that it took.

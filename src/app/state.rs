@@ -21,6 +21,7 @@ use super::view_options::{CompareMode, ViewOptions};
 use crate::event::Side;
 use crate::geometry::Pose;
 use crate::lesson::Moment;
+use crate::localize::QueryResult;
 use crate::method::Method;
 use crate::run::Protocol;
 use crate::scene::FrameStore;
@@ -307,15 +308,22 @@ impl AppState {
         loaded.problems.get(self.run().reference_at(self.cursor()))
     }
 
-    /// Goes to the first method that is wrong and shows why; where all are right, to the end of the first.
+    /// Goes to the first method that is wrong and shows why; where all are right, to the end of the first. The fused
+    /// pose of a method answers for its references.
     fn go_to_cause(&mut self) {
-        let mut spans = self.session.run().spans().iter().filter(|span| span.result.is_some());
-        let has_failed = |span: &&Span| {
-            let result = span.result.as_ref();
-            result.is_some_and(|result| result.grade_shown(self.options.shows_truth).is_failure())
+        let run = self.session.run();
+        let has_result = |part: Part| run.span_of(part).is_some_and(|span| span.result.is_some());
+        let answers = |span: &&Span| match span.part {
+            Part::Reference(method, _) => !has_result(Part::Fusion(method)),
+            _ => true,
         };
-        let failed = spans.clone().find(has_failed).map(|span| (span.part, true));
-        let first = spans.next().map(|span| (span.part, false));
+        let results = run.spans().iter().filter(answers);
+        let mut results = results.filter_map(|span| Some((span.part, span.result.as_ref()?)));
+        let has_failed = |(_, result): &(Part, &QueryResult)| {
+            result.grade_shown(self.options.shows_truth).is_failure()
+        };
+        let failed = results.clone().find(has_failed).map(|(part, _)| (part, true));
+        let first = results.next().map(|(part, _)| (part, false));
         if let Some((part, why)) = failed.or(first) {
             self.show_part(part, why);
         }

@@ -42,13 +42,16 @@ fn icon() -> egui::IconData {
     eframe::icon_data::from_png_bytes(png).unwrap_or_default()
 }
 
-/// How the window is opened and painted.
-pub fn window_options() -> eframe::NativeOptions {
+/// Width and height of a window at first \[points\].
+const SIZE: [u32; 2] = [1500, 950];
+
+/// How a window of this size \[points\] is opened and painted.
+fn window_options([width, height]: [u32; 2]) -> eframe::NativeOptions {
     eframe::NativeOptions {
         viewport: ViewportBuilder::default()
             .with_app_id("posescope")
             .with_icon(icon())
-            .with_inner_size([1500.0, 950.0]),
+            .with_inner_size([width as f32, height as f32]),
         // There are no wide gradients, and it costs time for every pixel on a software adapter.
         dithering: false,
         wgpu_options: adapter::configuration(wgpu::Backends::all()),
@@ -56,13 +59,13 @@ pub fn window_options() -> eframe::NativeOptions {
     }
 }
 
-/// Opens the window with the results that are known already, in a table where there are any, and returns
-/// when it is closed.
+/// Opens a window of this size \[points\] with the results that are known already, in a table where there are any,
+/// and returns when it is closed.
 ///
 /// # Errors
 /// [`WindowError`] when there is no display, or nothing to draw with.
-pub fn open(setup: Setup, results: KnownResults) -> Result<(), WindowError> {
-    open_with(setup, move |app| {
+pub fn open(setup: Setup, results: KnownResults, size: [u32; 2]) -> Result<(), WindowError> {
+    open_with(setup, size, move |app| {
         let has_results = !results.now.is_empty();
         let mut app = app.with_results(results);
         if has_results {
@@ -77,14 +80,18 @@ pub fn open(setup: Setup, results: KnownResults) -> Result<(), WindowError> {
 /// # Errors
 /// [`WindowError`] when there is no display, or nothing to draw with.
 pub fn open_lesson(setup: Setup, lesson: Lesson) -> Result<(), WindowError> {
-    open_with(setup, move |app| app.with_lesson(lesson))
+    open_with(setup, SIZE, move |app| app.with_lesson(lesson))
 }
 
-fn open_with(setup: Setup, with: impl FnOnce(App) -> App) -> Result<(), WindowError> {
+fn open_with(
+    setup: Setup,
+    size: [u32; 2],
+    with: impl FnOnce(App) -> App,
+) -> Result<(), WindowError> {
     if !has_display() {
         return Err(WindowError::NoDisplay);
     }
-    let mut options = window_options();
+    let mut options = window_options(size);
     options.viewport = options.viewport.with_title(setup.title());
     eframe::run_native(
         "posescope",

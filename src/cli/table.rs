@@ -11,7 +11,7 @@ pub fn results(results: &[(QueryResult, Duration)], width: Option<usize>) -> Str
     let header = [
         "query",
         "reference",
-        "start",
+        "distance",
         "method",
         "grade",
         "error",

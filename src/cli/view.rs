@@ -20,7 +20,7 @@ use super::terminal::Terminal;
 pub fn view(args: &ViewArgs, terminal: &Terminal) -> Result<(), CliError> {
     let (setup, results) = setup(args)?;
     let headless = setup.clone();
-    match app::open(setup, results) {
+    match app::open(setup, results, args.screenshot.window) {
         Ok(()) => Ok(()),
         Err(
             error @ (WindowError::NoDisplay | WindowError::NoAdapter(_) | WindowError::Failed(_)),

@@ -8,8 +8,8 @@ pub const MARK: f32 = 7.0;
 const GAP: f32 = 8.0;
 /// Height of a title \[px\].
 const TITLE: f32 = 18.0;
-/// What the large panel and the strip below it take of the width, where something is beside them.
-const LARGE_SHARE: f32 = 0.52;
+/// What the large panel and the strip below it may take of the width, where something is beside them.
+const LARGE_SHARES: [f32; 2] = [0.52, 0.62];
 
 /// A rectangle: left, top, width and height \[px\].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -71,12 +71,23 @@ impl ProofPicture {
 
     fn better(&self, width: f32, height: f32, worth: impl Fn(&[Place]) -> f32) -> Vec<Place> {
         let all = Place { left: 0.0, top: 0.0, width, height };
-        let (below, beside) = (self.stacked(all), self.side_by_side(all));
-        if worth(&below) > worth(&beside) { below } else { beside }
+        if self.beside.is_empty() {
+            return self.side_by_side(all, 1.0, 1);
+        }
+        let mut best = self.stacked(all);
+        for share in LARGE_SHARES {
+            for columns in 1..=self.beside.len().min(2) {
+                let places = self.side_by_side(all, share, columns);
+                if worth(&places) >= worth(&best) {
+                    best = places;
+                }
+            }
+        }
+        best
     }
 
-    fn side_by_side(&self, all: Place) -> Vec<Place> {
-        let share = if self.beside.is_empty() { 1.0 } else { LARGE_SHARE };
+    /// The large panel on a share of the width, the small ones beside it in columns.
+    fn side_by_side(&self, all: Place, share: f32, columns: usize) -> Vec<Place> {
         let left = Place { width: (all.width - GAP) * share, ..all };
         let strip = self.below.as_ref().map(|below| left.width / below.aspect() + TITLE + GAP);
         let strip = strip.unwrap_or(0.0).min(0.3 * all.height);
@@ -88,8 +99,13 @@ impl ProofPicture {
             places.push(place.below_title().fitted(below));
         }
         let beside_left = left.width + GAP;
-        let column = Place { left: beside_left, width: all.width - beside_left, ..all };
-        places.extend(column_of(&self.beside, column));
+        let width = (all.width - beside_left - GAP * (columns - 1) as f32) / columns as f32;
+        for (at, panels) in
+            self.beside.chunks(self.beside.len().div_ceil(columns).max(1)).enumerate()
+        {
+            let column = Place { left: beside_left + at as f32 * (width + GAP), width, ..all };
+            places.extend(column_of(panels, column));
+        }
         places
     }
 

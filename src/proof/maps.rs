@@ -2,7 +2,7 @@
 
 use image::{GrayImage, Rgb, RgbImage};
 
-use super::{ColorScale, Panel, ProofCase, ProofPicture, Thing, is_near, responsible};
+use super::{ColorScale, Panel, ProofCase, ProofPicture, Thing, is_near, photos, responsible};
 use crate::cost::Explanation;
 use crate::diagnosis::MapOverlay;
 use crate::estimator::{self, Estimator};
@@ -57,6 +57,9 @@ pub(super) fn cost_map(case: &ProofCase<'_>, overlay: MapOverlay) -> Option<Proo
     }
     for seen in result.iter().chain(&truth) {
         beside.push(view_panel(query, seen));
+    }
+    if matches!(overlay, MapOverlay::Preference | MapOverlay::Ranks) {
+        beside.push(photos::reference_cloud(case));
     }
     let below = result.as_ref().zip(truth.as_ref());
     // On the way to a heading that was not searched, the cost says nothing of the search.

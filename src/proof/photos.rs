@@ -29,6 +29,8 @@ const PATCHES: usize = 4;
 const INLIER: usize = 4;
 /// Matches without a depth.
 const NO_DEPTH: Color = [0xFF; 3];
+/// A scan is dense that has a point for so few pixels of the photo.
+const DENSE: usize = 12;
 /// What is drawn but does not count.
 const FAINT: Color = [0x70; 3];
 
@@ -139,7 +141,8 @@ pub(super) fn matches(case: &ProofCase<'_>) -> Option<ProofPicture> {
             panel.line(color, width, [place(one.query), [x, y + top as f32]]);
         }
     }
-    Some(ProofPicture { large: panel, below: Some(funnel(&matches)), beside: Vec::new() })
+    let beside = vec![reference_cloud(case)];
+    Some(ProofPicture { large: panel, below: Some(funnel(&matches)), beside })
 }
 
 /// Both photos with their keypoints, where nothing was matched.
@@ -333,13 +336,8 @@ pub(super) fn cloud_on_photo(case: &ProofCase<'_>) -> Option<ProofPicture> {
     if let Some(cameras) = cloud_by_two_cameras(case) {
         return Some(cameras);
     }
-    let (query, reference) = (&case.problem.query, &case.problem.reference);
-    let (photo, points) =
-        cloud_picture(&reference.photo, &reference.intrinsics, case, &Pose::identity());
-    let large = Panel::new(
-        format!("The cloud on the reference photo, coloured by depth: {points} points"),
-        photo,
-    );
+    let query = &case.problem.query;
+    let large = reference_cloud(case);
     let on_query = |what: &str, query_from_reference: &Pose| {
         let (picture, points) =
             cloud_picture(&query.photo, &query.intrinsics, case, query_from_reference);
@@ -356,6 +354,15 @@ pub(super) fn cloud_on_photo(case: &ProofCase<'_>) -> Option<ProofPicture> {
         below: Some(depth_legend()),
         beside: truth.into_iter().chain(result).collect(),
     })
+}
+
+/// The cloud on the reference's own photo. Its edges lie on those of the photo, unless the cloud or its place is wrong:
+/// then no method can work, and what else is said is a consequence.
+pub(super) fn reference_cloud(case: &ProofCase<'_>) -> Panel {
+    let reference = &case.problem.reference;
+    let (photo, points) =
+        cloud_picture(&reference.photo, &reference.intrinsics, case, &Pose::identity());
+    Panel::new(format!("The cloud on the reference photo, by depth: {points} points"), photo)
 }
 
 /// Where the verdict names another camera: the cloud on the query's photo, seen from the truth by both.
@@ -410,7 +417,7 @@ fn cloud_picture(
 ) -> (RgbImage, usize) {
     let mut canvas = picture::photo(photo).into_rgb8();
     for pixel in canvas.pixels_mut() {
-        pixel.0 = pixel.0.map(|value| value / 3);
+        pixel.0 = pixel.0.map(|value| value / 2);
     }
     let reference = &case.problem.reference;
     let points = reference.cloud.points.iter().map(|point| point.cast::<f64>());
@@ -426,9 +433,11 @@ fn cloud_picture(
     let mut seen: Vec<(f64, Point2<f64>)> = seen.collect();
     seen.sort_by(|a, b| b.0.total_cmp(&a.0));
     let count = seen.len();
+    // The photo stays visible between the points: a dense scan has smaller ones.
+    let side = if count * DENSE < canvas.len() / 3 { 2 } else { 1 };
     for (depth_m, pixel) in seen {
-        let (x, y) = (pixel.x.round() as u32, pixel.y.round() as u32);
-        for (x, y) in [(x, y), (x + 1, y), (x, y + 1), (x + 1, y + 1)] {
+        let (left, top) = (pixel.x.round() as u32, pixel.y.round() as u32);
+        for (x, y) in (0..side * side).map(|at| (left + at % side, top + at / side)) {
             if let Some(here) = canvas.get_pixel_mut_checked(x, y) {
                 *here = Rgb(palette::depth(depth_m));
             }

@@ -207,7 +207,7 @@ fn eighty_columns_hold_every_result_with_whole_words() {
     let sequence = SmallSequence::write();
     let narrow = printed(&sequence, TWO_QUERIES, Some("80"));
     expect_narrow(&narrow);
-    assert!(narrow.starts_with("query 000005, reference 000004, start 1.000 m\n"), "{narrow}");
+    assert!(narrow.starts_with("query 000005, reference 000004, distance 1.000 m\n"), "{narrow}");
     // Nothing of what a wide terminal shows is missing or broken, but the times.
     let wide = printed(&sequence, TWO_QUERIES, Some("400"));
     let rows = wide.split_once('\n').map_or("", |(_, rows)| rows);

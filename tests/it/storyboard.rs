@@ -89,6 +89,30 @@ fn remedies_are_tried_beside_the_picture_of_the_cause() {
     assert!(state.options.shows_why);
     let here = state.run().span_at(state.cursor()).map(|span| span.part);
     assert_eq!(here, Some(part));
+    // Nothing helps a photo without texture: the advice stays.
+    assert!(is_said(&window, "No setting and no other method made it right."));
+    assert!(is_said(&window, "What may help"));
+}
+
+#[test]
+fn changed_settings_stand_below_the_cause_with_their_defaults() {
+    let mut changed = Setup { query: GREY, ..setup() };
+    changed.task.params.assign("pm.sigma=2").expect("a value");
+    let window = finished(changed);
+    for words in ["--radius 3 (default 15)", "pm.sigma=2 (default "] {
+        assert!(is_said(&window, words), "{words}");
+    }
+}
+
+#[test]
+fn a_fused_pose_answers_for_its_references() {
+    let mut fusing = Setup { query: GREY, chosen: vec![0, 2].into(), ..setup() };
+    fusing.task.protocol.fusions = vec!["avg".parse().expect("a fusion")];
+    let window = finished(fusing);
+    let state = app(&window);
+    let here = state.run().span_at(state.cursor()).map(|span| span.part);
+    assert!(matches!(here, Some(Part::Fusion(_))), "{here:?}");
+    assert!(state.options.shows_why);
 }
 
 #[test]

@@ -63,6 +63,14 @@ pub struct Diagnosis {
     pub evidence: Value,
 }
 
+impl Diagnosis {
+    /// The kind of picture that proves it.
+    pub fn proof(&self) -> Proof {
+        let rule = self.code.rule();
+        (rule.proof_on)(&self.evidence).unwrap_or(rule.proof)
+    }
+}
+
 /// What is assessed: a method's outcome on a problem, what it emitted, and the truth where it is known.
 #[derive(Clone, Debug)]
 pub struct Subject<'a> {

@@ -17,6 +17,8 @@ use crate::app::view_options::Tab;
 use crate::diagnosis::{Code, Confidence, Diagnosis, Grade, confidence};
 use crate::localize::{Helped, QueryResult};
 use crate::params::Params;
+use crate::run::Protocol;
+use crate::session::Run;
 
 pub(crate) fn ui(ui: &mut Ui, state: &AppState, commands: &Queue, panes: &mut Panes) {
     let tab = state.options.tab;
@@ -57,7 +59,7 @@ fn why(ui: &mut Ui, state: &AppState, commands: &Queue) {
     match result.diagnosis.split_first() {
         Some((primary, others)) => {
             finding(ui, primary);
-            changed(ui, &state.shown_run().params);
+            changed(ui, state.shown_run());
             helped(ui, state, commands, &result, primary);
             if !others.is_empty() {
                 heading(ui, "Also found");
@@ -82,7 +84,7 @@ fn why(ui: &mut Ui, state: &AppState, commands: &Queue) {
         None => {
             ui.strong(format!("{}: {}", part_name(span.part), result.grade));
             ui.label(told(&result));
-            changed(ui, &state.shown_run().params);
+            changed(ui, state.shown_run());
         }
     }
     if let Some(known) = &result.confidence {
@@ -112,17 +114,22 @@ fn why(ui: &mut Ui, state: &AppState, commands: &Queue) {
     }
 }
 
-/// The parameters that are not at their defaults: they may be the cause.
-fn changed(ui: &mut Ui, params: &Params) {
+/// The settings that are not at their defaults: they may be the cause.
+fn changed(ui: &mut Ui, run: &Run) {
     const MOST: usize = 5;
-    let rows = params.list().into_iter().zip(Params::default().list());
-    let changes: Vec<_> = rows.filter(|(row, default)| row.value != default.value).collect();
+    let default_m = Protocol::default().radius_m();
+    let radius = (run.radius_m != default_m)
+        .then(|| format!("--radius {} (default {default_m})", run.radius_m));
+    let rows = run.params.list().into_iter().zip(Params::default().list());
+    let params = rows.filter(|(row, default)| row.value != default.value);
+    let params = params
+        .map(|(row, default)| format!("{}={} (default {})", row.key, row.value, default.value));
+    let changes: Vec<String> = radius.into_iter().chain(params).collect();
     if changes.is_empty() {
         return;
     }
     heading(ui, "Changed from the default");
-    for (row, default) in changes.iter().take(MOST) {
-        let change = format!("{}={} (default {})", row.key, row.value, default.value);
+    for change in changes.iter().take(MOST) {
         ui.label(RichText::new(change).monospace().size(12.0));
     }
     if let Some(more) = changes.len().checked_sub(MOST + 1) {
@@ -211,6 +218,7 @@ const NAMES: &[(&str, &str)] = &[
     ("query", "Keypoints in the query"),
     ("rank", "Rank of the right cell"),
     ("ranked", "Frames kept of the ranking"),
+    ("R2.reference", "Keypoints in the reference"),
     ("right", "True matches, right depth"),
     ("share_of_reference", "Coverage, of the reference's"),
     ("supports_truth", "Matches that fit the truth"),
@@ -253,7 +261,7 @@ fn helped(
     }
     let Some(explanation) = &result.explanation else {
         heading(ui, "What may help");
-        ui.label(result.advice(primary.code));
+        ui.label(result.advice(primary));
         if result.error.or(result.initial_error).is_some() && state.setup.task.protocol.explain == 0
         {
             let button = ui
@@ -290,7 +298,7 @@ fn helped(
         ui.weak("Found with the help of the truth. Click one to run it.");
     } else if explanation.complete {
         heading(ui, "What may help");
-        ui.label(result.advice(primary.code));
+        ui.label(result.advice(primary));
         ui.label(NO_SETTING_HELPS);
     }
 }

@@ -1,4 +1,4 @@
-//! The arguments of `posescope view --screenshot`.
+//! The arguments of `posescope view` for the size of the window and for a picture of it.
 
 use std::path::PathBuf;
 
@@ -27,8 +27,7 @@ pub struct ScreenshotArgs {
         long,
         value_name = "WIDTHxHEIGHT",
         default_value = "1500x950",
-        value_parser = size,
-        requires = "screenshot"
+        value_parser = size
     )]
     #[arg(hide_short_help = true)]
     pub window: [u32; 2],

@@ -30,7 +30,7 @@ const COLUMNS: [Column; 12] = [
     column("change", "", true),
     column("rotation (°)", "number", false),
     column("confidence", "number", false),
-    column("start (m)", "number", false),
+    column("distance (m)", "number", false),
     column("reference", "", false),
     column("photo", "", false),
 ];
@@ -168,7 +168,7 @@ fn cell(report: &RunReport, one: &ReportedResult, column: &Column) -> Markup {
         },
         "error (m)" => number(result.error.map(|error| error.translation_m), 3),
         "rotation (°)" => number(result.error.map(|error| error.rotation_deg), 2),
-        "start (m)" => number(result.initial_error.map(|error| error.translation_m), 3),
+        "distance (m)" => number(result.initial_error.map(|error| error.translation_m), 3),
         "confidence" => match &result.confidence {
             Some(known) => {
                 html! { td class=[class] data-v=(known.probability) { (known.likely()) } }

@@ -38,7 +38,8 @@ pub(super) struct Funnel {
 }
 
 impl Funnel {
-    /// The step before `lifted` that lost the greatest share of what it got, and both counts.
+    /// The step before `lifted` that lost the greatest share of what it got, and both counts. One more on each side
+    /// keeps a step from the blame that got one or two.
     pub(super) fn worst_step(&self) -> (Step, usize, usize) {
         let steps = [
             (Step::Detect, self.visible, self.detected),
@@ -46,7 +47,7 @@ impl Funnel {
             (Step::Ratio, self.nearest, self.ratio),
             (Step::Unique, self.ratio, self.unique),
         ];
-        let kept = |before: usize, after: usize| after as f64 / before.max(1) as f64;
+        let kept = |before: usize, after: usize| (after + 1) as f64 / (before + 1) as f64;
         let worst = steps
             .into_iter()
             .filter(|(_, before, _)| *before > 0)

@@ -116,6 +116,8 @@ pub struct Rule {
     pub advice: &'static str,
     /// The advice for methods of a family, if it is another.
     pub advice_of: fn(Family) -> Option<&'static str>,
+    /// The advice for what was found, if that says more.
+    pub advice_on: fn(&serde_json::Value) -> Option<&'static str>,
     /// What it applies to.
     pub applies_to: &'static [Family],
     /// Whether it needs the ground truth.
@@ -128,6 +130,8 @@ pub struct Rule {
     pub decided_at: DecidedAt,
     /// The kind of picture that proves it.
     pub proof: Proof,
+    /// The kind for what was found, if that needs another.
+    pub proof_on: fn(&serde_json::Value) -> Option<Proof>,
     /// What may help a method against it, the likeliest first.
     pub remedies: fn(&Ask<'_>) -> Vec<Remedy>,
 }
@@ -140,12 +144,14 @@ impl Rule {
             title: "",
             advice: "",
             advice_of: |_| None,
+            advice_on: |_| None,
             applies_to: &[],
             needs_truth: true,
             is_conclusive: false,
             test: Test::Reported,
             decided_at: DecidedAt::End,
             proof: Proof::DecidingStage,
+            proof_on: |_| None,
             remedies: |_| Vec::new(),
         }
     }
@@ -195,16 +201,17 @@ impl Code {
         self.rule().title
     }
 
-    /// What to try against it. Another system does not read our parameters.
-    pub fn advice(self, method: Method) -> &'static str {
+    /// What to try against what was found. Another system does not read our parameters.
+    pub fn advice(self, method: Method, evidence: &serde_json::Value) -> &'static str {
         let rule = self.rule();
+        let family = Family::of(method);
         let is_of_a_cost = !rule.applies_to.contains(&Family::Features);
-        match Family::of(method) {
-            Some(Family::Given) if is_of_a_cost && rule.applies_to.contains(&Family::Given) => {
-                "compare it with --method robust, or use another reference"
-            }
-            family => family.and_then(rule.advice_of).unwrap_or(rule.advice),
+        if family == Some(Family::Given) && is_of_a_cost && rule.applies_to.contains(&Family::Given)
+        {
+            return "compare it with --method robust, or use another reference";
         }
+        let of_family = || family.and_then(rule.advice_of);
+        (rule.advice_on)(evidence).or_else(of_family).unwrap_or(rule.advice)
     }
 
     /// Whether it says that something failed: all but [`Code::L1`], which says that the pose is uncertain.

@@ -1,7 +1,7 @@
 //! A result in words. Terminal, recording and report only lay these out.
 
 use super::result::{QueryResult, Status};
-use crate::diagnosis::{Code, Grade, confidence};
+use crate::diagnosis::{Code, Diagnosis, Grade, confidence};
 
 impl QueryResult {
     /// The method, with the fusion where references were fused.
@@ -32,11 +32,11 @@ impl QueryResult {
     }
 
     /// What to try against a verdict of this result.
-    pub fn advice(&self, code: Code) -> &'static str {
-        if code == Code::L1 && self.status == Status::Failed {
+    pub fn advice(&self, found: &Diagnosis) -> &'static str {
+        if found.code == Code::L1 && self.status == Status::Failed {
             return "lower --min-confidence or fb2.least_probability to see the refused pose";
         }
-        code.advice(self.method)
+        found.code.advice(self.method, &found.evidence)
     }
 
     /// What follows the primary verdict, a paragraph each: other verdicts, what to try, what helped.
@@ -48,7 +48,7 @@ impl QueryResult {
         let mut paragraphs: Vec<String> = also.collect();
         let Some(explanation) = &self.explanation else {
             if self.grade.is_failure() {
-                paragraphs.push(format!("try: {}", self.advice(primary.code)));
+                paragraphs.push(format!("try: {}", self.advice(primary)));
             }
             return paragraphs;
         };
@@ -61,7 +61,7 @@ impl QueryResult {
                 1 => "the one remedy that was tried did not help".to_owned(),
                 runs => format!("none of the {runs} remedies that were tried helped"),
             });
-            paragraphs.push(format!("try: {}", self.advice(primary.code)));
+            paragraphs.push(format!("try: {}", self.advice(primary)));
         }
         if !explanation.complete {
             paragraphs.push("stopped before all remedies were tried".to_owned());

@@ -1,10 +1,13 @@
 //! D4: the truth is outside of what is searched.
 
+use serde_json::Value;
+
 use super::*;
 
 pub(super) const RULE: Rule = Rule {
     title: "the truth is outside of what is searched",
     advice: "if the reference is wrong, use another; otherwise raise --radius or grid.yaw_range, or lower grid.coverage_floor",
+    advice_on,
     applies_to: Family::SEARCHING,
     is_conclusive: true,
     test: Test::Method(test),
@@ -13,6 +16,18 @@ pub(super) const RULE: Rule = Rule {
     remedies,
     ..Rule::new(Code::D4)
 };
+
+/// What was too small decides what to raise.
+fn advice_on(evidence: &Value) -> Option<&'static str> {
+    let metres = |key: &str| evidence.get(key).and_then(Value::as_f64);
+    Some(if evidence.get("is_turned").and_then(Value::as_bool) == Some(true) {
+        "raise grid.yaw_range, or use a reference with a nearer heading"
+    } else if metres("distance_m")? > metres("radius_m")? {
+        "raise --radius, or use a nearer reference"
+    } else {
+        return None;
+    })
+}
 
 fn test(case: &Case<'_>) -> Option<Diagnosis> {
     let radius_m = case.subject.problem.uncertainty_radius_m;
@@ -111,5 +126,23 @@ fn remedies(ask: &Ask<'_>) -> Vec<Remedy> {
                 vec![ask.set("grid.yaw_range", 45.0), ask.rounds()],
             ]
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::*;
+    use crate::method::Method;
+
+    #[test]
+    fn the_advice_names_what_was_too_small() {
+        let advice = |evidence: &Value| Code::D4.advice(Method::MI, evidence);
+        let outside = json!({ "distance_m": 20.0, "radius_m": 15.0, "is_turned": false });
+        assert!(advice(&outside).starts_with("raise --radius"));
+        let turned = json!({ "distance_m": 2.0, "radius_m": 15.0, "is_turned": true });
+        assert!(advice(&turned).starts_with("raise grid.yaw_range"));
+        assert_eq!(advice(&json!({ "covered": 10, "least_covered": 300 })), RULE.advice);
     }
 }

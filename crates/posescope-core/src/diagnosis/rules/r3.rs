@@ -54,24 +54,20 @@ struct Matches {
 impl fmt::Display for Matches {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (before, lost) = (self.before, self.before - self.after.min(self.before));
-        write!(
-            f,
-            "Too few true matches: {} of {}. {lost} of {before} ",
-            self.true_matches.unique, self.unique
-        )?;
-        if let Some(limit) = &self.limit {
-            return write!(
-                f,
-                "visible reference keypoints were not detected in the query: {limit}."
-            );
+        let (of, lost_by) = match self.lost_at {
+            Step::View => ("reference keypoints with a depth", "are outside the query's view"),
+            Step::Detect => ("reference keypoints in the query's view", "were not detected there"),
+            Step::Match => ("keypoints detected in both photos", "match a wrong one"),
+            Step::Ratio => ("true nearest neighbours", "fail the ratio test"),
+            Step::Unique => ("true matches", "are not mutually best"),
+        };
+        let true_matches = self.true_matches.unique;
+        write!(f, "Too few true matches: {true_matches} of {}. ", self.unique)?;
+        write!(f, "Of {before} {of}, {lost} {lost_by}")?;
+        match &self.limit {
+            Some(limit) => write!(f, ": {limit}."),
+            None => f.write_str("."),
         }
-        f.write_str(match self.lost_at {
-            Step::View => "reference keypoints with a depth are out of the query's view.",
-            Step::Detect => "visible reference keypoints were not detected in the query.",
-            Step::Match => "visible reference keypoints lose their match to a wrong one.",
-            Step::Ratio => "true nearest neighbours fail the ratio test.",
-            Step::Unique => "true matches are not mutually best.",
-        })
     }
 }
 
@@ -112,12 +108,12 @@ mod tests {
             };
             matches.to_string()
         };
+        assert!(said(None).ends_with(
+            "Of 40 reference keypoints in the query's view, 38 were not detected there."
+        ));
         assert!(
-            said(None)
-                .ends_with("38 of 40 visible reference keypoints were not detected in the query.")
-        );
-        assert!(
-            said(Some("surf.max_keypoints=40")).ends_with("in the query: surf.max_keypoints=40.")
+            said(Some("surf.max_keypoints=40"))
+                .ends_with("not detected there: surf.max_keypoints=40.")
         );
     }
 }

@@ -8,6 +8,12 @@ pub(super) const RULE: Rule = Rule {
     applies_to: Family::MATCHING,
     test: Test::Method(test),
     proof: Proof::Matches,
+    proof_on: |evidence| {
+        let count = |key: &str| evidence.get(key)?.as_u64();
+        let inliers = [count("inliers")?, count("true_inliers")?];
+        depths_are_wrong(inliers, count("wrong_depth")?, count("supports_truth")?)
+            .then_some(Proof::DepthPatch)
+    },
     remedies,
     ..Rule::new(Code::R8)
 };
@@ -16,28 +22,32 @@ fn test(case: &Case<'_>) -> Option<Diagnosis> {
     let matches = case.matches()?;
     Some(RULE.found(&Accepted {
         error: case.subject.error()?,
-        inliers: matches.inliers(),
-        true_inliers: matches.funnel.inliers,
-        supports_truth: matches.funnel.lifted,
-        wrong_depth: matches.wrong_depth,
+        inliers: matches.inliers() as u64,
+        true_inliers: matches.funnel.inliers as u64,
+        supports_truth: matches.funnel.lifted as u64,
+        wrong_depth: matches.wrong_depth as u64,
         true_matches: matches.funnel,
     }))
 }
 
+/// Whether most inliers are true, and many of the true matches have a wrong depth.
+fn depths_are_wrong([inliers, true_ones]: [u64; 2], wrong_depth: u64, right_depth: u64) -> bool {
+    2 * true_ones >= inliers && 2 * wrong_depth > right_depth
+}
+
 evidence!(Accepted {
     error: PoseError,
-    inliers: usize,
-    true_inliers: usize,
-    supports_truth: usize,
-    wrong_depth: usize,
+    inliers: u64,
+    true_inliers: u64,
+    supports_truth: u64,
+    wrong_depth: u64,
     true_matches: Funnel,
 } => {
     let off = metres(error.translation_m);
     // A pose on true matches points at their depths or their spread, one on false matches at the photos.
-    let is_on_true_ones = 2 * true_inliers >= *inliers;
-    let why = if is_on_true_ones && 2 * wrong_depth > *supports_truth {
+    let why = if depths_are_wrong([*inliers, *true_inliers], *wrong_depth, *supports_truth) {
         format!("Of the true matches, {wrong_depth} have a wrong depth, {supports_truth} the right one.")
-    } else if is_on_true_ones {
+    } else if 2 * true_inliers >= *inliers {
         "They are too few or too close together to fix it.".to_owned()
     } else {
         format!(
@@ -74,7 +84,9 @@ mod tests {
                 wrong_depth,
                 true_matches: Funnel::default(),
             };
-            accepted.to_string()
+            let found = RULE.found(&accepted);
+            assert_eq!(found.proof() == Proof::DepthPatch, found.text.contains("wrong depth"));
+            found.text
         };
         let elsewhere = "The truth explains 21: something looks alike or moved, or the camera is not as stated.";
         assert!(said(14, 18).ends_with("18 have a wrong depth, 21 the right one."));
