@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
-use posescope::diagnosis::{Evidence, confidence};
+use posescope::diagnosis::{Evidence, Subject, confidence};
 use posescope::estimator;
 use posescope::geometry::{Pose, PoseError};
 use posescope::image::Photo;
@@ -252,19 +252,21 @@ impl Trial {
             let mut evidence = Evidence::default();
             let estimator = estimator::entry(method).make(&params);
             let outcome = estimator.estimate(&problem, &mut Trace::to(&mut evidence))?;
-            let signals = confidence::signals(&problem, method, &params, &outcome, &evidence);
+            let subject = Subject::new(&problem, method, &params, &outcome, &evidence);
+            let signals = confidence::signals(&subject);
             let (Ok(pose), Some(signals)) = (&outcome.pose, signals) else {
                 continue;
             };
             let error = self.truth.map(|truth| PoseError::between(&truth, pose));
+            let (names, values): (Vec<_>, Vec<_>) = signals.into_iter().unzip();
             samples.push(Sample {
                 method: method.name().to_owned(),
                 is_for_fitting: self.conditions.iter().all(is_fitted),
                 shows_place: self.conditions[0] != UNKNOWABLE,
                 is_near: error.is_some_and(|error| error.translation_m < confidence::WITHIN_M),
-                probability: confidence::probability(method, &signals.values),
-                names: signals.names.iter().map(ToString::to_string).collect(),
-                values: signals.values,
+                probability: confidence::probability(method, &values),
+                names: names.iter().map(ToString::to_string).collect(),
+                values,
             });
         }
         Ok(samples)

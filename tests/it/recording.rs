@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use posescope::cost;
-use posescope::diagnosis::{Evidence, Subject, Tolerance};
+use posescope::diagnosis::{Assessment, Evidence, Subject, Tolerance};
 use posescope::estimator::{self, Direct};
 use posescope::event::{Kind, KindSet, PhaseSearched, ReferencesRanked, Stage, ViewRendered};
 use posescope::features::FeatureState;
@@ -59,7 +59,7 @@ fn run(recorder: &mut Recorder, methods: &[Method], params: &Params) {
         let tolerance = Tolerance { translation_m: 0.4, rotation_deg: 5.0 };
         let subject = Subject::new(&problem, method, params, &outcome, &evidence);
         let subject = subject.against(Some(&truth), tolerance);
-        let result = evaluate("two walls", &subject);
+        let result = evaluate("two walls", &subject, Assessment::of(&subject));
         recorder.end_method(&result, &StageTimes::default());
     }
 }

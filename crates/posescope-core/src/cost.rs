@@ -14,7 +14,6 @@ mod joint_histogram;
 mod lesser_half;
 mod mutual_information;
 mod photometric;
-mod settings;
 mod statistic;
 
 use rand::SeedableRng as _;
@@ -28,14 +27,12 @@ pub use photometric::Photometric;
 pub use statistic::{CostOfPairs, Explanation, ExplanationKind, PhotometricWeights, Statistic};
 
 #[doc(hidden)]
-pub use entry::{Entry, RegisteredCost, SearchRule, Similarity};
+pub use entry::{CostSetting, CostSettings, Entry, RegisteredCost, SearchRule, Similarity};
 pub(crate) use joint_histogram::{MAX_BYTE_BINS, MIN_ENTROPY};
 #[doc(hidden)]
 pub use joint_histogram::{bin, byte_bin, count_pairs};
 #[doc(hidden)]
 pub use lesser_half::{LesserHalf, LesserHalfFinder};
-#[doc(hidden)]
-pub use settings::{CostSetting, CostSettings};
 
 use crate::image::{FloatImage, GrayImage, cubic_interpolated};
 pub use crate::memo::{Key, key};

@@ -2,7 +2,6 @@
 //!
 //! | file | what |
 //! |---|---|
-//! | `motion` | six numbers that move a camera, and how a point moves with them |
 //! | `view` | what a moved camera's photo shows at the points of a coloured cloud, and its slope |
 //! | [`photometric`] | the squared differences, robustly, by Levenberg–Marquardt (after Tykkälä, Audras, Comport, *Direct iterative closest point for real-time visual odometry*, ICCV workshops 2011) |
 //! | [`information`] | the normalised information distance of a smooth histogram by BFGS (after Pascoe, Maddern, Tanner, Piniés, Newman, *NID-SLAM*, CVPR 2017) |
@@ -11,7 +10,6 @@
 //! to, which need not be the right one.
 
 pub mod information;
-mod motion;
 pub mod photometric;
 mod view;
 
@@ -31,9 +29,9 @@ parameters! {
         /// Standard deviation of the Gaussian that smooths both photos on the finest level.
         pub sigma_px: f64 = 1.0 => number("sigma", "px", 0.3..=20.0),
         /// Most steps per level.
-        pub most_steps: usize = 40 => count("steps", "", 1..=1000),
+        pub max_steps: usize = 40 => count("steps", "", 1..=1000),
         /// Most points of the cloud, evenly sampled.
-        pub most_points: usize = 6000 => count("points", "", 50..=1_000_000),
+        pub max_points: usize = 6000 => count("points", "", 50..=1_000_000),
     }
 }
 

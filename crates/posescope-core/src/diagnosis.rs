@@ -21,13 +21,11 @@ mod case;
 pub mod confidence;
 mod descent;
 mod evidence;
-mod family;
 mod fused;
 mod matches;
 mod numbers;
 mod proof;
 pub mod remedies;
-mod reported;
 mod rules;
 mod search;
 mod starts;
@@ -40,13 +38,13 @@ pub use assessment::{Assessment, Grade};
 pub use case::{Case, FusionCase, Member, RankingCase};
 pub use confidence::{Confidence, PoseConfidence};
 pub use evidence::Evidence;
-pub use family::Family;
 pub use fused::{diagnose_fusion, diagnose_ranking, fused_confidence};
 pub use matches::true_match_px;
 pub use proof::{MapOverlay, Proof};
 pub use rules::{Code, DecidedAt, RULES, Rule, Test};
 pub use tolerance::Tolerance;
 
+pub use crate::estimator::Family;
 use crate::estimator::Outcome;
 use crate::geometry::{Pose, PoseError};
 use crate::method::Method;
@@ -103,16 +101,17 @@ impl<'a> Subject<'a> {
         outcome: &'a Outcome,
         evidence: &'a Evidence,
     ) -> Self {
-        Self {
+        let subject = Self {
             problem,
             method,
             params,
             outcome,
             evidence,
-            confidence: PoseConfidence::of(problem, method, params, outcome, evidence),
+            confidence: None,
             truth: None,
             tolerance: Tolerance::default(),
-        }
+        };
+        Self { confidence: PoseConfidence::of(&subject), ..subject }
     }
 
     /// The same, compared with the truth: a pose within the tolerance of it is right.

@@ -1,4 +1,4 @@
-//! The estimators. Each is a straight-line function from a [`Problem`] to an [`Outcome`] that tells
+//! The estimators. Each is a straight-line function from a [`Problem`] to an [`Outcome`] that emits
 //! what it does to a [`Trace`].
 //!
 //! A direct estimator is a registered [cost](crate::cost::ALL) with a search, so a new cost is a new
@@ -23,10 +23,10 @@ pub use feature::{
     DepthRule, FeatureBased, FeatureParams, GuidedParams, count_matches, projected_cloud,
 };
 pub use given::Given;
+use hybrid::JointHybrid;
 pub use hybrid::{Hybrid, HybridParts, hybrid_outcome};
-pub use joint::{
-    JointDirect, JointEstimator, JointFeatures, JointHybrid, JointOutcome, JointReference,
-};
+use joint::{JointDirect, JointEstimator, JointFeatures};
+pub(crate) use joint::{JointReference, estimate_jointly};
 pub use mi6::SixFreedoms;
 pub use robust::{Robust, RobustParams};
 pub use starts::SixParams;
@@ -196,7 +196,7 @@ impl Entry {
 
     /// The estimator that takes several references at once with these parameters; `None` for a method that takes
     /// one at a time.
-    pub fn make_joint(&self, params: &Params) -> Option<Box<dyn JointEstimator>> {
+    pub(crate) fn make_joint(&self, params: &Params) -> Option<Box<dyn JointEstimator>> {
         (self.joint)(params)
     }
 
@@ -309,7 +309,7 @@ impl FromStr for Method {
 }
 
 /// Why a straight-line estimator stops early.
-enum Halt {
+pub(crate) enum Halt {
     Failed(Failure),
     Cancelled,
 }

@@ -442,7 +442,7 @@ impl DepthsLifted {
 }
 
 impl PoseScored {
-    /// The event of a hypothesis that was scored, where the reference pose covers so many pixels.
+    /// The event of a scored hypothesis; `covered_at_reference` are the pixels that the reference pose covers.
     pub fn new(phase: Phase, evaluation: u64, scored: Scored, covered_at_reference: u32) -> Self {
         let Scored { offset, score, is_best } = scored;
         let coverage = f64::from(score.covered) / f64::from(covered_at_reference.max(1));

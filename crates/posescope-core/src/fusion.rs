@@ -8,7 +8,6 @@
 //! A new fusion is an entry in [`ALL`].
 
 mod average;
-mod joint;
 pub(crate) mod share;
 
 use std::fmt;
@@ -17,9 +16,6 @@ use std::sync::Arc;
 
 pub use average::average_pose;
 pub use share::{Share, ShareOutcome, Support};
-
-#[doc(hidden)]
-pub use joint::fuse_jointly;
 
 use crate::estimator::Failure;
 use crate::event::{ReferencesFused, Stage};
@@ -84,7 +80,7 @@ pub const ALL: &[Fusion] = &[
     },
 ];
 
-const JOINT: &str = "joint";
+pub(crate) const JOINT: &str = "joint";
 
 /// All weight for the most matches; the first of equals wins.
 fn most_matches(matches: &[usize]) -> Vec<f64> {

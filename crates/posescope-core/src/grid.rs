@@ -73,14 +73,13 @@ impl GridParams {
     /// Whether an offset lies where the grid of a search within `radius_m` ends, in position or yaw: its
     /// basin may go on outside.
     pub fn is_on_rim(&self, offset: &Offset, radius_m: f64) -> bool {
-        let distance_m = offset.right_m.hypot(offset.forward_m);
         let yaw_deg = offset.yaw_rad.to_degrees().abs();
-        distance_m > radius_m - 0.5 * self.coarse_step_m
+        offset.distance_m() > radius_m - 0.5 * self.coarse_step_m
             || yaw_deg > self.yaw_range_deg - 0.5 * self.yaw_step_deg
     }
 }
 
-/// Pixels that a hypothesis must cover to have a say, for a coverage floor as in
+/// Pixels that an eligible hypothesis covers at least, for a coverage floor as in
 /// [`GridParams::coverage_floor`].
 pub fn least_covered(coverage_floor: f64, covered_at_reference: u32) -> u32 {
     (coverage_floor * f64::from(covered_at_reference)).ceil() as u32
@@ -109,6 +108,16 @@ impl Offset {
         let centre = &reference_from_camera.translation;
         let ahead = reference_from_camera.rotation * Vector3::z();
         Self { right_m: centre.x, forward_m: centre.z, yaw_rad: (-ahead.x).atan2(ahead.z) }
+    }
+
+    /// Distance from the reference camera \[m\].
+    pub fn distance_m(&self) -> f64 {
+        self.right_m.hypot(self.forward_m)
+    }
+
+    /// Distance from the position of another offset \[m\].
+    pub fn distance_from(&self, other: &Self) -> f64 {
+        (self.right_m - other.right_m).hypot(self.forward_m - other.forward_m)
     }
 
     /// The camera's pose in the reference camera's frame.

@@ -1,4 +1,4 @@
-//! What is wrong with data that somebody hands in.
+//! Errors of input data.
 
 /// Why a photo, a camera, a pose or a radius cannot be used.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

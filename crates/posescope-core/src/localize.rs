@@ -20,5 +20,5 @@ pub use result::{
 pub use select::{
     ByMatches, ChoiceError, Ranking, References, Selection, draw, frames_within, report_ranking,
 };
-pub use single::{localize, localize_by, localize_jointly, localize_traced, words_of};
+pub use single::{localize, localize_by, localize_traced, words_of};
 pub use timing::{StageTimes, StageTimings};

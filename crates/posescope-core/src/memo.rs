@@ -49,12 +49,19 @@ pub fn key(inputs: impl fmt::Debug) -> Key {
 #[derive(Default)]
 pub(crate) struct Memo(Option<Arc<Values>>);
 
-/// Identifies a memo within the process, for results that depend on two frames.
+/// Identifies a memo or a scene: no two are the same within one process.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct MemoId(u64);
+pub(crate) struct Id(u64);
+
+impl Id {
+    pub(crate) fn new() -> Self {
+        static NEXT: AtomicU64 = AtomicU64::new(0);
+        Self(NEXT.fetch_add(1, Ordering::Relaxed))
+    }
+}
 
 struct Values {
-    id: MemoId,
+    id: Id,
     recent: Recent<(TypeId, Key), Entry>,
 }
 
@@ -81,10 +88,9 @@ impl Memo {
 
     /// An empty memo.
     pub(crate) fn new() -> Self {
-        static NEXT: AtomicU64 = AtomicU64::new(0);
         let limit = Limit { count: VALUES, bytes: BYTES };
         Self(Some(Arc::new(Values {
-            id: MemoId(NEXT.fetch_add(1, Ordering::Relaxed)),
+            id: Id::new(),
             recent: Recent::within(limit, |entry: &Entry| entry.bytes, |_| false),
         })))
     }
@@ -94,8 +100,8 @@ impl Memo {
         Self(self.0.clone())
     }
 
-    /// Which memo it is; `None` for one that keeps nothing.
-    pub(crate) fn id(&self) -> Option<MemoId> {
+    /// Which memo it is, for results that depend on two frames; `None` for one that keeps nothing.
+    pub(crate) fn id(&self) -> Option<Id> {
         self.0.as_ref().map(|values| values.id)
     }
 

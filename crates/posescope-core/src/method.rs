@@ -38,8 +38,8 @@ impl Method {
     pub fn called(name: &str) -> Result<Self, MethodNameError> {
         let is_plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || "-_.+".contains(c);
         let starts_well = name.starts_with(|c: char| c.is_ascii_lowercase());
-        if !starts_well || !name.chars().all(is_plain) || name.len() > LONGEST_NAME {
-            return Err(MethodNameError(name.chars().take(LONGEST_NAME).collect()));
+        if !starts_well || !name.chars().all(is_plain) || name.len() > MAX_NAME {
+            return Err(MethodNameError(name.chars().take(MAX_NAME).collect()));
         }
         if let Some(known) = Self::known(name) {
             return Ok(known);
@@ -97,13 +97,13 @@ impl PartialOrd for Method {
 static NAMES: Mutex<BTreeSet<&'static str>> = Mutex::new(BTreeSet::new());
 
 /// Characters of a name at most; tables have columns of about this width.
-const LONGEST_NAME: usize = 24;
+const MAX_NAME: usize = 24;
 
 /// What is no name of a method.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
     "`{0}` is not a possible name of a method: lower-case letters, digits and -_.+ expected, a letter first, \
-     {LONGEST_NAME} at most"
+     {MAX_NAME} at most"
 )]
 pub struct MethodNameError(String);
 

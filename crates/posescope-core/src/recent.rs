@@ -37,11 +37,6 @@ impl<K: Eq, V: Clone> Recent<K, V> {
         Self { limit, bytes, is_held, entries: Mutex::default() }
     }
 
-    /// How much is kept.
-    pub fn limit(&self) -> Limit {
-        self.limit
-    }
-
     /// The value of a key, which then counts as the one used last.
     pub fn get<Q: Eq + ?Sized>(&self, key: &Q) -> Option<V>
     where

@@ -12,9 +12,9 @@
 //! | `build` | from the features of the frames to a file | |
 //! | `layout` | the file: checked, then mapped | |
 //! | `index` | from the features of a query to ranked frames | |
-//! | `ranking` | what is told of ranked frames | |
+//! | `ranking` | what is reported of ranked frames | |
 //!
-//! Nothing in here knows scenes or photos; whoever calls it does.
+//! Nothing in here knows scenes or photos; the caller does.
 
 mod affine;
 mod build;
@@ -24,8 +24,6 @@ mod index;
 mod layout;
 mod params;
 mod ranking;
-#[cfg(test)]
-mod synthetic;
 #[cfg(test)]
 mod tests;
 mod tf_idf;

@@ -1,9 +1,9 @@
-//! A cost's place in the registry.
+//! A cost's place in the registry, and the registered costs with their parameters.
 
 use std::fmt;
 
-use super::{Cost, ExplanationKind};
-use crate::describe::{Describe, choice};
+use super::{ALL, Cost, ExplanationKind, key};
+use crate::describe::{About, Describe, Field, choice};
 
 /// How a direct method finds the pose of least cost.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -50,8 +50,6 @@ pub struct Entry {
     pub about: &'static str,
     /// What a value of its channel is: `grey value`.
     pub sees: &'static str,
-    /// Whether it can be descended too: then how it is searched is a parameter, `search`.
-    pub is_smooth: bool,
     /// What the cost is one minus of, where it is made of a joint histogram.
     pub similarity: Option<Similarity>,
     /// The cost with its default parameters.
@@ -62,5 +60,68 @@ impl Entry {
     /// How it explains itself, if it does.
     pub fn explains(&self) -> Option<ExplanationKind> {
         (self.make)().statistic().explains()
+    }
+}
+
+/// A registered cost with its parameters, and how it is searched.
+#[derive(Debug)]
+pub struct CostSetting {
+    /// The cost.
+    pub cost: Box<dyn RegisteredCost>,
+    /// How its minimum is found.
+    pub search: SearchRule,
+}
+
+impl CostSetting {
+    /// The default setting of a cost.
+    pub fn new(entry: &Entry) -> Self {
+        Self { cost: (entry.make)(), search: SearchRule::default() }
+    }
+}
+
+impl Describe for CostSetting {
+    fn fields(&mut self) -> Vec<Field<'_>> {
+        let mut fields = self.cost.fields();
+        let doc = "How the pose of least cost is found: over the grid, from many starts, or from the reference \
+                   pose downhill.";
+        let about = About { name: "search", unit: "", doc };
+        fields.push(Field::choice(about, &mut self.search));
+        fields
+    }
+}
+
+impl Clone for CostSetting {
+    fn clone(&self) -> Self {
+        Self { cost: self.cost.boxed(), ..*self }
+    }
+}
+
+/// The setting of every cost, in the order of [`ALL`].
+#[derive(Clone, Debug)]
+pub struct CostSettings(Vec<CostSetting>);
+
+impl CostSettings {
+    /// Names of the groups, with their parameters.
+    pub fn groups(&mut self) -> impl Iterator<Item = (&'static str, &mut dyn Describe)> {
+        let settings = self.0.iter_mut().map(|setting| setting as &mut dyn Describe);
+        ALL.iter().map(|entry| entry.name).zip(settings)
+    }
+
+    /// The setting of a registered cost.
+    pub fn of(&self, entry: &Entry) -> Option<&CostSetting> {
+        let place = ALL.iter().position(|known| known.name == entry.name)?;
+        self.0.get(place)
+    }
+}
+
+impl Default for CostSettings {
+    fn default() -> Self {
+        Self(ALL.iter().map(CostSetting::new).collect())
+    }
+}
+
+impl PartialEq for CostSettings {
+    fn eq(&self, other: &Self) -> bool {
+        key(&self.0) == key(&other.0)
     }
 }

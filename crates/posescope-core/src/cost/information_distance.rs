@@ -13,7 +13,6 @@ pub(super) const ENTRY: Entry = Entry {
     name: "nid",
     about: "normalised information distance",
     sees: "grey value",
-    is_smooth: true,
     similarity: Some(Similarity { name: "shared information", formula: "I(Q,S) / H(Q,S)" }),
     make: || Box::new(InformationDistance::default()),
 };

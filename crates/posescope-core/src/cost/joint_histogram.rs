@@ -104,7 +104,7 @@ pub fn bin(value: f32, bins: usize) -> usize {
     ((value * scale) as usize).min(bins - 1)
 }
 
-/// The most bins that a byte tells apart.
+/// The most bins that a byte can number.
 pub const MAX_BYTE_BINS: usize = 256;
 
 /// As [`bin`], for 256 bins at most.

@@ -40,15 +40,15 @@ impl LesserHalf {
 /// Bits of a number that do not decide its bin: each octave has 32 bins.
 const IGNORED_BITS: u32 = 18;
 /// All numbers below have one bin. Of squared differences of grey values such are few.
-const LEAST: f32 = 1.0 / 256.0;
-const FIRST: u32 = LEAST.to_bits() >> IGNORED_BITS;
+const MIN_BINNED: f32 = 1.0 / 256.0;
+const FIRST: u32 = MIN_BINNED.to_bits() >> IGNORED_BITS;
 const BINS: usize = 32 * 24 + 2;
 
 /// Numbers that are looked at to guess the median, about.
 const SAMPLE: usize = 1024;
 /// Bins of the sample that tell how close the numbers lie, on each side of the median's.
 const BINS_BESIDE: usize = 2;
-/// The guess is corrected by counting what lies below it so many times.
+/// How often the guess is corrected by counting what lies below it.
 const CORRECTIONS: usize = 2;
 /// Numbers around the last guess that are compared with each other: a share of all, and some more.
 const SHARE_AROUND: f32 = 0.0015;
@@ -122,7 +122,7 @@ impl LesserHalfFinder {
         LesserHalf::is_exact(sum).then_some((counted, sum))
     }
 
-    /// What a sample tells.
+    /// The median and the density of a sample.
     fn guess(&mut self, values: &[f32], middle: usize) -> Guess {
         let sampled = &mut self.sampled;
         sampled.fill(0);

@@ -10,7 +10,6 @@ pub(super) const ENTRY: Entry = Entry {
     name: "mi",
     about: "1 − mutual information normalised by the larger entropy",
     sees: "grey value",
-    is_smooth: true,
     similarity: Some(Similarity { name: "NMI", formula: "I(Q,S) / max(H(Q), H(S))" }),
     make: || Box::new(MutualInformation::default()),
 };

@@ -10,7 +10,6 @@ pub(super) const ENTRY: Entry = Entry {
     name: "pm",
     about: "squared difference of grey values, the worse half ignored",
     sees: "grey value",
-    is_smooth: true,
     similarity: None,
     make: || Box::new(Photometric::default()),
 };

@@ -161,7 +161,7 @@ impl Gradient for Distance<'_> {
     }
 }
 
-/// Goes down from the start of a view, with so many bins per axis of the histogram, and tells every step;
+/// Descends from the start of a view, with `bins` per axis of the histogram, and passes every step to `tell`;
 /// the last is where it ends.
 ///
 /// # Errors
@@ -169,12 +169,12 @@ impl Gradient for Distance<'_> {
 pub fn descend<E>(
     view: &View<'_>,
     bins: usize,
-    most_steps: usize,
+    max_steps: usize,
     mut tell: impl FnMut(Step) -> Result<(), E>,
 ) -> Result<(), E> {
     let start = FirstOrderState::new(vec![0.0; 6]);
     let Ok(mut stepper) = Executor::new(Distance::new(view, bins), Bfgs::new(), start)
-        .max_iter(most_steps as u64)
+        .max_iter(max_steps as u64)
         .into_stepper();
     let mut before = f64::INFINITY;
     loop {

@@ -12,7 +12,7 @@ use super::{Step, View};
 /// Median absolute deviation to standard deviation, for Gaussian noise.
 const TO_DEVIATION: f64 = 1.4826;
 
-/// Residuals beyond so many standard deviations count linearly (Huber; 95 % efficient).
+/// Residuals beyond this many standard deviations count linearly (Huber; 95 % efficient).
 const HUBER: f64 = 1.345;
 
 /// The relative reduction that the model promises below which a level is done.
@@ -71,13 +71,13 @@ impl Jacobian for Differences<'_> {
     }
 }
 
-/// Goes down from the start of a view and tells every step; the last is where it ends.
+/// Descends from the start of a view and passes every step to `tell`; the last is where it ends.
 ///
 /// # Errors
 /// Those of `tell`.
 pub fn descend<E>(
     view: &View<'_>,
-    most_steps: usize,
+    max_steps: usize,
     mut tell: impl FnMut(Step) -> Result<(), E>,
 ) -> Result<(), E> {
     let (differences, deviation) = Differences::new(view);
@@ -86,7 +86,7 @@ pub fn descend<E>(
         .with_relative_model_reduction_tolerance(MIN_REDUCTION);
     let start = PointState::new(vec![0.0; 6]);
     let Ok(mut stepper) =
-        Executor::new(objective, solver, start).max_iter(most_steps as u64).into_stepper();
+        Executor::new(objective, solver, start).max_iter(max_steps as u64).into_stepper();
     loop {
         let Ok(outcome) = stepper.step();
         let state = stepper.state();

@@ -1,9 +1,9 @@
 //! Builds the remedies of rules: changes of settings, for a method with its parameters.
 
-use super::family::Family;
+use super::Family;
+use crate::estimator::{FeatureBased, FeatureParams};
 use crate::method::Method;
 use crate::params::Params;
-use crate::robust::MlesacParams;
 
 /// A change of one setting.
 #[derive(Clone, Debug, PartialEq)]
@@ -97,13 +97,10 @@ impl Ask<'_> {
 
     /// A looser or stricter ratio test.
     pub(super) fn ratio(&self, by: f64) -> Change {
-        match self.family {
-            Family::Guided => {
-                // With guided matching, features need not be as distinct.
-                self.set("fb2.ratio", (self.params.fb2.ratio + by).clamp(0.1, 0.98))
-            }
-            _ => self.set("fb.ratio", (self.params.fb.ratio + by).clamp(0.1, 1.0)),
-        }
+        // With guided matching, features need not be as distinct.
+        let most = if self.family == Family::Guided { 0.98 } else { 1.0 };
+        let ratio = (self.matching().ratio + by).clamp(0.1, most);
+        self.set(self.key("fb.ratio", "fb2.ratio"), ratio)
     }
 
     /// More keypoints, by a lower threshold of the detector.
@@ -114,20 +111,9 @@ impl Ask<'_> {
         }
     }
 
-    /// The greatest distance of a projected point from the keypoint that takes its depth \[px\].
-    pub(super) fn depth_radius_px(&self) -> f64 {
-        match self.family {
-            Family::Guided => self.params.fb2.depth_radius_px,
-            _ => self.params.fb.depth_radius_px,
-        }
-    }
-
-    /// MLESAC's parameters.
-    pub(super) fn mlesac(&self) -> &MlesacParams {
-        match self.family {
-            Family::Guided => &self.params.fb2.mlesac,
-            _ => &self.params.fb.mlesac,
-        }
+    /// How the method matches features.
+    pub(super) fn matching(&self) -> FeatureParams {
+        FeatureBased::of(self.family, self.params).params
     }
 }
 

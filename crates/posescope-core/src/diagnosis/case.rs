@@ -3,18 +3,17 @@
 
 use std::cell::OnceCell;
 
+use super::Family;
 use super::confidence::{self, PoseConfidence};
-use super::family::Family;
 use super::matches::{Matching, TrueMatches};
 use super::search::Search;
 use super::starts::Starts;
 use super::{Diagnosis, Subject, Tolerance};
-use crate::estimator::{self, Failure, FeatureBased, HybridParts};
+use crate::estimator::{self, Failure, FeatureBased, FeatureParams, HybridParts};
 use crate::fusion::Share;
 use crate::geometry::{Pose, PoseError};
 use crate::method::Method;
 use crate::retrieval::ReferenceRanking;
-use crate::solver::Correspondence;
 use crate::stats::mean_and_squares;
 
 /// A result that is wrong, missing or perhaps uncertain.
@@ -25,6 +24,8 @@ pub struct Case<'a> {
     pub(super) responsible: Method,
     /// The search on a grid, or what stands for one.
     pub(super) search: Option<&'a Search<'a>>,
+    /// How the method matches features, if it does.
+    features: FeatureBased,
     matches: OnceCell<Option<TrueMatches>>,
     starts: OnceCell<Option<Starts>>,
     contrast: OnceCell<f64>,
@@ -41,6 +42,7 @@ impl<'a> Case<'a> {
             family,
             responsible: confidence::responsible(subject.method, subject.outcome),
             search,
+            features: FeatureBased::of(family, subject.params),
             matches: OnceCell::new(),
             starts: OnceCell::new(),
             contrast: OnceCell::new(),
@@ -77,25 +79,14 @@ impl<'a> Case<'a> {
     }
 
     /// How the method matches features.
-    pub(super) fn matching(&self) -> Matching<'a> {
-        let params = self.subject.params;
-        match self.family {
-            Family::Guided => Matching {
-                mlesac: &params.fb2.mlesac,
-                depth_radius_px: params.fb2.depth_radius_px,
-                visible: true,
-                radius_slack: params.fb2.radius_slack,
-            },
-            _ => Matching {
-                mlesac: &params.fb.mlesac,
-                depth_radius_px: params.fb.depth_radius_px,
-                visible: params.fb.visible,
-                radius_slack: params.fb.radius_slack,
-            },
-        }
+    pub(super) fn matching(&self) -> Matching<'_> {
+        let FeatureParams { mlesac, depth_radius_px, visible, radius_slack, .. } =
+            &self.features.params;
+        let (depth_radius_px, visible) = (*depth_radius_px, *visible);
+        Matching { mlesac, depth_radius_px, visible, radius_slack: *radius_slack }
     }
 
-    /// The parameter that limits the number of keypoints, with its value, where the query has so many.
+    /// The parameter that limits the number of keypoints, with its value, where the query reached it.
     pub(super) fn keypoint_limit(&self) -> Option<String> {
         let params = self.subject.params;
         let (key, limit) = match self.family {
@@ -108,13 +99,8 @@ impl<'a> Case<'a> {
 
     /// Whether the method would accept a pose that these correspondences agree on.
     pub(super) fn would_accept(&self, matches: &TrueMatches, inliers: &[usize]) -> bool {
-        let (params, camera) = (self.subject.params, &self.subject.problem.query.intrinsics);
-        let correspondences: &[Correspondence] = &matches.correspondences;
-        let estimator = match self.family {
-            Family::Guided => FeatureBased::guided(params),
-            _ => FeatureBased::new(params),
-        };
-        estimator.would_accept(correspondences, inliers, camera)
+        let camera = &self.subject.problem.query.intrinsics;
+        self.features.would_accept(&matches.correspondences, inliers, camera)
     }
 
     /// The error of the consensus, accepted or not.

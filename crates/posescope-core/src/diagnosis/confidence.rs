@@ -18,18 +18,13 @@ use serde::{Deserialize, Serialize};
 
 pub use coefficients::probability;
 
-use super::family::Family;
-use super::{Evidence, Subject};
-use crate::estimator::{self, Failure, Outcome};
+use super::{Family, Subject};
+use crate::estimator::{self, CostSummary, Failure, Outcome};
 use crate::grid::ScoredLattice;
 use crate::method::Method;
-use crate::params::Params;
-use crate::problem::Problem;
+use crate::stats::median_and_deviation;
 use crate::text::words;
 use appearance::Look;
-use inliers::Inliers;
-use minimum::Minimum;
-use settled::Settled;
 
 /// The distance from the truth that [`PoseConfidence::probability`] refers to \[m\].
 pub const WITHIN_M: f64 = 1.0;
@@ -115,14 +110,8 @@ pub fn percent(probability: f64) -> String {
     }
 }
 
-/// What a probability is made of: names and values, in one order for all results of one family.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Signals {
-    /// The names.
-    pub names: &'static [&'static str],
-    /// The values; all are finite.
-    pub values: Vec<f64>,
-}
+/// What a probability is made of: names and finite values, in one order for all results of one family.
+pub type Signals = Vec<(&'static str, f64)>;
 
 impl PoseConfidence {
     /// A probability alone.
@@ -148,16 +137,11 @@ impl PoseConfidence {
         }
     }
 
-    /// That of the pose of an outcome; `None` without a pose, and for a method that was not calibrated.
-    pub fn of(
-        problem: &Problem,
-        method: Method,
-        params: &Params,
-        outcome: &Outcome,
-        evidence: &Evidence,
-    ) -> Option<Self> {
-        let (signals, rest) = left_behind(problem, method, params, outcome, evidence)?;
-        let probability = probability(responsible(method, outcome), &signals.values)?;
+    /// That of a subject's pose; `None` without a pose, and for a method that was not calibrated.
+    pub(super) fn of(subject: &Subject<'_>) -> Option<Self> {
+        let (signals, rest) = left_behind(subject)?;
+        let values: Vec<f64> = signals.iter().map(|(_, value)| *value).collect();
+        let probability = probability(responsible(subject.method, subject.outcome), &values)?;
         Some(Self { probability, word: Confidence::of(probability), ..rest })
     }
 }
@@ -191,66 +175,24 @@ pub fn accepted(subject: &Subject<'_>, asked: Option<f64>) -> Outcome {
     }
 }
 
-/// The signals of an outcome with a pose, as the probability takes them.
-pub fn signals(
-    problem: &Problem,
-    method: Method,
-    params: &Params,
-    outcome: &Outcome,
-    evidence: &Evidence,
-) -> Option<Signals> {
-    Some(left_behind(problem, method, params, outcome, evidence)?.0)
+/// The signals of a subject with a pose, as the probability takes them.
+pub fn signals(subject: &Subject<'_>) -> Option<Signals> {
+    Some(left_behind(subject)?.0)
 }
 
-/// The signals of an outcome with a pose, and its confidence but for the probability.
-fn left_behind(
-    problem: &Problem,
-    method: Method,
-    params: &Params,
-    outcome: &Outcome,
-    evidence: &Evidence,
-) -> Option<(Signals, PoseConfidence)> {
+/// The signals of a subject with a pose, and its confidence but for the probability.
+fn left_behind(subject: &Subject<'_>) -> Option<(Signals, PoseConfidence)> {
+    let &Subject { method, outcome, evidence, .. } = subject;
     outcome.pose.as_ref().ok()?;
-    let rest = PoseConfidence::new(f64::NAN);
-    let chance_level = outcome.cost.and_then(|cost| cost.shuffled);
-    Some(match Family::of(responsible(method, outcome))? {
-        family @ (Family::Features | Family::Guided) => {
-            let look = if family == Family::Guided { Look::THOROUGH } else { Look::QUICK };
-            let inliers = Inliers::of(problem, params, evidence, look)?;
-            let deviation = |first: usize| {
-                let covariance = inliers.covariance?;
-                Some([0, 1, 2].map(|axis| covariance[(first + axis, first + axis)].sqrt()))
-            };
-            let confidence = PoseConfidence {
-                position_std_m: deviation(3),
-                rotation_std_deg: deviation(0).map(|d| d.map(f64::to_degrees)),
-                inlier_spread: Some(inliers.spread),
-                chance_level: evidence.judged.as_ref().map(|j| j.acceptance.log10_nfa),
-                ..rest
-            };
-            (inliers.signals(evidence), confidence)
-        }
+    match Family::of(responsible(method, outcome))? {
+        Family::Features => inliers::signals(subject, Look::QUICK),
+        Family::Guided => inliers::signals(subject, Look::THOROUGH),
         // The coefficients of a cost were fitted to its search on the grid.
-        Family::Grid if evidence.settled.is_some() => return None,
-        Family::Grid => {
-            let minimum = Minimum::of(outcome, evidence)?;
-            let deviations = minimum.deviations(evidence);
-            let confidence = PoseConfidence {
-                position_std_m: deviations.map(|[right, forward, _]| [right, 0.0, forward]),
-                rotation_std_deg: deviations.map(|[.., yaw]| [0.0, yaw.to_degrees(), 0.0]),
-                runner_up_margin: minimum.runner_up_margin,
-                chance_level,
-                ..rest
-            };
-            (minimum.signals(), confidence)
-        }
-        Family::Starts => {
-            let settled = Settled::of(outcome, evidence)?;
-            let runner_up_margin = settled.runner_up_margin;
-            (settled.signals(), PoseConfidence { runner_up_margin, chance_level, ..rest })
-        }
-        Family::Given => return None,
-    })
+        Family::Grid if evidence.settled.is_some() => None,
+        Family::Grid => minimum::signals(outcome, evidence),
+        Family::Starts => settled::signals(outcome, evidence),
+        Family::Given => None,
+    }
 }
 
 /// Large values say little more than moderate ones.
@@ -258,8 +200,38 @@ fn tamed(value: f64) -> f64 {
     value.signum() * value.abs().ln_1p()
 }
 
-fn eligible_costs(surface: &ScoredLattice) -> Vec<f64> {
-    (0..surface.scores.len()).filter_map(|cell| surface.eligible_cost(cell)).collect()
+/// The eligible costs of some poses.
+struct Costs {
+    median: f64,
+    /// Their robust standard deviation.
+    deviation: f64,
+    least: f64,
+}
+
+impl Costs {
+    fn of<'s>(surfaces: impl IntoIterator<Item = &'s ScoredLattice>) -> Option<Self> {
+        let mut costs = Vec::new();
+        for surface in surfaces {
+            let cells = 0..surface.scores.len();
+            costs.extend(cells.filter_map(|cell| surface.eligible_cost(cell)));
+        }
+        let least = costs.iter().copied().fold(f64::INFINITY, f64::min);
+        let (median, deviation) = median_and_deviation(&mut costs)?;
+        Some(Self { median, deviation, least })
+    }
+
+    /// How far a cost is below the median, in standard deviations.
+    fn depth(&self, cost: f64) -> f64 {
+        (self.median - cost) / self.deviation
+    }
+}
+
+/// Share of the cost of shuffled pixels that is saved, and covered pixels over those covered at the
+/// reference pose.
+fn gain_and_coverage(summary: &CostSummary) -> Signals {
+    let shuffled = summary.shuffled.unwrap_or(1.0).max(f64::MIN_POSITIVE);
+    let coverage = summary.coverage_best / summary.coverage_reference.max(f64::MIN_POSITIVE);
+    vec![("gain", 1.0 - summary.best / shuffled), ("coverage", coverage.clamp(1e-3, 1e3).ln())]
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 //! None of it uses the truth: a remedy that starts at the truth would be no remedy. Each rule lists what may
 //! help its verdict for the method at hand; another method or another reference may help against any.
 
-use super::family::Family;
+use super::Family;
 use super::{Code, confidence};
 use crate::estimator;
 use crate::method::Method;

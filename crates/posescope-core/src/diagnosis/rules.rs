@@ -10,35 +10,40 @@ use std::str::FromStr;
 
 use serde::Serialize;
 
+use super::Family;
 use super::ask::{Ask, Change, Remedy};
 use super::case::{Case, FusionCase, Member, RankingCase};
-use super::family::Family;
 use super::matches::Funnel;
 use super::numbers::{metres, ordinal, pair};
 use super::search::Search;
 use super::starts::Starts;
 use super::{Diagnosis, MapOverlay, Proof};
+use crate::estimator::Failure;
 use crate::event::Stage;
 use crate::geometry::{Pose, PoseError};
 use crate::grid::{Offset, Phase};
 use crate::method::Method;
 use crate::text::UnknownWord;
 
-/// The evidence of a verdict: a struct whose fields go into a file, and the sentence that is made of them.
+/// The evidence of a verdict: a struct whose fields go into a file, and the sentence that is made of them: a
+/// block, or what `format!` takes.
 macro_rules! evidence {
-    ($name:ident { $($field:ident: $type:ty),+ $(,)? } => $($words:tt)+) => {
+    ($name:ident { $($(#[$attribute:meta])* $field:ident: $type:ty),+ $(,)? } => $words:block) => {
         #[derive(Serialize)]
         struct $name {
-            $($field: $type),+
+            $($(#[$attribute])* $field: $type),+
         }
 
         impl fmt::Display for $name {
             fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
                 #[allow(unused_variables, reason = "not every field is in the sentence")]
                 let Self { $($field),+ } = self;
-                write!(f, $($words)+)
+                f.write_str(&$words)
             }
         }
+    };
+    ($name:ident { $($fields:tt)+ } => $($words:tt)+) => {
+        evidence!($name { $($fields)+ } => { format!($($words)+) });
     };
 }
 
@@ -212,6 +217,37 @@ impl Code {
     /// Whether it says that something failed: all but [`Code::L1`], which says that the pose is uncertain.
     pub fn is_failure(self) -> bool {
         self != Self::L1
+    }
+}
+
+impl Code {
+    /// The verdict that a method's own failure is.
+    pub fn of(failure: &Failure) -> Self {
+        match failure {
+            Failure::NothingInView { .. } | Failure::NoReference { .. } => Self::R1,
+            Failure::TooFewFeatures { .. } => Self::R2,
+            Failure::TooFewMatches { .. }
+            | Failure::NoConsensus { .. }
+            | Failure::ChanceConsensus { .. } => Self::R3,
+            Failure::TooFewDepths { .. } => Self::R4,
+            Failure::OutsideRadius { .. } => Self::R9,
+            Failure::NothingComparable { .. } | Failure::FlatCost { .. } => Self::D5,
+            Failure::LedOutside { .. } => Self::D8,
+            Failure::ChanceMinimum { .. } => Self::D6,
+            Failure::LatticeTooLarge(_) => Self::D9,
+            Failure::NoReferenceSucceeded { failure, .. } => Self::of(failure),
+            Failure::NotJoint { .. } => Self::F2,
+            Failure::NotAnswered { .. } => Self::E1,
+            Failure::LowConfidence { .. } => Self::L1,
+            Failure::Internal { .. } => Self::X9,
+        }
+    }
+}
+
+impl Diagnosis {
+    /// What an estimator that has no pose reports.
+    pub fn of_failure(failure: &Failure) -> Self {
+        Self { code: Code::of(failure), text: failure.to_string(), evidence: serde_json::json!({}) }
     }
 }
 

@@ -10,10 +10,10 @@ use std::sync::{Mutex, OnceLock, PoisonError};
 
 use rayon::prelude::*;
 
+use super::Family;
 use super::Subject;
 use super::confidence;
 use super::descent::compass_search;
-use super::family::Family;
 use crate::cost::shuffled;
 use crate::estimator::{self, Estimator};
 use crate::geometry::{Pose, PoseError, yaw};
@@ -45,6 +45,13 @@ const SHUFFLES: u64 = 12;
 pub(super) struct Place {
     pub(super) offset: Offset,
     pub(super) cost: f64,
+}
+
+impl Place {
+    /// The one of lower cost, of equals this.
+    fn lower(self, next: Self) -> Self {
+        if next.cost < self.cost { next } else { self }
+    }
 }
 
 /// The cost at a pose beside that of its shuffled pixels.
@@ -141,7 +148,7 @@ impl<'a> Search<'a> {
     /// What beat the truth; `None` where the truth is out of reach, or covers too little.
     pub(super) fn rivals(&self) -> Option<&Rivals> {
         let rivals = || {
-            if self.is_out_of_reach() {
+            if self.out_of_reach() != (false, false) {
                 return None;
             }
             let (near, result_cost) = (self.near_truth()?, self.result_cost?);
@@ -178,35 +185,27 @@ impl<'a> Search<'a> {
         )
     }
 
-    /// Whether the truth is too far from the reference, or turned too far, to be reached.
-    pub(super) fn is_out_of_reach(&self) -> bool {
-        let (is_far, is_turned) = self.out_of_reach();
-        is_far || is_turned
-    }
-
     /// Whether the truth is too far from the reference, and whether it is turned too far.
     pub(super) fn out_of_reach(&self) -> (bool, bool) {
         let (reach_m, reach_rad) = self.reach();
         let truth = self.truth_offset();
-        let distance_m = truth.right_m.hypot(truth.forward_m);
         let yaw_deg = truth.yaw_rad.to_degrees();
         (
-            distance_m > reach_m + self.grid.coarse_step_m,
+            truth.distance_m() > reach_m + self.grid.coarse_step_m,
             yaw_deg.abs() > reach_rad.to_degrees() + self.grid.yaw_step_deg,
         )
     }
 
     fn is_reachable(&self, offset: &Offset) -> bool {
         let (reach_m, reach_rad) = self.reach();
-        offset.right_m.hypot(offset.forward_m) <= reach_m + 1e-9
-            && offset.yaw_rad.abs() <= reach_rad + 1e-9
+        offset.distance_m() <= reach_m + 1e-9 && offset.yaw_rad.abs() <= reach_rad + 1e-9
     }
 
     /// The reachable pose nearest to the truth.
     pub(super) fn nearest_reachable(&self) -> Offset {
         let (reach_m, reach_rad) = self.reach();
         let truth = self.truth_offset();
-        let shrink = (reach_m / truth.right_m.hypot(truth.forward_m)).min(1.0);
+        let shrink = (reach_m / truth.distance_m()).min(1.0);
         Offset {
             right_m: truth.right_m * shrink,
             forward_m: truth.forward_m * shrink,
@@ -233,9 +232,7 @@ impl<'a> Search<'a> {
         let within_m = self.subject.tolerance.translation_m;
         let within_rad = self.subject.tolerance.rotation_deg.to_radians();
         let is_near = |offset: &Offset| {
-            let (right, forward) =
-                (offset.right_m - centre.right_m, offset.forward_m - centre.forward_m);
-            right.hypot(forward) <= within_m
+            offset.distance_from(&centre) <= within_m
                 && (offset.yaw_rad - centre.yaw_rad).abs() <= within_rad
                 && self.is_reachable(offset)
         };
@@ -250,12 +247,9 @@ impl<'a> Search<'a> {
             .filter(is_near)
             .collect();
         let costs = self.costs(&lattice);
-        let best = lattice
-            .iter()
-            .zip(costs)
-            .filter_map(|(offset, cost)| Some(Place { offset: *offset, cost: cost? }))
-            .reduce(|best, next| if next.cost < best.cost { next } else { best });
-        let best = best.map(|place| place.offset);
+        let scored = lattice.iter().zip(costs);
+        let scored = scored.filter_map(|(&offset, cost)| Some(Place { offset, cost: cost? }));
+        let best = scored.reduce(Place::lower).map(|place| place.offset);
         let starts: Vec<Offset> =
             std::iter::once(centre).chain(best.filter(|best| *best != centre)).collect();
         self.lowest(&starts, &is_near)
@@ -270,10 +264,7 @@ impl<'a> Search<'a> {
     ) -> Option<Place> {
         let minima: Vec<Option<Place>> =
             starts.par_iter().map(|start| self.descended(*start, is_allowed)).collect();
-        minima
-            .into_iter()
-            .flatten()
-            .reduce(|best, next| if next.cost < best.cost { next } else { best })
+        minima.into_iter().flatten().reduce(Place::lower)
     }
 
     fn costs(&self, offsets: &[Offset]) -> Vec<Option<f64>> {
@@ -383,11 +374,11 @@ impl<'a> Search<'a> {
     pub(super) fn goes_on_outside(&self) -> bool {
         let beyond_m = 2.0 * self.grid.coarse_step_m;
         let (reach_m, _) = self.reach();
-        let distance = |offset: &Offset| offset.right_m.hypot(offset.forward_m);
-        let is_allowed = |offset: &Offset| distance(offset) <= reach_m + beyond_m;
+        let is_allowed = |offset: &Offset| offset.distance_m() <= reach_m + beyond_m;
         let minimum = self.descended(self.result, &is_allowed);
         minimum.zip(self.result_cost).is_some_and(|(minimum, cost)| {
-            let is_outside = distance(&minimum.offset) > self.subject.problem.uncertainty_radius_m
+            let is_outside = minimum.offset.distance_m()
+                > self.subject.problem.uncertainty_radius_m
                 || minimum.offset.yaw_rad.abs() > self.grid.yaw_range_deg.to_radians();
             let against = self.against_chance(&minimum.offset);
             let is_beyond = against.is_some_and(|against| against.deviations() >= BEYOND_CHANCE);

@@ -39,18 +39,9 @@ impl Direct {
     #[doc(hidden)]
     pub fn new(entry: &cost::Entry, params: &Params) -> Self {
         let setting = params.costs.of(entry).cloned();
-        let CostSetting { cost, search, .. } = setting.unwrap_or_else(|| CostSetting::new(entry));
+        let CostSetting { cost, search } = setting.unwrap_or_else(|| CostSetting::new(entry));
         let cost_key = key((entry.name, &cost));
-        Self {
-            method: Method::named(entry.name),
-            cost,
-            search,
-            render: params.render.clone(),
-            grid: params.grid.clone(),
-            descent: params.descent.clone(),
-            starts: ManyStarts::new(params),
-            cost_key,
-        }
+        Self { search, cost_key, ..Self::searching(entry.name, cost, params) }
     }
 
     /// The estimator of your own cost: it renders and searches the grid as PM and MI do, by
@@ -162,7 +153,7 @@ impl Direct {
         Ok((problem.world_from_query(&found.refined[0].pose), found.summary))
     }
 
-    /// Colours the cloud, and tells of it.
+    /// Colours the cloud, and emits it.
     pub(super) fn color(
         &self,
         problem: &Problem,
@@ -207,7 +198,7 @@ impl Direct {
 }
 
 impl Direct {
-    /// Scores a lattice, or recalls its scores from the query, and tells each in scan order.
+    /// Scores a lattice, or recalls its scores from the query, and passes them to `tell` in scan order.
     fn scored(
         &self,
         problem: &Problem,
@@ -314,7 +305,7 @@ struct Search<'a, 'cost> {
 }
 
 impl Search<'_, '_> {
-    /// Scores a lattice and tells its hypotheses, and the view of each that is the best so far.
+    /// Scores a lattice and emits its hypotheses, and the view of each that is the best so far.
     fn phase(
         &mut self,
         lattice: Lattice,

@@ -29,6 +29,14 @@ pub(super) fn entry() -> Entry {
 }
 
 impl FeatureBased {
+    /// The method of a family: `fb2`, or FB.
+    pub(crate) fn of(family: Family, params: &Params) -> Self {
+        match family {
+            Family::Guided => Self::guided(params),
+            _ => Self::new(params),
+        }
+    }
+
     /// `fb2` with these parameters.
     pub fn guided(params: &Params) -> Self {
         let guide = &params.fb2;

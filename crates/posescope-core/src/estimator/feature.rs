@@ -16,7 +16,6 @@ pub use self::lifted::projected_cloud;
 pub use self::matched::count_matches;
 pub(super) use self::matched::{Detected, Detector};
 pub use self::params::{DepthRule, FeatureParams};
-pub(super) use self::several::Gathered;
 use self::states::FeatureStates;
 use super::{Estimator, Failure, FeatureCounts, Halt, Outcome, separate_failure};
 use crate::depth::LiftedMatch;
@@ -41,7 +40,7 @@ pub(super) const MINIMUM: usize = 4;
 pub struct FeatureBased {
     pub(super) method: Method,
     pub(super) detector: Detector,
-    pub(super) params: FeatureParams,
+    pub(crate) params: FeatureParams,
     /// Which points lend their depth, where only visible ones do.
     pub(super) render: RenderParams,
     /// What the random samples are drawn for.

@@ -7,19 +7,21 @@
 
 mod direct;
 mod feature;
-mod hybrid;
 #[cfg(test)]
 mod tests;
 
-pub use direct::JointDirect;
-pub use feature::JointFeatures;
-pub use hybrid::JointHybrid;
+pub(super) use direct::JointDirect;
+pub(super) use feature::JointFeatures;
 
 use std::sync::Arc;
 
-use super::Failure;
+use super::{Failure, Halt, find, separate_failure};
+use crate::event::{ReferencesFused, Stage};
+use crate::fusion::JOINT;
 use crate::fusion::share::{Share, ShareOutcome, Support};
 use crate::geometry::{Pose, PoseError};
+use crate::method::Method;
+use crate::params::Params;
 use crate::problem::Problem;
 use crate::trace::{Cancelled, Trace};
 
@@ -29,72 +31,93 @@ const ELSEWHERE_M: f64 = 1.0;
 
 /// One of the references of a joint estimate.
 #[derive(Clone, Copy, Debug)]
-pub struct JointReference<'a> {
+pub(crate) struct JointReference<'a> {
     /// The query with this reference.
-    pub problem: &'a Problem,
+    pub(crate) problem: &'a Problem,
     /// Feature matches between both: ratio test and uniqueness passed.
-    pub matches: usize,
+    pub(crate) matches: usize,
     /// The pose that this reference alone gave, `world_from_camera`: where a search may start from too.
-    pub alone: Option<&'a Pose>,
+    pub(crate) alone: Option<&'a Pose>,
 }
 
-/// What several references have to say together.
-#[derive(Clone, Debug)]
-pub struct JointOutcome {
-    /// `world_from_camera` of the query, or why there is none.
-    pub pose: Result<Pose, Failure>,
-    /// What each reference has to do with it, in their order; nothing without a pose.
-    pub supports: Vec<Option<Support>>,
-}
+/// A pose of the query, `world_from_camera`, and what each reference has to do with it, in their order.
+pub(super) type JointPose = (Pose, Vec<Option<Support>>);
 
 /// A way to find the query's pose from several references at once.
-pub trait JointEstimator: Send + Sync {
+pub(crate) trait JointEstimator: Send + Sync {
     /// Localises the query against all of the references, of which there is at least one.
-    ///
-    /// # Errors
-    /// Only [`Cancelled`].
-    fn estimate(
+    fn agree(
         &self,
         references: &[JointReference<'_>],
         trace: &mut Trace<'_>,
-    ) -> Result<JointOutcome, Cancelled>;
+    ) -> Result<JointPose, Halt>;
 }
 
-impl JointOutcome {
-    /// No pose from so many references.
-    pub fn failed(failure: Failure, references: usize) -> Self {
-        Self { pose: Err(failure), supports: vec![None; references] }
-    }
+/// The pose that several references give together, and what each has to do with it, in their order.
+///
+/// A method that takes one reference at a time, or is in no registry, fails with [`Failure::NotJoint`].
+///
+/// # Errors
+/// Only [`Cancelled`].
+pub(crate) fn estimate_jointly(
+    method: Method,
+    params: &Params,
+    references: &[JointReference<'_>],
+    trace: &mut Trace<'_>,
+) -> Result<(Result<Pose, Failure>, Vec<Share>), Cancelled> {
+    trace.stage(Stage::Fuse, |trace| {
+        let agreed = match find(method).and_then(|entry| entry.make_joint(params)) {
+            _ if references.is_empty() => Err(Failure::NoReference { radius_m: None }),
+            None => Err(Failure::NotJoint { method }),
+            Some(estimator) => separate_failure(estimator.agree(references, trace))?,
+        };
+        let (pose, supports) = match agreed {
+            Ok((pose, supports)) => (Ok(pose), supports),
+            Err(failure) => (Err(failure), vec![None; references.len()]),
+        };
+        let found = pose.as_ref().ok().copied();
+        let shares = shares(found.as_ref(), &supports, references);
+        trace.emit(|| ReferencesFused {
+            fusion: JOINT,
+            shares: Arc::from(shares.as_slice()),
+            pose: found,
+        })?;
+        Ok((pose, shares))
+    })
+}
 
-    /// The share of each reference in the pose: as much of it as it supports.
-    ///
-    /// One that supports nothing of it is an outlier; so is one that alone puts the query elsewhere, but
-    /// what it has in common with the pose keeps its weight.
-    pub fn shares(&self, references: &[JointReference<'_>]) -> Vec<Share> {
-        let amount = |support: &Option<Support>| support.map_or(0.0, |support| support.amount());
-        let total: f64 = self.supports.iter().map(amount).sum();
-        references
-            .iter()
-            .zip(&self.supports)
-            .map(|(reference, support)| {
-                let weight = amount(support);
-                let outcome = match (&self.pose, reference.alone) {
-                    (Err(_), _) => ShareOutcome::Failed,
-                    (Ok(_), _) if weight <= 0.0 => ShareOutcome::Unsupportive,
-                    (Ok(pose), Some(alone)) if is_elsewhere(pose, alone) => ShareOutcome::Outvoted,
-                    (Ok(_), _) => ShareOutcome::Kept,
-                };
-                Share {
-                    reference: reference.problem.reference.name.clone(),
-                    matches: reference.matches,
-                    weight: if weight > 0.0 { weight / total } else { 0.0 },
-                    outcome,
-                    pose: reference.alone.copied(),
-                    support: *support,
-                }
-            })
-            .collect()
-    }
+/// The share of each reference in the pose: as much of it as it supports.
+///
+/// One that supports nothing of it is an outlier; so is one that alone puts the query elsewhere, but
+/// what it has in common with the pose keeps its weight.
+fn shares(
+    pose: Option<&Pose>,
+    supports: &[Option<Support>],
+    references: &[JointReference<'_>],
+) -> Vec<Share> {
+    let amount = |support: &Option<Support>| support.map_or(0.0, |support| support.amount());
+    let total: f64 = supports.iter().map(amount).sum();
+    references
+        .iter()
+        .zip(supports)
+        .map(|(reference, support)| {
+            let weight = amount(support);
+            let outcome = match (pose, reference.alone) {
+                (None, _) => ShareOutcome::Failed,
+                (Some(_), _) if weight <= 0.0 => ShareOutcome::Unsupportive,
+                (Some(pose), Some(alone)) if is_elsewhere(pose, alone) => ShareOutcome::Outvoted,
+                (Some(_), _) => ShareOutcome::Kept,
+            };
+            Share {
+                reference: reference.problem.reference.name.clone(),
+                matches: reference.matches,
+                weight: if weight > 0.0 { weight / total } else { 0.0 },
+                outcome,
+                pose: reference.alone.copied(),
+                support: *support,
+            }
+        })
+        .collect()
 }
 
 fn is_elsewhere(pose: &Pose, alone: &Pose) -> bool {

@@ -65,7 +65,7 @@ impl SixFreedoms {
         }
     }
 
-    /// The cost with photos that are so many times smaller.
+    /// The cost with photos that are `shrink` times smaller.
     pub(super) fn level(&self, problem: &Problem, shrink: u32) -> Level<'static> {
         self.starts.level(Judge::new(problem, &self.render, &self.judge, shrink))
     }
@@ -89,7 +89,7 @@ impl SixFreedoms {
         self.starts.search(problem, level, Some(&smaller), &compare, trace)
     }
 
-    /// The minimum below a pose from which no search started, or `None` where none is
+    /// The minimum that a pose leads to, though no search started there; `None` where there is none.
     pub fn basin_of(&self, problem: &Problem, reference_from_camera: &Pose) -> Option<Refined> {
         let (level, never) = (self.level(problem, 1), || Ok::<_, Infallible>(()));
         let Ok(refined) = self.starts.refined(problem, &level, *reference_from_camera, never);

@@ -308,7 +308,7 @@ impl Search<'_> {
         Ok(surface)
     }
 
-    /// Refines the starts and tells where they came; the least price is first.
+    /// Refines the starts and emits where they ended, the lowest price first.
     fn refine(
         &mut self,
         starts: &[Start],

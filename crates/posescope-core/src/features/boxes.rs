@@ -8,7 +8,7 @@ use super::integral::{IntegralImage, Span};
 
 /// Columns of the table that one row of boxes may span: 26 units of the scale of the largest filters of
 /// four octaves. A wider row takes its boxes one by one.
-const WIDEST: usize = 1024;
+const MAX_WIDTH: usize = 1024;
 
 /// The extents of the boxes of a grid along one axis.
 pub(super) struct Spans<const N: usize> {
@@ -19,7 +19,10 @@ pub(super) struct Spans<const N: usize> {
 }
 
 impl<const N: usize> Spans<N> {
-    /// Spans about each of the centres, as one alone would be made.
+    /// Spans of length `side` \[px\] about each of the centres, in an image of `extent` pixels along this axis.
+    ///
+    /// A span that would leave the image is moved back to its border: the image goes on as its outermost
+    /// pixels, without the edge that a black frame would add. `side` must not exceed `extent`.
     #[inline(always)]
     pub(super) fn new(centres: &[f32; N], side: f32, extent: usize) -> Self {
         let mut spans = Self { first: [0; N], last: [0; N], head: [0.0; N], tail: [0.0; N] };
@@ -53,14 +56,14 @@ impl<const N: usize> Spans<N> {
 pub(super) struct Strips {
     /// Sums of each column of the table's differences: over the upper cut pixels, the whole ones, the
     /// lower cut ones.
-    sums: [[u32; WIDEST]; 3],
+    sums: [[u32; MAX_WIDTH]; 3],
     /// What each single column of pixels counts.
-    columns: [f32; WIDEST],
+    columns: [f32; MAX_WIDTH],
 }
 
 impl Default for Strips {
     fn default() -> Self {
-        Self { sums: [[0; WIDEST]; 3], columns: [0.0; WIDEST] }
+        Self { sums: [[0; MAX_WIDTH]; 3], columns: [0.0; MAX_WIDTH] }
     }
 }
 
@@ -76,7 +79,7 @@ pub(super) fn aligned<const N: usize>(
     let mut boxes = [[0.0; N]; N];
     let left = columns.first[0] as usize;
     let width = columns.last[N - 1] as usize + 2 - left;
-    if width > WIDEST {
+    if width > MAX_WIDTH {
         for (row, boxes) in boxes.iter_mut().enumerate() {
             for (column, sum) in boxes.iter_mut().enumerate() {
                 *sum = integral.area(columns.span(column), rows.span(row));
@@ -92,9 +95,9 @@ pub(super) fn aligned<const N: usize>(
         let mut ends = [[0.0_f32; N]; 2];
         for i in 0..N {
             // Within the strips, as the compiler sees.
-            let first = (columns.first[i] as usize - left) % WIDEST;
-            let start = (columns.first[i] as usize + 1 - left) % WIDEST;
-            let end = (columns.last[i] as usize - left) % WIDEST;
+            let first = (columns.first[i] as usize - left) % MAX_WIDTH;
+            let start = (columns.first[i] as usize + 1 - left) % MAX_WIDTH;
+            let end = (columns.last[i] as usize - left) % MAX_WIDTH;
             inner[0][i] = upper[end].wrapping_sub(upper[start]);
             inner[1][i] = whole[end].wrapping_sub(whole[start]);
             inner[2][i] = lower[end].wrapping_sub(lower[start]);

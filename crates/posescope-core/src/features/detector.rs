@@ -18,7 +18,7 @@ use super::{Keypoint, SurfParams};
 const REACH: usize = 2;
 
 /// Largest lobe of a filter \[px\]: box sums of larger ones may exceed 31 bits in white images.
-const LARGEST_LOBE: usize = 741;
+const MAX_LOBE: usize = 741;
 
 /// Finds all blobs, upright, octave by octave. `checkpoint` is called before each octave.
 pub(super) fn detect<E>(
@@ -32,7 +32,7 @@ pub(super) fn detect<E>(
     let mut known = Known::default();
     // Without a third layer that fits into the image, an octave has no maxima.
     let useful = |&octave: &usize| {
-        3 * lobe(octave, 2) <= extent && lobe(octave, params.intervals) <= LARGEST_LOBE
+        3 * lobe(octave, 2) <= extent && lobe(octave, params.intervals) <= MAX_LOBE
     };
     for index in (0..params.octaves).take_while(useful) {
         checkpoint()?;

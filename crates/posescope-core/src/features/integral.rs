@@ -149,30 +149,24 @@ pub(super) struct Span {
     pub(super) tail: f32,
 }
 
-impl Span {
-    /// The span of length `side` \[px\] about `centre`, a pixel coordinate, in an image of `extent`
-    /// pixels along this axis.
-    ///
-    /// A span that would leave the image is moved back to its border: the image goes on as its
-    /// outermost pixels, without the edge that a black frame would add. `side` must not exceed
-    /// `extent`.
-    #[cfg(test)]
-    pub(super) fn new(centre: f32, side: f32, extent: usize) -> Self {
-        // Pixel centres are integers, so the image starts half a pixel before 0.
-        let room = (extent as f32 - side).max(0.0);
-        let start = (centre + 0.5 - 0.5 * side).max(0.0).min(room);
-        let end = start + side;
-        let first = (start as usize).min(extent - 1);
-        let last = (end as usize).min(extent - 1);
-        Self { first, head: 1.0 - (start - first as f32), last, tail: end - last as f32 }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use proptest::prelude::*;
 
     use super::*;
+
+    // What `Spans::new` must give for one centre alone.
+    impl Span {
+        pub(in crate::features) fn new(centre: f32, side: f32, extent: usize) -> Self {
+            // Pixel centres are integers, so the image starts half a pixel before 0.
+            let room = (extent as f32 - side).max(0.0);
+            let start = (centre + 0.5 - 0.5 * side).max(0.0).min(room);
+            let end = start + side;
+            let first = (start as usize).min(extent - 1);
+            let last = (end as usize).min(extent - 1);
+            Self { first, head: 1.0 - (start - first as f32), last, tail: end - last as f32 }
+        }
+    }
 
     fn image() -> impl Strategy<Value = GrayImage> {
         (1u32..12, 1u32..12).prop_flat_map(|(width, height)| {

@@ -28,10 +28,7 @@ impl ScoredLattice {
         if self.lattice.phase.is_yaw() {
             return None;
         }
-        let away = |cell: usize| {
-            let offset = self.lattice.offset(cell)?;
-            Some((offset.right_m - place.right_m).hypot(offset.forward_m - place.forward_m))
-        };
+        let away = |cell: usize| Some(self.lattice.offset(cell)?.distance_from(place));
         let minima = self.local_minima();
         let reach_m = STEPS_TO_MINIMUM * self.lattice.step;
         let nearest = minima

@@ -25,7 +25,7 @@ pub struct DenseSurface {
 
 impl DenseSurface {
     /// A surface without scores, of the positions within `radius_m` at `coarse_step` and the headings within
-    /// `yaw_range` at `yaw_step`. `least_covered` is how many pixels a hypothesis must cover to have a say.
+    /// `yaw_range` at `yaw_step`. An eligible hypothesis covers at least `least_covered` pixels.
     ///
     /// # Errors
     /// [`LatticeTooLarge`].
@@ -67,7 +67,7 @@ impl DenseSurface {
         self.tried >= self.hypotheses()
     }
 
-    /// The hypotheses that come next, at most so many, all with one heading; none where all are tried.
+    /// The hypotheses that come next, `at_most` of them, all with one heading; none where all are tried.
     pub fn next(&self, at_most: usize) -> Vec<Offset> {
         let of_a_heading = self.positions.len().max(1);
         let Some(&yaw_rad) = self.headings.get(self.tried / of_a_heading) else {

@@ -99,12 +99,10 @@ impl Lattice {
             offset.yaw_rad += along(column, self.columns);
             return Some(offset);
         }
-        let (right, forward) = (along(column, self.columns), along(row, self.rows));
-        offset.right_m += right;
-        offset.forward_m += forward;
+        offset.right_m += along(column, self.columns);
+        offset.forward_m += along(row, self.rows);
         // The disc is the reference's, wherever a later round has its centre.
-        let is_inside = offset.right_m.hypot(offset.forward_m) <= self.reach_m + 1e-9;
-        is_inside.then_some(offset)
+        (offset.distance_m() <= self.reach_m + 1e-9).then_some(offset)
     }
 
     /// The cells that are hypotheses, with their offsets, in scan order.

@@ -13,7 +13,7 @@ pub struct ScoredLattice {
     pub lattice: Lattice,
     /// One per cell; `None` where the cell is no hypothesis.
     pub scores: Vec<Option<Score>>,
-    /// Pixels that a hypothesis must cover to have a say.
+    /// Pixels that an eligible hypothesis covers at least.
     pub least_covered: u32,
 }
 
@@ -25,14 +25,9 @@ impl ScoredLattice {
 
     /// The cell of least cost; of equal ones the first in scan order.
     pub fn minimum(&self) -> Option<usize> {
-        self.minimum_with(self.least_covered)
-    }
-
-    /// What [`Self::minimum`] would be if a hypothesis had to cover `least_covered` pixels.
-    pub fn minimum_with(&self, least_covered: u32) -> Option<usize> {
         let mut best: Option<(usize, f64)> = None;
-        for (cell, score) in self.scores.iter().enumerate() {
-            if let Some(cost) = score.and_then(|score| score.eligible_cost(least_covered))
+        for cell in 0..self.scores.len() {
+            if let Some(cost) = self.eligible_cost(cell)
                 && best.is_none_or(|(_, least)| cost < least)
             {
                 best = Some((cell, cost));
@@ -56,17 +51,11 @@ impl ScoredLattice {
     ///
     /// A cell at the rim of the lattice counts: it may be the foot of a basin outside.
     pub fn local_minima(&self) -> Vec<(usize, f64)> {
-        self.local_minima_with(self.least_covered)
-    }
-
-    /// What [`Self::local_minima`] would be if a hypothesis had to cover `least_covered` pixels.
-    pub fn local_minima_with(&self, least_covered: u32) -> Vec<(usize, f64)> {
-        let eligible_cost = |cell: usize| self.scores[cell]?.eligible_cost(least_covered);
         let mut minima: Vec<(usize, f64)> = (0..self.scores.len())
-            .filter_map(|cell| Some((cell, eligible_cost(cell)?)))
+            .filter_map(|cell| Some((cell, self.eligible_cost(cell)?)))
             .filter(|&(cell, cost)| {
                 self.neighbours(cell).all(|neighbour| {
-                    eligible_cost(neighbour)
+                    self.eligible_cost(neighbour)
                         .is_none_or(|other| cost < other || (cost == other && cell < neighbour))
                 })
             })
@@ -163,18 +152,19 @@ mod tests {
             let costs = surface.scores.iter().map(may_win);
             let least = costs.clone().flatten().min_by(f64::total_cmp);
             let first = costs.clone().position(|cost| cost.is_some() && cost == least);
-            prop_assert_eq!(surface.minimum_with(floor), first);
-            let ranked = surface.local_minima_with(floor);
+            let surface = ScoredLattice { least_covered: floor, ..surface };
+            prop_assert_eq!(surface.minimum(), first);
+            let ranked = surface.local_minima();
             prop_assert_eq!(ranked.first().map(|minimum| minimum.0), first);
         }
 
         #[test]
-        fn the_own_floor_gives_the_own_minimum_and_a_higher_one_never_a_lower_cost(
+        fn a_higher_floor_never_gives_a_lower_cost(
             surface in any_surface(), floor in 0_u32..45, raised_by in 0_u32..45,
         ) {
-            prop_assert_eq!(surface.minimum_with(surface.least_covered), surface.minimum());
             let cost = |floor| {
-                let cell: usize = surface.minimum_with(floor)?;
+                let surface = ScoredLattice { least_covered: floor, ..surface.clone() };
+                let cell: usize = surface.minimum()?;
                 surface.scores[cell]?.cost
             };
             let (low, high) = (cost(floor), cost(floor + raised_by));

@@ -15,31 +15,22 @@ const MAX_DEVIATIONS: f32 = 2.5;
 const MIN_DEVIATION: f32 = 4.0;
 
 /// The gradient at which edges are as strong as they go \[grey value per px\].
-const STRONGEST_EDGE: f32 = 60.0;
+const MAX_EDGE: f32 = 60.0;
 
 /// The side of the squares whose means stand for the surroundings \[px\]: means over 20 px need no more.
 const SQUARE: u32 = 4;
 
-/// The channels of one photo, each 0 … 255.
-#[derive(Clone, Debug)]
-pub struct ChannelImages(pub [FloatImage; 3]);
-
-impl ChannelImages {
-    /// The channels of a photo that is smoothed by a Gaussian of `sigma` \[px\] first.
-    pub fn of(photo: &GrayImage, sigma: f64, params: &JudgeParams) -> Self {
-        let smoothed = gaussian_smoothed(photo, sigma);
-        let contrast = local_contrast(photo, &smoothed, params.contrast_sigma_px);
-        let edges = edges(&gaussian_smoothed(photo, params.edge_sigma_px));
-        Self([smoothed, contrast, edges])
-    }
-
-    /// The value of a channel between the pixels, linearly; beyond the border that of the nearest pixel.
-    pub fn value(&self, channel: usize, x: f32, y: f32) -> f32 {
-        linear(&self.0[channel], x, y)
-    }
+/// The channels of one photo, each 0 … 255: the grey values smoothed by a Gaussian of `sigma` \[px\], their
+/// contrast, and edges.
+pub fn channel_images(photo: &GrayImage, sigma: f64, params: &JudgeParams) -> [FloatImage; 3] {
+    let smoothed = gaussian_smoothed(photo, sigma);
+    let contrast = local_contrast(photo, &smoothed, params.contrast_sigma_px);
+    let edges = edges(&gaussian_smoothed(photo, params.edge_sigma_px));
+    [smoothed, contrast, edges]
 }
 
-fn linear(image: &FloatImage, x: f32, y: f32) -> f32 {
+/// The value between the pixels, linearly; beyond the border that of the nearest pixel.
+pub fn linear(image: &FloatImage, x: f32, y: f32) -> f32 {
     let (last_x, last_y) = ((image.width() - 1) as f32, (image.height() - 1) as f32);
     let (x, y) = (x.clamp(0.0, last_x), y.clamp(0.0, last_y));
     let (left, top) = (x.floor(), y.floor());
@@ -92,12 +83,12 @@ fn surroundings(photo: &GrayImage, sigma: f64) -> (FloatImage, FloatImage) {
 /// The logarithm of the gradient's magnitude, by central differences.
 fn edges(smoothed: &FloatImage) -> FloatImage {
     let (width, height) = smoothed.dimensions();
-    let strongest = (1.0 + STRONGEST_EDGE).ln();
+    let max_log = (1.0 + MAX_EDGE).ln();
     FloatImage::from_fn(width, height, |x, y| {
         let at = |x: u32, y: u32| smoothed.get_pixel(x, y).0[0];
         let along = at((x + 1).min(width - 1), y) - at(x.saturating_sub(1), y);
         let down = at(x, (y + 1).min(height - 1)) - at(x, y.saturating_sub(1));
         let magnitude = 0.5 * along.hypot(down);
-        Luma([(255.0 * (1.0 + magnitude).ln() / strongest).min(255.0)])
+        Luma([(255.0 * (1.0 + magnitude).ln() / max_log).min(255.0)])
     })
 }

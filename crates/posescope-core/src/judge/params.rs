@@ -1,8 +1,8 @@
-//! What the judge is told.
+//! Parameters of the judge.
 
 use crate::describe::{choice, parameters};
 
-/// Which channels have a say.
+/// Which channels the cost is the mean of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Channels {
     /// The grey value.
@@ -23,7 +23,7 @@ choice!(Channels:
 );
 
 impl Channels {
-    /// The places of those that have a say, in the order of [`super::CHANNELS`].
+    /// Their places among all, in this order.
     pub(super) fn places(self) -> std::ops::Range<usize> {
         match self {
             Self::Intensity => 0..1,

@@ -8,7 +8,7 @@ use rand::seq::SliceRandom as _;
 use rand_pcg::Pcg64;
 
 use super::chance::corrected_distance;
-use super::channels::ChannelImages;
+use super::channels::{channel_images, linear};
 use super::params::{Channels, JudgeParams};
 use crate::camera::Intrinsics;
 use crate::cost::{Pair, byte_bin};
@@ -105,26 +105,18 @@ impl Objective for Judge {
     }
 }
 
-/// The mean cost of the channels over the pairs.
+/// The mean cost of the channels over the pairs. A channel that is constant tells nothing, which costs 1;
+/// where all are, there is no cost.
 fn cost_of(pairs: &[Pair<Bins>], params: &JudgeParams, counts: &mut Vec<u32>) -> Option<f64> {
     let &JudgeParams { bins, channels, corrected, .. } = params;
     count(pairs, bins, channels, counts);
-    let cells = bins * bins;
-    let mut costs = [None; 3];
-    for place in channels.places() {
-        let counts = &counts[place * cells..][..cells];
-        costs[place] = corrected_distance(counts, bins, corrected);
+    let (places, mut sum, mut is_any) = (channels.places(), 0.0, false);
+    for counts in counts.chunks(bins * bins).skip(places.start).take(places.len()) {
+        let cost = corrected_distance(counts, bins, corrected);
+        is_any |= cost.is_some();
+        sum += cost.unwrap_or(1.0);
     }
-    mean(&costs[channels.places()])
-}
-
-/// The mean of the costs. A channel that is constant tells nothing, which costs 1; where all are, there
-/// is no cost.
-fn mean(costs: &[Option<f64>]) -> Option<f64> {
-    costs.iter().any(Option::is_some).then(|| {
-        let sum: f64 = costs.iter().map(|cost| cost.unwrap_or(1.0)).sum();
-        sum / costs.len() as f64
-    })
+    is_any.then(|| sum / places.len() as f64)
 }
 
 /// Counts the pairs of each channel in a joint histogram of its own.
@@ -156,13 +148,9 @@ fn binned(values: [f32; 3], bins: usize) -> Bins {
 
 fn query_bins(photo: &GrayImage, params: &JudgeParams, shrink: u32) -> Vec<Bins> {
     let (photo, params) = shrunk(photo, params, shrink);
-    let ChannelImages([intensity, contrast, edges]) =
-        ChannelImages::of(&photo, params.sigma_px, &params);
-    let values = intensity.as_raw().iter().zip(contrast.as_raw());
-    let values = values.zip(edges.as_raw());
-    let bins = values
-        .map(|((&intensity, &contrast), &edges)| binned([intensity, contrast, edges], params.bins));
-    bins.collect()
+    let [grey, contrast, edges] = channel_images(&photo, params.sigma_px, &params);
+    let values = grey.as_raw().iter().zip(contrast.as_raw()).zip(edges.as_raw());
+    values.map(|((&grey, &contrast), &edge)| binned([grey, contrast, edge], params.bins)).collect()
 }
 
 fn reference_points(
@@ -175,19 +163,18 @@ fn reference_points(
     let photo = &reference.photo.gray;
     let (photo, params) = shrunk(photo, params, shrink);
     let camera = shrunk_camera(&reference.intrinsics, shrink);
-    let channels = ChannelImages::of(&photo, params.reference_sigma_px, &params);
+    let [grey, contrast, edges] = channel_images(&photo, params.reference_sigma_px, &params);
     // A view that is smaller is covered by fewer points.
     let visible = reference.visible_cloud(render);
     let points: Vec<Point3<f32>> = visible.positions().step_by(shrink as usize).collect();
     let bins = points.iter().map(|point| {
         let pixel = camera.project(&point.cast()).unwrap_or_default();
         let (x, y) = (pixel.x as f32, pixel.y as f32);
-        let intensity = match shrink {
+        let grey = match shrink {
             1 if params.reference_sigma_px == 0.0 => cubic_interpolated(&photo, x, y),
-            _ => channels.value(0, x, y),
+            _ => linear(&grey, x, y),
         };
-        let values = [intensity, channels.value(1, x, y), channels.value(2, x, y)];
-        binned(values, params.bins)
+        binned([grey, linear(&contrast, x, y), linear(&edges, x, y)], params.bins)
     });
     ShownPoints { values: bins.collect(), positions: PointArrays::new(points.iter().copied()) }
 }

@@ -21,6 +21,7 @@ use crate::estimator::{self, Estimator, Failure, Given, Hybrid, Outcome, hybrid_
 use crate::event::KindSet;
 use crate::foreign::Foreign;
 use crate::fusion::Fusion;
+use crate::geometry::Pose;
 use crate::method::Method;
 use crate::params::Params;
 use crate::problem::Problem;
@@ -119,11 +120,6 @@ impl<'a> Localizer<'a> {
     /// The parameters.
     pub fn params(&self) -> &Params {
         self.params
-    }
-
-    /// When a pose is right.
-    pub fn tolerance(&self) -> Tolerance {
-        self.tolerance
     }
 
     /// The same localizer, which localises a query that went wrong again, at most so often for each
@@ -266,7 +262,7 @@ impl<'a> Localizer<'a> {
                     let lines =
                         if request.fusions.is_empty() { vec![None] } else { fusions.collect() };
                     for fusion in lines {
-                        let result = self.without_pose(work, method, fusion, &failure);
+                        let result = self.of_pose(work, method, fusion, Err(&failure));
                         let result = self.with_ranking_judged(result, request, work.truth.as_ref());
                         emit(result, StageTimes::default(), request.clone())?;
                     }
@@ -324,12 +320,13 @@ impl<'a> Localizer<'a> {
         }
     }
 
-    fn without_pose(
+    /// A result of the query with what follows from its pose alone.
+    fn of_pose(
         &self,
         work: &QueryWork<'_>,
         method: Method,
         fusion: Option<Fusion>,
-        failure: &Failure,
+        pose: Result<&Pose, &Failure>,
     ) -> QueryResult {
         QueryResult {
             fusion,
@@ -338,7 +335,7 @@ impl<'a> Localizer<'a> {
                 &work.query.name,
                 method,
                 self.seed,
-                Err(failure),
+                pose,
                 work.truth.as_ref(),
                 self.tolerance,
             )

@@ -269,17 +269,8 @@ fn costs_at(subject: &Subject<'_>, pose: &Pose) -> Vec<CostAtPose> {
     costs
 }
 
-/// Measures an outcome against the true pose, where it is known, and assesses it.
-pub fn evaluate(scene: &str, subject: &Subject<'_>) -> QueryResult {
-    evaluate_as(scene, subject, Assessment::of(subject))
-}
-
-/// As [`evaluate`], with an assessment that is known.
-pub(super) fn evaluate_as(
-    scene: &str,
-    subject: &Subject<'_>,
-    assessment: Assessment,
-) -> QueryResult {
+/// Measures an outcome against the true pose, where it is known; `assessment` is that of the subject.
+pub fn evaluate(scene: &str, subject: &Subject<'_>, assessment: Assessment) -> QueryResult {
     let Subject { problem, method, outcome, truth, .. } = *subject;
     let cost_at_truth = truth.filter(|_| outcome.cost.is_some()).and_then(|truth_pose| {
         let estimator = estimator::find(method)?.make(subject.params);

@@ -4,8 +4,8 @@ use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use crate::diagnosis::{Evidence, Subject, confidence};
-use crate::estimator::{self, Estimator, Failure, JointReference, Outcome};
-use crate::fusion::{Share, fuse_jointly};
+use crate::estimator::{self, Estimator, Failure, JointReference, Outcome, estimate_jointly};
+use crate::fusion::Share;
 use crate::geometry::Pose;
 use crate::method::Method;
 use crate::params::Params;
@@ -71,11 +71,8 @@ pub fn localize_by(
     problem: &Problem,
     trace: &mut Trace<'_>,
 ) -> Result<Outcome, Cancelled> {
-    let estimated = catch_unwind(AssertUnwindSafe(|| estimator.estimate(problem, trace)));
-    estimated.unwrap_or_else(|panic| {
-        let message = words_of(panic.as_ref());
-        Ok(Outcome::failed(Failure::Internal { message }))
-    })
+    caught(|| estimator.estimate(problem, trace))
+        .unwrap_or_else(|failure| Ok(Outcome::failed(failure)))
 }
 
 /// Localises one query against several references at once. Returns the share of each in the pose too. A
@@ -84,17 +81,20 @@ pub fn localize_by(
 ///
 /// # Errors
 /// [`Cancelled`] when a sink asks the run to stop.
-pub fn localize_jointly(
+pub(super) fn localize_jointly(
     references: &[JointReference<'_>],
     method: Method,
     params: &Params,
     trace: &mut Trace<'_>,
 ) -> Result<(Result<Pose, Failure>, Vec<Share>), Cancelled> {
-    let fused = catch_unwind(AssertUnwindSafe(|| fuse_jointly(method, params, references, trace)));
-    fused.unwrap_or_else(|panic| {
-        let message = words_of(panic.as_ref());
-        Ok((Err(Failure::Internal { message }), Vec::new()))
-    })
+    caught(|| estimate_jointly(method, params, references, trace))
+        .unwrap_or_else(|failure| Ok((Err(failure), Vec::new())))
+}
+
+/// What is returned, or the failure that a panic is.
+fn caught<T>(body: impl FnOnce() -> T) -> Result<T, Failure> {
+    catch_unwind(AssertUnwindSafe(body))
+        .map_err(|panic| Failure::Internal { message: words_of(panic.as_ref()) })
 }
 
 /// What a panic said, on one line.

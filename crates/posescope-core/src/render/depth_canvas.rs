@@ -102,7 +102,7 @@ impl<K: Copy + Default> DepthCanvas<K> {
     fn draw_points<T: Copy>(&mut self, values: Values<'_, T>, keep: impl Fn(T, T) -> K) -> usize {
         let Projected { pixels, depths, .. } = &self.projected;
         let nearest = &mut self.nearest[..values.query.len()];
-        // Of the same length to whoever compiles this, too.
+        // So that the compiler knows that both have the same length.
         let query = &values.query[..nearest.len()];
         for (&pixel, &depth) in pixels.iter().zip(depths) {
             if let Some(there) = nearest.get_mut(pixel as usize) {
@@ -199,8 +199,8 @@ fn row_and_column(corner: u32) -> (usize, usize) {
     (row as usize, column as usize)
 }
 
-/// Puts a depth into a square at the beginning of `there`, of so many pixels, with so many from one row to the
-/// next.
+/// Puts a depth into a square at the beginning of `there`, with `side` and, from one row to the next, `stride`
+/// \[px\].
 #[inline(always)]
 fn put_square<S: Simd, const SIDE: usize>(
     simd: S,

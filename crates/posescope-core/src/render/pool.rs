@@ -11,7 +11,7 @@ use crate::geometry::Pose;
 pub const MAX_AT_A_TIME: usize = 256;
 
 /// Hypotheses that a thread scores between two checkpoints. Of a street photo of 1241 × 376 px one
-/// takes some 50 µs, so that whoever wants to stop waits a few milliseconds.
+/// takes some 50 µs, so that stopping takes a few milliseconds.
 const PER_THREAD: usize = 64;
 
 /// Hypotheses that a thread takes at once. At the end of a batch the others wait for the last job: with 4 of

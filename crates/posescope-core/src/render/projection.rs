@@ -7,7 +7,7 @@ use crate::camera::Intrinsics;
 use crate::geometry::Pose;
 
 /// Nearer points are not seen \[m\].
-const NEAREST_M: f32 = 0.1;
+const MIN_DEPTH_M: f32 = 0.1;
 
 /// A projection of single precision: for a point p, `row · (p, 1)` is column times depth, row times depth,
 /// and depth \[px·m, px·m, m\].
@@ -77,7 +77,7 @@ impl Projection {
         let p = &point.position;
         let along = |row: &[f32; 4]| row[0] * p.x + row[1] * p.y + row[2] * p.z + row[3];
         let depth = along(&self.rows[2]);
-        if !(depth > NEAREST_M && depth < f32::INFINITY) {
+        if !(depth > MIN_DEPTH_M && depth < f32::INFINITY) {
             return None;
         }
         let inverse = depth.recip();
@@ -146,7 +146,7 @@ impl<S: Simd> ProjectionOfEight<S> {
         let inverse = f32x8::splat(simd, 1.0) / depth;
         let column = ((turned[0] + self.added[0]) * inverse + 0.5).floor();
         let row = ((turned[1] + self.added[1]) * inverse + 0.5).floor();
-        let in_view = depth.simd_gt(NEAREST_M)
+        let in_view = depth.simd_gt(MIN_DEPTH_M)
             & depth.simd_lt(f32::INFINITY)
             & column.simd_ge(self.first)
             & row.simd_ge(self.first)

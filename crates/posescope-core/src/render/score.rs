@@ -24,7 +24,7 @@ pub trait Objective: Sync {
     /// The scores of many cameras `reference_from_camera`, in their order.
     fn score(&self, reference_from_camera: &[Pose]) -> Vec<Score>;
 
-    /// How many of so many hypotheses to score at a time, so that a run can be stopped soon.
+    /// The batch size for a number of hypotheses, small enough that a run can be stopped soon.
     fn batch(&self, hypotheses: usize) -> usize;
 
     /// The cost at a pose if the view's pixels had nothing to do with the query's: what a minimum must beat to

@@ -13,7 +13,7 @@ use rayon::prelude::*;
 use xxhash_rust::xxh3::xxh3_64;
 
 use super::error::BuildError;
-use super::layout::{Description, IndexWriter, IndexedFeature, RecordCounts};
+use super::layout::{Description, IndexWriter, RecordCounts};
 use super::tf_idf::InvertedIndexBuilder;
 use super::vocabulary::{Clustering, Vocabulary};
 use crate::features::{Descriptor, Features};
@@ -192,19 +192,15 @@ fn write(
     for done in 0..counts.documents {
         let (places, descriptors) = waiting.next(done)?;
         let words = vocabulary.quantize(&descriptors);
-        let mut features: Vec<IndexedFeature> = words
-            .iter()
-            .zip(&places)
-            .filter_map(|(word, &[x, y, scale, angle])| {
-                Some(IndexedFeature { word: (*word)?, x, y, scale, angle })
-            })
-            .collect();
+        let features = words.into_iter().zip(places);
+        let mut features: Vec<(u32, [f32; 4])> =
+            features.filter_map(|(word, place)| Some((word?, place))).collect();
         // Stable: of one word, the strongest stays first.
-        features.sort_by_key(|feature| feature.word);
-        for feature in &features {
-            writer.feature(feature)?;
+        features.sort_by_key(|(word, _)| *word);
+        for (word, place) in &features {
+            writer.record([*word].into_iter().chain(place.map(f32::to_bits)))?;
         }
-        let words: Vec<u32> = features.iter().map(|feature| feature.word).collect();
+        let words: Vec<u32> = features.iter().map(|(word, _)| *word).collect();
         occurrences.push(&words);
         counts.features += features.len();
         starts.push(number(counts.features)?);
@@ -212,19 +208,19 @@ fn write(
     }
     let frames = request.frames.iter().copied().chain([0]);
     for (frame, start) in frames.zip(starts) {
-        writer.pair(number(frame)?, start.to_le_bytes())?;
+        writer.record([number(frame)?, start])?;
     }
     for word in vocabulary.words() {
-        writer.word(word)?;
+        writer.record(word.map(f32::to_bits))?;
     }
     let inverted = occurrences.weighted();
     for (list, idf) in inverted.lists.iter().zip(&inverted.idf) {
-        writer.pair(number(counts.postings)?, idf.to_le_bytes())?;
+        writer.record([number(counts.postings)?, idf.to_bits()])?;
         counts.postings += list.len();
     }
-    writer.pair(number(counts.postings)?, 0_f32.to_le_bytes())?;
+    writer.record([number(counts.postings)?, 0])?;
     for (document, weight) in inverted.lists.iter().flatten() {
-        writer.pair(*document, weight.to_le_bytes())?;
+        writer.record([*document, weight.to_bits()])?;
     }
     writer.finish(&Description {
         scene: request.scene.clone(),

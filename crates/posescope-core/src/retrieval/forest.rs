@@ -22,7 +22,7 @@ const VARIANCE_SAMPLE: usize = 100;
 
 /// Points of a leaf at most. Comparing a few more points takes less time than walking to them one by
 /// one: a walk goes through memory, a comparison through 256 bytes in a row.
-const LEAF: usize = 12;
+const MAX_LEAF: usize = 12;
 
 /// Several trees over the same points, which the forest does not keep.
 pub struct Forest {
@@ -44,15 +44,6 @@ enum Node {
         children: [u32; 2],
     },
     Leaf(Range<u32>),
-}
-
-/// A point and its squared distance from the query.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Nearest {
-    /// Index of the point.
-    pub index: usize,
-    /// Squared Euclidean distance.
-    pub squared_distance: f32,
 }
 
 /// Memory of a search, kept between searches to spare allocations.
@@ -80,16 +71,16 @@ impl Forest {
         Self { trees, points: points.len() }
     }
 
-    /// The nearest of the points that the forest was made from: best bin first over all trees
-    /// together, until `checks` points were compared. With as many checks as points it is exact.
-    /// `None` where there is no point at a finite distance.
+    /// The nearest of the points that the forest was made from, and its squared distance: best bin first
+    /// over all trees together, until `checks` points were compared. With as many checks as points it is
+    /// exact. `None` where there is no point at a finite distance.
     pub fn nearest(
         &self,
         points: &[Descriptor],
         query: &Descriptor,
         checks: usize,
         scratch: &mut Scratch,
-    ) -> Option<Nearest> {
+    ) -> Option<(u32, f32)> {
         scratch.begin(self.points);
         let mut search = Search { points, query, scratch, best: None, checks_left: checks.max(1) };
         for (number, tree) in self.trees.iter().enumerate() {
@@ -119,7 +110,7 @@ struct Search<'a> {
     points: &'a [Descriptor],
     query: &'a Descriptor,
     scratch: &'a mut Scratch,
-    best: Option<Nearest>,
+    best: Option<(u32, f32)>,
     checks_left: usize,
 }
 
@@ -138,7 +129,7 @@ impl Search<'_> {
                 }
                 Node::Leaf(range) => {
                     for &index in &tree.order[range.start as usize..range.end as usize] {
-                        self.compare(index as usize);
+                        self.compare(index);
                     }
                     return;
                 }
@@ -146,17 +137,17 @@ impl Search<'_> {
         }
     }
 
-    fn compare(&mut self, index: usize) {
-        let seen = &mut self.scratch.seen[index];
+    fn compare(&mut self, index: u32) {
+        let seen = &mut self.scratch.seen[index as usize];
         if *seen == self.scratch.search || self.checks_left == 0 {
             return;
         }
         *seen = self.scratch.search;
         self.checks_left -= 1;
-        let squared_distance = squared_distance(self.query, &self.points[index]);
-        let least = self.best.map_or(f32::INFINITY, |best| best.squared_distance);
+        let squared_distance = squared_distance(self.query, &self.points[index as usize]);
+        let least = self.best.map_or(f32::INFINITY, |(_, least)| least);
         if squared_distance < least {
-            self.best = Some(Nearest { index, squared_distance });
+            self.best = Some((index, squared_distance));
         }
     }
 }
@@ -199,7 +190,7 @@ impl Tree {
 
 /// A dimension in which the points vary, and their mean there; `None` for points that are equal.
 fn split(points: &[Descriptor], members: &[u32], rng: &mut Pcg64) -> Option<(usize, f32)> {
-    if members.len() <= LEAF {
+    if members.len() <= MAX_LEAF {
         return None;
     }
     let sample = &members[..members.len().min(VARIANCE_SAMPLE)];
@@ -264,7 +255,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::retrieval::synthetic::random_descriptors;
+    use crate::retrieval::tests::random_descriptors;
 
     fn exact(points: &[Descriptor], query: &Descriptor) -> f32 {
         let distances = points.iter().map(|point| squared_distance(point, query));
@@ -295,7 +286,7 @@ mod tests {
             }
             let found = forest.nearest(&points, &query, 64, &mut scratch);
             let found = found.expect("there are points");
-            hits += usize::from(found.squared_distance == exact(&points, &query));
+            hits += usize::from(found.1 == exact(&points, &query));
         }
         assert!(hits >= 475, "{hits} of 500");
     }
@@ -308,7 +299,7 @@ mod tests {
         let points = [[0.5; 64]; 300];
         let forest = Forest::new(&points, 3, 0);
         let found = forest.nearest(&points, &[0.5; 64], 10, &mut scratch);
-        assert_eq!(found.map(|found| found.squared_distance), Some(0.0));
+        assert_eq!(found.map(|found| found.1), Some(0.0));
         let unknown = [f32::NAN; 64];
         assert_eq!(forest.nearest(&points, &unknown, 300, &mut scratch), None);
     }
@@ -324,7 +315,7 @@ mod tests {
             let mut scratch = Scratch::default();
             for query in &queries {
                 let found = forest.nearest(&points, query, count, &mut scratch);
-                let found = found.map(|found| found.squared_distance);
+                let found = found.map(|found| found.1);
                 prop_assert_eq!(found, Some(exact(&points, query)));
             }
         }

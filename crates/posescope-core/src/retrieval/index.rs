@@ -155,12 +155,11 @@ impl Index {
         let sorted: Vec<u32> = by_word.iter().map(|(word, _)| *word).collect();
         let mut scored = self.scored(&sorted, allowed);
         scored.sort_unstable_by(|a, b| (b.1.total_cmp(&a.1)).then(a.0.cmp(&b.0)));
-        let tolerance = params.tolerance();
         let verified: Vec<Geometry> = scored
             .par_iter()
             .take(params.verify)
             .map(|&(document, _)| {
-                let found = verify(&self.pairs(features, &by_word, document), &tolerance);
+                let found = verify(&self.pairs(features, &by_word, document), params);
                 found.map_or(Geometry::Refused, Geometry::Verified)
             })
             .collect();
@@ -205,22 +204,22 @@ impl Index {
         document: usize,
     ) -> Vec<WordMatch> {
         let theirs: Vec<_> = self.stored.features(document).collect();
-        let mut theirs = theirs.chunk_by(|a, b| a.word == b.word).peekable();
+        let mut theirs = theirs.chunk_by(|a, b| a.0 == b.0).peekable();
         let mut pairs = Vec::new();
         for ours in by_word.chunk_by(|a, b| a.0 == b.0) {
             let word = ours[0].0;
-            while theirs.next_if(|run| run[0].word < word).is_some() {}
-            let Some(run) = theirs.next_if(|run| run[0].word == word) else {
+            while theirs.next_if(|run| run[0].0 < word).is_some() {}
+            let Some(run) = theirs.next_if(|run| run[0].0 == word) else {
                 continue;
             };
             if ours.len() * run.len() > PAIRS_PER_WORD {
                 continue;
             }
             for &(_, query) in ours {
-                pairs.extend(run.iter().map(|feature| WordMatch {
+                pairs.extend(run.iter().map(|&(_, reference_keypoint)| WordMatch {
                     query,
                     query_keypoint: features.keypoints[query as usize],
-                    reference_keypoint: feature.keypoint(),
+                    reference_keypoint,
                 }));
             }
         }

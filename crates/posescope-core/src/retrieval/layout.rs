@@ -29,11 +29,10 @@ const LAYOUT: u8 = 1;
 const KIND: [u8; 7] = *b"PSINDEX";
 const MAGIC: usize = 8;
 const FOOTER: usize = 16;
-const FEATURE: usize = 20;
-const DOCUMENT: usize = 8;
-const WORD: usize = size_of::<Descriptor>();
-const LIST: usize = 8;
-const POSTING: usize = 8;
+/// Numbers of a record, each of 32 bits.
+const FEATURE: usize = 5;
+const PAIR: usize = 2;
+const WORD: usize = 64;
 /// Bytes read at a time to check them.
 const BLOCK: usize = 1 << 20;
 
@@ -67,35 +66,6 @@ pub struct RecordCounts {
     pub postings: usize,
 }
 
-/// A feature of an indexed frame.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct IndexedFeature {
-    /// The visual word of the feature.
-    pub word: u32,
-    /// The column of its keypoint \[px\].
-    pub x: f32,
-    /// The row of its keypoint \[px\].
-    pub y: f32,
-    /// See [`Keypoint::scale`].
-    pub scale: f32,
-    /// See [`Keypoint::angle`].
-    pub angle: f32,
-}
-
-impl IndexedFeature {
-    /// What is known of the feature.
-    pub fn keypoint(&self) -> Keypoint {
-        Keypoint {
-            x: self.x,
-            y: self.y,
-            scale: self.scale,
-            angle: self.angle,
-            response: 0.0,
-            laplacian_positive: false,
-        }
-    }
-}
-
 /// Writes an index from front to back and sums it up.
 pub struct IndexWriter<W> {
     out: W,
@@ -116,24 +86,9 @@ impl<W: Write> IndexWriter<W> {
         self.out.write_all(bytes)
     }
 
-    /// A record of two numbers.
-    pub fn pair(&mut self, first: u32, second: [u8; 4]) -> io::Result<()> {
-        let mut record = [0; 8];
-        record[..4].copy_from_slice(&first.to_le_bytes());
-        record[4..].copy_from_slice(&second);
-        self.bytes(&record)
-    }
-
-    /// Writes a feature.
-    pub fn feature(&mut self, feature: &IndexedFeature) -> io::Result<()> {
-        let IndexedFeature { word, x, y, scale, angle } = *feature;
-        self.bytes(&word.to_le_bytes())?;
-        [x, y, scale, angle].iter().try_for_each(|number| self.bytes(&number.to_le_bytes()))
-    }
-
-    /// Writes a visual word.
-    pub fn word(&mut self, word: &Descriptor) -> io::Result<()> {
-        word.iter().try_for_each(|number| self.bytes(&number.to_le_bytes()))
+    /// Writes a record.
+    pub fn record(&mut self, numbers: impl IntoIterator<Item = u32>) -> io::Result<()> {
+        numbers.into_iter().try_for_each(|number| self.bytes(&number.to_le_bytes()))
     }
 
     /// Ends with the description and the footer.
@@ -210,36 +165,30 @@ impl MappedIndex {
             serde_json::from_slice(map.get(text_start..text_end)?).ok()?;
         let counts = description.counts;
         let mut at = MAGIC;
-        let mut part = |records: usize, size: usize| {
+        let mut part = |records: usize, numbers: usize| {
             let start = at;
-            at = at.checked_add(records.checked_mul(size)?)?;
+            at = at.checked_add(records.checked_mul(numbers * size_of::<u32>())?)?;
             Some(start..at)
         };
         let stored = Self {
             features: part(counts.features, FEATURE)?,
-            documents: part(counts.documents.checked_add(1)?, DOCUMENT)?,
+            documents: part(counts.documents.checked_add(1)?, PAIR)?,
             words: part(counts.words, WORD)?,
-            lists: part(counts.words.checked_add(1)?, LIST)?,
-            postings: part(counts.postings, POSTING)?,
+            lists: part(counts.words.checked_add(1)?, PAIR)?,
+            postings: part(counts.postings, PAIR)?,
             map,
             description,
         };
         if stored.postings.end != text_start {
             return None;
         }
-        let rises = |starts: &mut dyn Iterator<Item = usize>, end: usize| {
-            let mut last = Some(0);
-            for start in starts {
-                last = last.filter(|last| *last <= start).map(|_| start);
-            }
-            last == Some(end)
+        let rises = |part: &Range<usize>, place: usize, end: usize| {
+            let records = stored.records::<PAIR>(part).iter();
+            let mut starts = records.map(|record| u32::from_le_bytes(record[place]) as usize);
+            starts.clone().is_sorted() && starts.next_back() == Some(end)
         };
-        let document = |document| stored.pair(&stored.documents, document);
-        let list = |word| stored.pair(&stored.lists, word);
-        let documents = &mut (0..=counts.documents).filter_map(document);
-        let lists = &mut (0..=counts.words).filter_map(list);
-        let is_sound = rises(&mut documents.map(|(_, start)| start as usize), counts.features)
-            && rises(&mut lists.map(|(start, _)| start as usize), counts.postings);
+        let is_sound = rises(&stored.documents, 1, counts.features)
+            && rises(&stored.lists, 0, counts.postings);
         is_sound.then_some(stored)
     }
 
@@ -248,72 +197,65 @@ impl MappedIndex {
         &self.description
     }
 
-    fn records<const SIZE: usize>(&self, part: &Range<usize>) -> &[[u8; SIZE]] {
+    /// The records of a part, of `N` numbers each.
+    fn records<const N: usize>(&self, part: &Range<usize>) -> &[[[u8; 4]; N]] {
         let bytes = self.map.get(part.clone()).unwrap_or_default();
-        bytes.as_chunks().0
+        bytes.as_chunks::<4>().0.as_chunks().0
     }
 
-    fn pair(&self, part: &Range<usize>, index: usize) -> Option<(u32, u32)> {
-        self.records::<8>(part).get(index).map(numbers)
+    fn pair(&self, part: &Range<usize>, index: usize) -> Option<[u32; PAIR]> {
+        Some(self.records::<PAIR>(part).get(index)?.map(u32::from_le_bytes))
+    }
+
+    /// The records of a part from one start to the next; none where there is no such start.
+    fn run<const N: usize>(
+        &self,
+        part: &Range<usize>,
+        starts: [Option<u32>; 2],
+    ) -> impl ExactSizeIterator<Item = [u32; N]> {
+        let range = match starts {
+            [Some(start), Some(end)] => start as usize..end as usize,
+            _ => 0..0,
+        };
+        let records = self.records::<N>(part).get(range).unwrap_or_default();
+        records.iter().map(|record| record.map(u32::from_le_bytes))
     }
 
     /// The position of a document's frame in its scene.
     pub fn frame(&self, document: usize) -> Option<usize> {
-        self.pair(&self.documents, document).map(|(frame, _)| frame as usize)
+        self.pair(&self.documents, document).map(|[frame, _]| frame as usize)
     }
 
-    /// The features of a document, in the order of their words.
-    pub fn features(&self, document: usize) -> impl ExactSizeIterator<Item = IndexedFeature> {
-        let start = |document| self.pair(&self.documents, document).map(|pair| pair.1);
-        let range = start(document).zip(start(document + 1));
-        let range = range.map_or(0..0, |(start, end)| start as usize..end as usize);
-        let records = self.records::<FEATURE>(&self.features);
-        records.get(range).unwrap_or_default().iter().map(|record| {
-            let (fields, _) = record.as_chunks::<4>();
-            let number = |field: usize| f32::from_le_bytes(fields[field]);
-            IndexedFeature {
-                word: u32::from_le_bytes(fields[0]),
-                x: number(1),
-                y: number(2),
-                scale: number(3),
-                angle: number(4),
-            }
+    /// The features of a document, each with its visual word, in the order of their words.
+    pub fn features(&self, document: usize) -> impl ExactSizeIterator<Item = (u32, Keypoint)> {
+        let start = |document| self.pair(&self.documents, document).map(|[_, start]| start);
+        let features = self.run::<FEATURE>(&self.features, [start(document), start(document + 1)]);
+        features.map(|[word, place @ ..]| {
+            let [x, y, scale, angle] = place.map(f32::from_bits);
+            let (response, laplacian_positive) = (0.0, false);
+            (word, Keypoint { x, y, scale, angle, response, laplacian_positive })
         })
     }
 
     /// The centres of the vocabulary.
     pub fn words(&self) -> Vec<Descriptor> {
-        self.records::<WORD>(&self.words)
-            .iter()
-            .map(|record| {
-                let (numbers, _) = record.as_chunks::<4>();
-                std::array::from_fn(|i| f32::from_le_bytes(numbers[i]))
-            })
-            .collect()
+        let words = self.records::<WORD>(&self.words).iter();
+        words.map(|numbers| numbers.map(f32::from_le_bytes)).collect()
     }
 
     /// The inverse document frequency of a word.
     pub fn idf(&self, word: u32) -> f32 {
         let list = self.pair(&self.lists, word as usize);
-        list.map_or(0.0, |(_, idf)| f32::from_bits(idf))
+        list.map_or(0.0, |[_, idf]| f32::from_bits(idf))
     }
 
     /// The documents with a word, and its weight there.
     pub fn postings(&self, word: u32) -> impl Iterator<Item = (usize, f32)> {
-        let start = |word| self.pair(&self.lists, word).map(|pair| pair.0 as usize);
-        let range = start(word as usize).zip(start(word as usize + 1));
-        let range = range.map_or(0..0, |(start, end)| start..end);
-        let records = self.records::<POSTING>(&self.postings);
-        records.get(range).unwrap_or_default().iter().map(|record| {
-            let (document, weight) = numbers(record);
-            (document as usize, f32::from_bits(weight))
-        })
+        let start = |word| self.pair(&self.lists, word).map(|[start, _]| start);
+        let word = word as usize;
+        let postings = self.run::<PAIR>(&self.postings, [start(word), start(word + 1)]);
+        postings.map(|[document, weight]| (document as usize, f32::from_bits(weight)))
     }
-}
-
-fn numbers(record: &[u8; 8]) -> (u32, u32) {
-    let [a, b, c, d, e, f, g, h] = *record;
-    (u32::from_le_bytes([a, b, c, d]), u32::from_le_bytes([e, f, g, h]))
 }
 
 /// The checksum of the next `length` bytes. Read and not mapped, so that checking a large index

@@ -1,6 +1,5 @@
 //! The parameters of retrieval.
 
-use super::verification::VerificationLimits;
 use crate::describe::parameters;
 use crate::features::SurfParams;
 
@@ -41,11 +40,6 @@ parameters! {
 impl RetrievalParams {
     /// The names of those that decide what an index holds; the others only how it is asked.
     pub const BUILDING: [&'static str; 5] = ["features", "sample", "iterations", "trees", "checks"];
-
-    /// The limits of verification.
-    pub fn tolerance(&self) -> VerificationLimits {
-        VerificationLimits { inlier_px: self.inlier_px, min_inliers: self.min_inliers }
-    }
 
     /// The features that are indexed and asked for: the strongest of those that `surf` finds.
     pub fn surf(&self, surf: &SurfParams) -> SurfParams {

@@ -6,7 +6,7 @@ use crate::geometry::Pose;
 /// Frames reported after those chosen.
 const RUNNERS_UP: usize = 5;
 /// Frames reported at most, unless more are chosen.
-const TOLD: usize = 10;
+const MAX_REPORTED: usize = 10;
 
 /// What the scores of a ranking are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -44,12 +44,12 @@ pub struct ReferenceRanking {
 impl ReferenceRanking {
     /// Frames to rank where `count` are asked for.
     pub fn depth(count: usize) -> usize {
-        count.max(TOLD.min(count + RUNNERS_UP))
+        count.max(MAX_REPORTED.min(count + RUNNERS_UP))
     }
 
     /// The frames that are worth a picture.
     pub fn pictured(&self) -> &[RankedReference] {
-        &self.frames[..self.frames.len().min(TOLD)]
+        &self.frames[..self.frames.len().min(MAX_REPORTED)]
     }
 }
 

@@ -9,9 +9,8 @@ use rand::SeedableRng as _;
 use rand_pcg::Pcg64;
 use tempfile::TempDir;
 
-use super::synthetic::{around, random_descriptors};
 use super::*;
-use crate::features::{Features, Keypoint};
+use crate::features::{Descriptor, Features, Keypoint};
 
 const FRAMES: usize = 30;
 /// Landmarks that a frame sees, and how many of them the next frame no longer sees.
@@ -158,8 +157,8 @@ fn the_file_gives_back_what_went_in() {
         assert_eq!(stored.frame(document), Some(2 * document));
         let written = view(2 * document, 0);
         let features: Vec<_> = stored.features(document).collect();
-        assert!(features.is_sorted_by_key(|feature| feature.word));
-        let mut places: Vec<_> = features.iter().map(|f| (f.x, f.y)).collect();
+        assert!(features.is_sorted_by_key(|(word, _)| *word));
+        let mut places: Vec<_> = features.iter().map(|(_, k)| (k.x, k.y)).collect();
         let mut expected: Vec<_> = written.keypoints.iter().map(|k| (k.x, k.y)).collect();
         places.sort_by(|a, b| a.partial_cmp(b).expect("finite"));
         expected.sort_by(|a, b| a.partial_cmp(b).expect("finite"));
@@ -321,4 +320,32 @@ proptest! {
             index.query(&view(1, 3), &RetrievalParams::default(), |_| true);
         }
     }
+}
+
+/// Descriptors of unit norm in random directions.
+pub(super) fn random_descriptors(count: usize, seed: u64) -> Vec<Descriptor> {
+    let mut rng = Pcg64::seed_from_u64(seed);
+    (0..count).map(|_| normalized(std::array::from_fn(|_| rng.random_range(-1.0..1.0)))).collect()
+}
+
+/// Descriptors of unit norm near the centres, dealt out to them in turn; `spread` is the greatest
+/// deviation of a number.
+pub(super) fn around(
+    centres: &[Descriptor],
+    count: usize,
+    spread: f32,
+    seed: u64,
+) -> Vec<Descriptor> {
+    let mut rng = Pcg64::seed_from_u64(seed);
+    (0..count)
+        .map(|i| {
+            let centre = centres[i % centres.len()];
+            normalized(centre.map(|value| value + rng.random_range(-spread..spread)))
+        })
+        .collect()
+}
+
+fn normalized(descriptor: Descriptor) -> Descriptor {
+    let norm = descriptor.iter().map(|value| value * value).sum::<f32>();
+    descriptor.map(|value| value / norm.sqrt())
 }

@@ -7,10 +7,11 @@
 use nalgebra::Point2;
 
 use super::affine::Affine;
+use super::params::RetrievalParams;
 use crate::features::Keypoint;
 
 /// Hypotheses at most; of more pairs, evenly spread ones are tried.
-const HYPOTHESES: usize = 400;
+const MAX_HYPOTHESES: usize = 400;
 /// Refinements of a hypothesis that was better than all before.
 const REFINEMENTS: usize = 4;
 /// Pairs without which all six degrees of freedom are not fitted: twice as many as they take.
@@ -28,15 +29,6 @@ pub struct WordMatch {
     pub query_keypoint: Keypoint,
     /// The reference's feature.
     pub reference_keypoint: Keypoint,
-}
-
-/// The limits within which verification takes features to agree.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct VerificationLimits {
-    /// Greatest distance of an inlier in the reference \[px\].
-    pub inlier_px: f64,
-    /// Fewest inliers of a verified image.
-    pub min_inliers: usize,
 }
 
 /// A feature of the query and where the reference shows it.
@@ -63,15 +55,14 @@ pub struct Verification {
 
 /// The transform that most features agree with, if they are enough. Pairs of one feature of the
 /// query stand together.
-pub fn verify(pairs: &[WordMatch], tolerance: &VerificationLimits) -> Option<Verification> {
+pub fn verify(pairs: &[WordMatch], params: &RetrievalParams) -> Option<Verification> {
     let points: Vec<_> = pairs
         .iter()
         .map(|pair| (pair.query_keypoint.pixel(), pair.reference_keypoint.pixel()))
         .collect();
-    let fit =
-        AffineFit { pairs, points: &points, limit: tolerance.inlier_px * tolerance.inlier_px };
+    let fit = AffineFit { pairs, points: &points, limit: params.inlier_px * params.inlier_px };
     let mut best: Option<(usize, Affine)> = None;
-    let stride = pairs.len().div_ceil(HYPOTHESES).max(1);
+    let stride = pairs.len().div_ceil(MAX_HYPOTHESES).max(1);
     for pair in pairs.iter().step_by(stride) {
         let hypothesis = Affine::from_features(&pair.query_keypoint, &pair.reference_keypoint);
         let inliers = fit.count(&hypothesis);
@@ -81,7 +72,7 @@ pub fn verify(pairs: &[WordMatch], tolerance: &VerificationLimits) -> Option<Ver
     }
     let (_, reference_from_query) = best?;
     let matches = fit.matches(&reference_from_query);
-    (matches.len() >= tolerance.min_inliers).then_some(Verification {
+    (matches.len() >= params.min_inliers).then_some(Verification {
         inliers: matches.len(),
         reference_from_query,
         matches,
@@ -181,7 +172,9 @@ mod tests {
 
     use super::*;
 
-    const TOLERANCE: VerificationLimits = VerificationLimits { inlier_px: 4.0, min_inliers: 6 };
+    fn limits() -> RetrievalParams {
+        RetrievalParams { inlier_px: 4.0, min_inliers: 6, ..Default::default() }
+    }
 
     fn keypoint(point: Point2<f64>, scale: f64, angle: f64) -> Keypoint {
         Keypoint {
@@ -241,7 +234,7 @@ mod tests {
         // A shear that no single pair knows.
         truth.linear[(0, 1)] += 0.03;
         let pairs = pairs(&truth, 0.1, 40, 160, 1);
-        let found = verify(&pairs, &TOLERANCE).expect("enough inliers");
+        let found = verify(&pairs, &limits()).expect("enough inliers");
         let true_ones = found.matches.iter().filter(|m| m.query < 40).count();
         assert!(true_ones >= 38, "{true_ones}");
         assert!(found.inliers - true_ones <= 3);
@@ -260,12 +253,12 @@ mod tests {
                 let affine = Affine::from_features(&pair.query_keypoint, &pair.reference_keypoint);
                 let error = |pair: &&WordMatch| {
                     let seen = affine.apply(&pair.query_keypoint.pixel());
-                    (seen - pair.reference_keypoint.pixel()).norm() <= TOLERANCE.inlier_px
+                    (seen - pair.reference_keypoint.pixel()).norm() <= limits().inlier_px
                 };
                 pairs.iter().filter(error).count()
             })
             .max();
-        let found = verify(&pairs, &TOLERANCE).map(|found| found.inliers);
+        let found = verify(&pairs, &limits()).map(|found| found.inliers);
         assert_eq!(found, Some(60));
         assert!(single < Some(50), "{single:?}");
     }
@@ -274,9 +267,9 @@ mod tests {
     fn unrelated_pairs_are_not_verified() {
         for seed in 0..20 {
             let pairs = pairs(&similarity(1.0, 0.0), 0.0, 0, 60, seed);
-            assert_eq!(verify(&pairs, &TOLERANCE), None, "seed {seed}");
+            assert_eq!(verify(&pairs, &limits()), None, "seed {seed}");
         }
-        assert_eq!(verify(&[], &TOLERANCE), None);
+        assert_eq!(verify(&[], &limits()), None);
     }
 
     #[test]
@@ -290,10 +283,10 @@ mod tests {
                 pair
             })
             .collect();
-        assert_eq!(verify(&crowd, &TOLERANCE), None);
+        assert_eq!(verify(&crowd, &limits()), None);
         // Twenty features of the query on one feature of the reference.
         let crowd: Vec<WordMatch> = (0..20).map(|query| WordMatch { query, ..one }).collect();
-        assert_eq!(verify(&crowd, &TOLERANCE), None);
+        assert_eq!(verify(&crowd, &limits()), None);
     }
 
     proptest! {
@@ -307,8 +300,8 @@ mod tests {
             for i in 0..pairs.len() / 4 {
                 pairs[2 * i + 1].query = pairs[2 * i].query;
             }
-            if let Some(found) = verify(&pairs, &TOLERANCE) {
-                prop_assert!(found.inliers >= TOLERANCE.min_inliers);
+            if let Some(found) = verify(&pairs, &limits()) {
+                prop_assert!(found.inliers >= limits().min_inliers);
                 prop_assert!(found.matches.is_sorted_by(|a, b| a.query < b.query));
                 for found_match in &found.matches {
                     let seen = found.reference_from_query.apply(&found_match.query_pixel);
@@ -337,7 +330,7 @@ mod tests {
                     }
                 })
                 .collect();
-            verify(&pairs, &TOLERANCE);
+            verify(&pairs, &limits());
         }
     }
 }

@@ -95,15 +95,10 @@ impl Vocabulary {
     ) -> Vec<T> {
         let descriptors = descriptors.par_iter().enumerate().with_min_len(CHUNK);
         let made = descriptors.map_init(Scratch::default, |scratch, (place, descriptor)| {
-            make(place, descriptor, self.nearest(descriptor, scratch))
+            let found = self.forest.nearest(&self.words, descriptor, self.checks, scratch);
+            make(place, descriptor, found)
         });
         made.collect()
-    }
-
-    /// The word of one descriptor, and the squared distance from it.
-    pub fn nearest(&self, descriptor: &Descriptor, scratch: &mut Scratch) -> Option<(u32, f32)> {
-        let found = self.forest.nearest(&self.words, descriptor, self.checks, scratch)?;
-        Some((found.index as u32, found.squared_distance))
     }
 
     /// Word and squared distance of each descriptor of the sample.
@@ -154,7 +149,7 @@ fn farthest(assigned: &[(u32, f32)], count: usize) -> Vec<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::retrieval::synthetic::{around, random_descriptors};
+    use crate::retrieval::tests::{around, random_descriptors};
 
     const FOUR: Clustering = Clustering { words: 4, iterations: 20, trees: 4, checks: 32, seed: 1 };
 

@@ -107,10 +107,10 @@ pub fn places_beyond_chance(
     threshold_px: f64,
     image_area_px: f64,
 ) -> Acceptance {
-    let area_px = effective_area_px(places.pixels(), image_area_px);
+    let area_px = effective_area_px(&places.pixels, image_area_px);
     let one = (PI * threshold_px * threshold_px / area_px).min(1.0);
     let any: f64 = places
-        .sizes()
+        .sizes
         .iter()
         .map(|&size| match size {
             1 => one,
@@ -119,7 +119,7 @@ pub fn places_beyond_chance(
         .sum();
     let independent = Independent {
         count: places.count(),
-        tested: places.correspondences(),
+        tested: places.of.len(),
         chance: any / places.count().max(1) as f64,
     };
     independent.judge(places.of_some(inliers))

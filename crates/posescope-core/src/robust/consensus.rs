@@ -1,4 +1,4 @@
-//! What MLESAC tells on the way and in the end.
+//! The trials and the outcome of MLESAC.
 
 use serde::Serialize;
 
@@ -19,7 +19,7 @@ pub struct Hypothesis {
     pub score: LikelihoodScore,
 }
 
-/// One random sample, told to the observer of [`super::mlesac()`].
+/// One random sample, passed to the observer of [`super::mlesac()`].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct Trial {

@@ -1,4 +1,4 @@
-//! What MLESAC is told: its parameters, and how many correspondences make a sample.
+//! MLESAC's parameters, and how many correspondences make a sample.
 
 use serde::{Deserialize, Serialize};
 

@@ -39,11 +39,11 @@ impl Counted {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Places {
     /// The place of each correspondence.
-    of: Vec<usize>,
+    pub(super) of: Vec<usize>,
     /// The pixel of the first correspondence of each place.
-    pixels: Vec<Point2<f64>>,
+    pub(super) pixels: Vec<Point2<f64>>,
     /// Correspondences of each place.
-    sizes: Vec<usize>,
+    pub(super) sizes: Vec<usize>,
 }
 
 impl Places {
@@ -69,21 +69,6 @@ impl Places {
         self.sizes.len()
     }
 
-    /// How many correspondences they are of.
-    pub fn correspondences(&self) -> usize {
-        self.of.len()
-    }
-
-    /// One pixel of each.
-    pub fn pixels(&self) -> &[Point2<f64>] {
-        &self.pixels
-    }
-
-    /// Correspondences of each.
-    pub fn sizes(&self) -> &[usize] {
-        &self.sizes
-    }
-
     /// The places that some of the correspondences are of.
     pub fn of_some(&self, correspondences: &[usize]) -> usize {
         let mut is_met = vec![false; self.count()];
@@ -103,8 +88,8 @@ mod tests {
         let pixels = [0.0, 2.0, 4.0, 90.0, 0.5].map(|x| Point2::new(x, 7.0));
         let places = Places::of(pixels, 3.0);
         assert_eq!(places.count(), 3);
-        assert_eq!(places.correspondences(), 5);
-        assert_eq!(places.sizes(), [3, 1, 1]);
+        assert_eq!(places.of.len(), 5);
+        assert_eq!(places.sizes, [3, 1, 1]);
         assert_eq!(places.of_some(&[0, 1, 4]), 1);
         assert_eq!(places.of_some(&[4, 2, 3]), 3);
         assert_eq!(places.of_some(&[]), 0);

@@ -1,9 +1,9 @@
 //! The frames used last, with what was computed of them.
 
-use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use super::{Scene, SceneError, pose_of, reference_of};
+use crate::memo::Id;
 use crate::problem::{Query, ReferenceTuple};
 use crate::recent::{Limit, Recent};
 
@@ -21,19 +21,9 @@ const BYTES: usize = 96 << 20;
 /// No lock is held while a frame is read. Two threads that ask for the same one may both read it, and get
 /// the same.
 pub struct FrameStore {
-    frames: Recent<FrameKey, Arc<Frame>>,
+    frames: Recent<(Id, usize), Arc<Frame>>,
     /// Held, so that none is taken for another at the same address.
-    scenes: Mutex<Vec<(Arc<dyn Scene>, SceneId)>>,
-}
-
-/// Which scene: no two are the same within one process.
-#[derive(Clone, Copy, PartialEq, Eq)]
-struct SceneId(u64);
-
-#[derive(Clone, Copy, PartialEq, Eq)]
-struct FrameKey {
-    scene: SceneId,
-    frame: usize,
+    scenes: Mutex<Vec<(Arc<dyn Scene>, Id)>>,
 }
 
 /// Query and reference tuple have the same photo and memo.
@@ -54,13 +44,6 @@ impl Frame {
     fn is_held(&self) -> bool {
         let reference = self.reference.get();
         Arc::strong_count(&self.query) > 1 || reference.is_some_and(|r| Arc::strong_count(r) > 1)
-    }
-}
-
-impl SceneId {
-    fn new() -> Self {
-        static NEXT: AtomicU64 = AtomicU64::new(0);
-        Self(NEXT.fetch_add(1, Ordering::Relaxed))
     }
 }
 
@@ -102,7 +85,7 @@ impl FrameStore {
         scenes.retain(|(known, _)| Arc::strong_count(known) > 1);
         let known = scenes.iter().find(|(known, _)| Arc::ptr_eq(known, scene));
         let id = known.map(|(_, id)| *id).unwrap_or_else(|| {
-            let id = SceneId::new();
+            let id = Id::new();
             scenes.push((Arc::clone(scene), id));
             id
         });
@@ -114,18 +97,18 @@ impl FrameStore {
 #[derive(Clone)]
 pub struct CachedScene<'a> {
     scene: &'a dyn Scene,
-    id: SceneId,
+    id: Id,
     store: Arc<FrameStore>,
 }
 
 impl<'a> CachedScene<'a> {
     /// The scenes of references and of queries, which may be the same, with a store of their own.
     pub fn pair(references: &'a dyn Scene, queries: &'a dyn Scene) -> (Self, Self) {
-        let references = Self { scene: references, id: SceneId::new(), store: Arc::default() };
+        let references = Self { scene: references, id: Id::new(), store: Arc::default() };
         let is_same = std::ptr::eq(references.scene, queries);
         let queries = Self {
             scene: queries,
-            id: if is_same { references.id } else { SceneId::new() },
+            id: if is_same { references.id } else { Id::new() },
             store: Arc::clone(&references.store),
         };
         (references, queries)
@@ -137,7 +120,7 @@ impl<'a> CachedScene<'a> {
     }
 
     fn frame(&self, frame: usize) -> Result<Arc<Frame>, SceneError> {
-        let key = FrameKey { scene: self.id, frame };
+        let key = (self.id, frame);
         let frames = &self.store.frames;
         if let Some(known) = frames.get(&key) {
             // It has grown since, by what was computed of it.

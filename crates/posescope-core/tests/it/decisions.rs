@@ -1,8 +1,7 @@
 //! Single decisions of the estimators, on two walls: each parameter changes what it says it does.
 
 use posescope_core::cloud::Cloud;
-use posescope_core::diagnosis::Code;
-use posescope_core::diagnosis::{Evidence, Subject, Tolerance};
+use posescope_core::diagnosis::{Assessment, Code, Evidence, Subject, Tolerance};
 use posescope_core::estimator::{self, Failure, Outcome};
 use posescope_core::geometry::Pose;
 use posescope_core::localize::{
@@ -126,7 +125,8 @@ fn the_cost_at_the_truth_is_that_of_the_true_pose_and_absent_without_one() {
         let outcome = outcome(method, &problem, &params);
         let evidence = Evidence::default();
         let subject = Subject::new(&problem, method, &params, &outcome, &evidence);
-        evaluate("two walls", &subject.against(truth, Tolerance::default()))
+        let subject = subject.against(truth, Tolerance::default());
+        evaluate("two walls", &subject, Assessment::of(&subject))
     };
     // If the reference pose were the true one, its cost would be the initial cost.
     let reference = problem.reference.world_from_camera;

@@ -47,10 +47,34 @@ const DEG_PER_M: f64 = 2.0;
 /// A pose that covers less of what the reference pose covers has no say.
 const MIN_COVERED: f64 = 0.25;
 
+/// Smaller gains would dominate the logarithm.
+const MIN_GAIN: f64 = 1e-3;
+
+/// The signals at a pose of the query camera in the reference camera's frame, kept with the query: a method
+/// and the hybrid that keeps its pose ask the same. None speaks for a pose where nothing can be compared.
+pub(super) fn signals(
+    problem: &Problem,
+    params: &Params,
+    reference_from_query: &Pose,
+    look: Look,
+) -> [(&'static str, f64); 6] {
+    let inputs = (&params.judge, &params.render, look, reference_from_query);
+    let seen = || {
+        let judge = Judge::new(problem, &params.render, &params.judge, look.shrink);
+        let mut poses = vec![*reference_from_query, Pose::identity()];
+        poses.extend(neighbours(reference_from_query));
+        let first_around = poses.len();
+        poses.extend(around(look.around));
+        Ok(Appearance::among(&judge.score(&poses), first_around).unwrap_or_default())
+    };
+    let Ok::<_, Infallible>(seen) = problem.try_recall(inputs, |_| 0, seen);
+    seen.value.signals()
+}
+
 /// The cost at a pose among the costs of others; all but the last in robust standard deviations of the
 /// costs around the reference.
 #[derive(Clone, Copy, Default)]
-pub(super) struct Appearance {
+struct Appearance {
     /// How far below the median of those around the reference.
     depth: f64,
     /// How far below the least of them.
@@ -64,30 +88,6 @@ pub(super) struct Appearance {
 }
 
 impl Appearance {
-    /// The appearance at a pose of the query camera in the reference camera's frame, kept with the query: a
-    /// method and the hybrid that keeps its pose ask the same. All 0 where nothing can be compared.
-    pub(super) fn of(
-        problem: &Problem,
-        params: &Params,
-        reference_from_query: &Pose,
-        look: Look,
-    ) -> Self {
-        let inputs = (&params.judge, &params.render, look, reference_from_query);
-        let seen = || Ok(Self::seen(problem, params, reference_from_query, look));
-        let Ok::<_, Infallible>(seen) = problem.try_recall(inputs, |_| 0, seen);
-        *seen.value
-    }
-
-    fn seen(problem: &Problem, params: &Params, reference_from_query: &Pose, look: Look) -> Self {
-        let judge = Judge::new(problem, &params.render, &params.judge, look.shrink);
-        let mut poses = vec![*reference_from_query, Pose::identity()];
-        poses.extend(neighbours(reference_from_query));
-        let first_around = poses.len();
-        poses.extend(around(look.around));
-        let scores = judge.score(&poses);
-        Self::among(&scores, first_around).unwrap_or_default()
-    }
-
     /// From the scores of the pose, the reference pose, both rings, and those around the reference.
     fn among(scores: &[Score], first_around: usize) -> Option<Self> {
         let (of_poses, around) = scores.split_at(first_around);
@@ -116,17 +116,14 @@ impl Appearance {
         })
     }
 
-    /// The signals: depth, margin, both rises, above the start, gain.
-    pub(super) fn signals(&self) -> [f64; 6] {
-        /// Smaller gains would dominate the logarithm.
-        const MIN_GAIN: f64 = 1e-3;
+    fn signals(&self) -> [(&'static str, f64); 6] {
         [
-            tamed(self.depth),
-            tamed(self.margin),
-            tamed(self.rises[0]),
-            tamed(self.rises[1]),
-            tamed(self.below_start),
-            self.gain.max(MIN_GAIN).ln(),
+            ("seen_depth", tamed(self.depth)),
+            ("seen_margin", tamed(self.margin)),
+            ("seen_rise", tamed(self.rises[0])),
+            ("seen_rise_farther", tamed(self.rises[1])),
+            ("seen_above_start", tamed(self.below_start)),
+            ("seen_gain", self.gain.max(MIN_GAIN).ln()),
         ]
     }
 }
@@ -193,7 +190,7 @@ mod tests {
         assert!(seen.margin > 0.0);
         let nothing = Score { cost: None, covered: 0 };
         assert!(Appearance::among(&[nothing; 6], 4).is_none());
-        assert!(Appearance::default().signals().iter().all(|s| s.is_finite()));
+        assert!(Appearance::default().signals().iter().all(|(_, signal)| signal.is_finite()));
     }
 
     #[test]

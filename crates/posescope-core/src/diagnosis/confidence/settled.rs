@@ -1,11 +1,10 @@
 //! What a search from many starts says about the pose in which they settled.
 
-use super::{Signals, eligible_costs, tamed};
+use super::{Costs, PoseConfidence, Signals, gain_and_coverage, tamed};
 use crate::diagnosis::Evidence;
 use crate::estimator::Outcome;
 use crate::geometry::{Pose, PoseError};
 use crate::grid::Phase;
-use crate::stats::median_and_deviation;
 
 /// Refined poses no farther apart are at one place.
 const SAME_M: f64 = 0.3;
@@ -14,22 +13,40 @@ const SAME_DEG: f64 = 1.0;
 /// A pose this far from the answer speaks against it \[m\].
 const ELSEWHERE_M: f64 = 1.0;
 
-/// A pose in which some of many starts settled, among the others.
-pub(super) struct Settled {
-    /// In robust standard deviations of the coarse costs, below their median.
-    depth: f64,
-    /// The same of the reference pose.
-    start_depth: f64,
-    /// How much deeper than the runner-up, in the same unit; `None` where there is none.
-    pub(super) runner_up_margin: Option<f64>,
-    /// Share of the cost of shuffled pixels that is saved.
-    gain: f64,
-    /// Covered pixels over those covered at the reference pose.
-    coverage: f64,
-    /// The share of the refined starts that ended there.
-    gathered: f64,
-    /// What features say, where some were asked.
-    features: Option<FeaturesSay>,
+/// The signals of a pose in which some of many starts settled, among the others, and what else is known of
+/// it. Depths are in robust standard deviations of the coarse costs, below their median.
+pub(super) fn signals(outcome: &Outcome, evidence: &Evidence) -> Option<(Signals, PoseConfidence)> {
+    let summary = outcome.cost.as_ref()?;
+    let surfaces = evidence.surfaces.iter().map(|surface| &**surface);
+    let coarse = Costs::of(surfaces.filter(|one| one.lattice.phase == Phase::PositionCoarse))?;
+    let refined = evidence.settled.as_ref()?;
+    let answer = match &evidence.candidates {
+        Some(candidates) => candidates.first()?.refined.pose,
+        None => refined.first()?.pose,
+    };
+    let same = refined.iter().filter(|one| is_same(&answer, &one.pose));
+    let depth = coarse.depth(summary.best);
+    let start_depth = summary.initial.map_or(0.0, |cost| coarse.depth(cost));
+    let above = |runner_up: f64| (runner_up - summary.best) / coarse.deviation;
+    let runner_up_margin = summary.runner_up.map(above);
+    let mut signals = vec![
+        ("depth", tamed(depth)),
+        ("margin", tamed(runner_up_margin.unwrap_or(depth))),
+        ("above_start", tamed(depth - start_depth)),
+    ];
+    signals.extend(gain_and_coverage(summary));
+    // The share of the refined starts that ended there.
+    signals.push(("gathered", same.count() as f64 / refined.len() as f64));
+    if let Some(candidates) = &evidence.candidates {
+        let of_features = candidates.iter().filter(|one| one.from_features);
+        let poses = of_features.map(|one| (one.refined.pose, one.accepted));
+        let FeaturesSay { support, against } = FeaturesSay::of(&answer, poses);
+        signals.extend([("support", support), ("against", against)]);
+    }
+    let chance_level = summary.shuffled;
+    let confidence =
+        PoseConfidence { runner_up_margin, chance_level, ..PoseConfidence::new(f64::NAN) };
+    Some((signals, confidence))
 }
 
 /// Whether the poses that features lead to, refined under the same cost, are that of the answer.
@@ -38,65 +55,6 @@ struct FeaturesSay {
     support: f64,
     /// 1 where one that its method accepts is elsewhere.
     against: f64,
-}
-
-impl Settled {
-    pub(super) fn of(outcome: &Outcome, evidence: &Evidence) -> Option<Self> {
-        let summary = outcome.cost.as_ref()?;
-        let coarse = evidence
-            .surfaces
-            .iter()
-            .filter(|surface| surface.lattice.phase == Phase::PositionCoarse);
-        let mut costs: Vec<f64> = coarse.flat_map(|surface| eligible_costs(surface)).collect();
-        let (centre, deviation) = median_and_deviation(&mut costs)?;
-        let depth = |cost: f64| (centre - cost) / deviation;
-        let refined = evidence.settled.as_ref()?;
-        let answer = match &evidence.candidates {
-            Some(candidates) => candidates.first()?.refined.pose,
-            None => refined.first()?.pose,
-        };
-        let same = refined.iter().filter(|one| is_same(&answer, &one.pose));
-        let shuffled = summary.shuffled.unwrap_or(1.0).max(f64::MIN_POSITIVE);
-        Some(Self {
-            depth: depth(summary.best),
-            start_depth: summary.initial.map_or(0.0, depth),
-            runner_up_margin: summary
-                .runner_up
-                .map(|runner_up| (runner_up - summary.best) / deviation),
-            gain: 1.0 - summary.best / shuffled,
-            coverage: summary.coverage_best / summary.coverage_reference.max(f64::MIN_POSITIVE),
-            gathered: same.count() as f64 / refined.len() as f64,
-            features: evidence.candidates.as_ref().map(|candidates| {
-                let of_features = candidates.iter().filter(|one| one.from_features);
-                FeaturesSay::of(&answer, of_features.map(|one| (one.refined.pose, one.accepted)))
-            }),
-        })
-    }
-
-    pub(super) fn signals(&self) -> Signals {
-        const NAMES: &[&str] = &[
-            "depth",
-            "margin",
-            "above_start",
-            "gain",
-            "coverage",
-            "gathered",
-            "support",
-            "against",
-        ];
-        let mut values = vec![
-            tamed(self.depth),
-            tamed(self.runner_up_margin.unwrap_or(self.depth)),
-            tamed(self.depth - self.start_depth),
-            self.gain,
-            self.coverage.clamp(1e-3, 1e3).ln(),
-            self.gathered,
-        ];
-        if let Some(features) = &self.features {
-            values.extend([features.support, features.against]);
-        }
-        Signals { names: &NAMES[..values.len()], values }
-    }
 }
 
 impl FeaturesSay {

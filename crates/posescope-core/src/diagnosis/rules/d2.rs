@@ -45,64 +45,37 @@ fn by_grid(search: &Search<'_>) -> Option<Diagnosis> {
         cost_at_result,
         cost_elsewhere: rivals.winner.cost,
         distance_m: search.distance_from_truth(&rivals.winner.offset),
-        near_truth: Some(At::from(&rivals.near.offset)),
-        elsewhere: Some(At::from(&rivals.winner.offset)),
+        near_truth: Some(rivals.near.offset),
+        elsewhere: Some(rivals.winner.offset),
     }))
 }
 
-/// A searched pose beside the reference's.
-#[derive(Serialize)]
-pub(super) struct At {
-    right_m: f64,
-    forward_m: f64,
-    yaw_deg: f64,
-}
-
-impl From<&Offset> for At {
-    fn from(offset: &Offset) -> Self {
-        Self {
-            right_m: offset.right_m,
-            forward_m: offset.forward_m,
-            yaw_deg: offset.yaw_rad.to_degrees(),
-        }
-    }
-}
-
-#[derive(Serialize)]
-struct Preferred {
+evidence!(Preferred {
     judge: Option<&'static str>,
     cost_near_truth: f64,
     cost_at_result: f64,
     cost_elsewhere: f64,
     /// How far elsewhere is from the truth \[m\].
     distance_m: f64,
-    near_truth: Option<At>,
-    elsewhere: Option<At>,
-}
-
-impl fmt::Display for Preferred {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (elsewhere, near) = pair(self.cost_elsewhere, self.cost_near_truth);
-        let of = match self.judge {
-            Some(judge) => format!(" of {judge}"),
-            None => String::new(),
-        };
-        // The heights and tilts that are searched may leave no right pose near the truth.
-        if self.cost_near_truth < self.cost_elsewhere {
-            return write!(
-                f,
-                "The lowest cost{of} near the truth, {near}, is at a pose that is not right. The result costs {elsewhere} \
-                 (lower is better)."
-            );
-        }
-        write!(
-            f,
-            "The cost{of} prefers a wrong place: {elsewhere} at {} from the truth. The lowest near the truth is {near} (lower \
-             is better).",
-            metres(self.distance_m)
+    near_truth: Option<Offset>,
+    elsewhere: Option<Offset>,
+} => {
+    let (lowest, near) = pair(*cost_elsewhere, *cost_near_truth);
+    let of = judge.map(|judge| format!(" of {judge}")).unwrap_or_default();
+    // The heights and tilts that are searched may leave no right pose near the truth.
+    if cost_near_truth < cost_elsewhere {
+        format!(
+            "The lowest cost{of} near the truth, {near}, is at a pose that is not right. The result \
+             costs {lowest} (lower is better)."
+        )
+    } else {
+        let off = metres(*distance_m);
+        format!(
+            "The cost{of} prefers a wrong place: {lowest} at {off} from the truth. The lowest near the \
+             truth is {near} (lower is better)."
         )
     }
-}
+});
 
 fn by_starts(starts: &Starts) -> Option<Diagnosis> {
     let near = starts.near.as_ref()?;
@@ -119,8 +92,7 @@ fn by_starts(starts: &Starts) -> Option<Diagnosis> {
     })
 }
 
-#[derive(Serialize)]
-struct PreferredBySix {
+evidence!(PreferredBySix {
     cost_near_truth: f64,
     cost_at_result: f64,
     penalty_near_truth: f64,
@@ -128,32 +100,23 @@ struct PreferredBySix {
     near_truth_error: PoseError,
     leads_away: bool,
     turned_by_prior: bool,
-}
-
-impl fmt::Display for PreferredBySix {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        if self.leads_away {
-            return write!(
-                f,
-                "The cost has no minimum at the truth: refined from there, the pose moves {} away.",
-                metres(self.near_truth_error.translation_m)
-            );
-        }
-        let (result, near) = pair(self.cost_at_result, self.cost_near_truth);
-        if !self.turned_by_prior {
-            write!(
-                f,
-                "The cost prefers a wrong place: {result} at the result, {near} near the truth (lower is better)."
-            )
-        } else {
-            write!(
-                f,
-                "The prior on likely poses decided against the truth: cost {near} near it, {result} at the result (lower is \
+} => {
+    let (result, near) = pair(*cost_at_result, *cost_near_truth);
+    if *leads_away {
+        let away = metres(near_truth_error.translation_m);
+        format!("The cost has no minimum at the truth: refined from there, the pose moves {away} away.")
+    } else if *turned_by_prior {
+        format!(
+            "The prior on likely poses decided against the truth: cost {near} near it, {result} at the \
+             result (lower is better)."
+        )
+    } else {
+        format!(
+            "The cost prefers a wrong place: {result} at the result, {near} near the truth (lower is \
              better)."
-            )
-        }
+        )
     }
-}
+});
 
 pub(super) fn remedies(ask: &Ask<'_>) -> Vec<Remedy> {
     let mut tried = vec![vec![ask.floor(4.0, 0.2)], vec![ask.wider_splat()], vec![ask.radius(0.5)]];

@@ -1,6 +1,5 @@
 //! D3: the search missed a lower cost near the truth.
 
-use super::d2::At;
 use super::*;
 use crate::diagnosis::search::Place;
 use crate::grid::ScoredLattice;
@@ -39,45 +38,38 @@ fn by_grid(search: &Search<'_>) -> Option<Diagnosis> {
         cost_near_truth: rivals.near.cost,
         cost_at_result: search.result_cost?,
         distance_m: search.distance_from_truth(&rivals.near.offset),
-        near_truth: At::from(&rivals.near.offset),
+        near_truth: rivals.near.offset,
         lost_in: lost.phase.map(Phase::name),
         rank: lost.rank,
         margin: lost.margin,
     }))
 }
 
-#[derive(Serialize)]
-struct Missed {
+evidence!(Missed {
     cost_near_truth: f64,
     cost_at_result: f64,
     /// How far the pose near the truth is from it \[m\].
     distance_m: f64,
-    near_truth: At,
+    near_truth: Offset,
     lost_in: Option<&'static str>,
     /// The rank of the coarse cell nearest to the pose near the truth.
     rank: Option<usize>,
     /// What that cell costs more than the lowest.
     margin: Option<f64>,
-}
-
-impl fmt::Display for Missed {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (near, result) = pair(self.cost_near_truth, self.cost_at_result);
-        write!(
-            f,
-            "The search missed it: cost {near} near the truth, {result} at the result (lower is better)."
-        )?;
-        match (self.rank, self.lost_in) {
-            (Some(rank), _) => write!(
-                f,
-                " The coarse grid ranked the right cell {}, and only the 1st is refined.",
-                ordinal(rank)
-            ),
-            (None, Some(phase)) => write!(f, " It went wrong in the phase “{phase}”."),
-            (None, None) => Ok(()),
+} => {
+    let (near, result) = pair(*cost_near_truth, *cost_at_result);
+    let why = match (rank, lost_in) {
+        (Some(rank), _) => {
+            let rank = ordinal(*rank);
+            format!(" The coarse grid ranked the right cell {rank}, and only the 1st is refined.")
         }
-    }
-}
+        (None, Some(phase)) => format!(" It went wrong in the phase “{phase}”."),
+        (None, None) => String::new(),
+    };
+    format!(
+        "The search missed it: cost {near} near the truth, {result} at the result (lower is better).{why}"
+    )
+});
 
 /// Another system's pose costs more than the truth.
 fn by_given(search: &Search<'_>) -> Option<Diagnosis> {
@@ -86,26 +78,16 @@ fn by_given(search: &Search<'_>) -> Option<Diagnosis> {
         Some(rivals) => rivals.is_missed.then_some(rivals.near.cost)?,
         None => search.cost_at_truth().filter(|cost| *cost < cost_at_result)?,
     };
-    Some(RULE.found(&Told { judge: search.judge?.name(), cost_near_truth, cost_at_result }))
+    Some(RULE.found(&CheaperTruth { judge: search.judge?.name(), cost_near_truth, cost_at_result }))
 }
 
-#[derive(Serialize)]
-struct Told {
-    judge: &'static str,
-    cost_near_truth: f64,
-    cost_at_result: f64,
-}
-
-impl fmt::Display for Told {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (near, here) = pair(self.cost_near_truth, self.cost_at_result);
-        write!(
-            f,
-            "The photos agree better near the truth: the cost of {} is {near} there and {here} here (lower is better).",
-            self.judge
-        )
-    }
-}
+evidence!(CheaperTruth { judge: &'static str, cost_near_truth: f64, cost_at_result: f64 } => {
+    let (near, here) = pair(*cost_near_truth, *cost_at_result);
+    format!(
+        "The photos agree better near the truth: the cost of {judge} is {near} there and {here} here \
+         (lower is better)."
+    )
+});
 
 fn by_starts(starts: &Starts) -> Option<Diagnosis> {
     let near = starts.near.as_ref().filter(|_| starts.is_missed())?;
@@ -119,30 +101,24 @@ fn by_starts(starts: &Starts) -> Option<Diagnosis> {
     }))
 }
 
-#[derive(Serialize)]
-struct MissedBySix {
+evidence!(MissedBySix {
     cost_near_truth: f64,
     cost_at_result: f64,
     penalty_near_truth: f64,
     penalty_at_result: f64,
     near_truth_error: PoseError,
     turned_by_prior: bool,
-}
-
-impl fmt::Display for MissedBySix {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (near, result) = pair(self.cost_near_truth, self.cost_at_result);
-        write!(
-            f,
-            "The search missed it: cost {near} near the truth, {result} at the result (lower is better). "
-        )?;
-        f.write_str(if !self.turned_by_prior {
-            "No start led there."
-        } else {
-            "With the prior on likely poses the truth wins."
-        })
-    }
-}
+} => {
+    let (near, result) = pair(*cost_near_truth, *cost_at_result);
+    let why = if *turned_by_prior {
+        "With the prior on likely poses the truth wins."
+    } else {
+        "No start led there."
+    };
+    format!(
+        "The search missed it: cost {near} near the truth, {result} at the result (lower is better). {why}"
+    )
+});
 
 /// Where the search turned away from the truth.
 #[derive(Default)]
@@ -161,12 +137,7 @@ fn lost_in(search: &Search<'_>, near: &Place) -> Loss {
     let Some((coarse, chosen)) = at(Phase::PositionCoarse) else {
         return Loss::default();
     };
-    let target = near.offset;
-    let away = |offset: &Offset| {
-        let (right, forward) =
-            (offset.right_m - target.right_m, offset.forward_m - target.forward_m);
-        right.hypot(forward)
-    };
+    let away = |offset: &Offset| offset.distance_from(&near.offset);
     let fine_reach = search.grid.fine_range_m.hypot(search.grid.fine_range_m);
     if away(&chosen) > fine_reach + search.grid.fine_step_m {
         return lost_among_coarse(coarse, &away);
@@ -205,12 +176,11 @@ fn remedies(ask: &Ask<'_>) -> Vec<Remedy> {
             let mi6 = &ask.params.mi6;
             let starts = ask.set("mi6.starts", (2 * mi6.starts).min(200) as f64);
             let finalists = ask.set("mi6.finalists", (2 * mi6.finalists).min(100) as f64);
-            let dense = ask.set("grid.coarse_step", ask.params.grid.coarse_step_m / 2.0);
             let yaws = ask.set("mi6.coarse_yaws", (2 * mi6.coarse_yaws).min(61) as f64);
             vec![
                 vec![starts.clone(), finalists.clone()],
-                vec![dense.clone()],
-                vec![dense, starts, finalists],
+                vec![ask.dense()],
+                vec![ask.dense(), starts, finalists],
                 vec![yaws],
                 vec![floor],
                 vec![splat],
@@ -241,7 +211,7 @@ mod tests {
             cost_near_truth: 0.914_63,
             cost_at_result: 0.927_01,
             distance_m: 0.05,
-            near_truth: At::from(&Offset::default()),
+            near_truth: Offset::default(),
             lost_in: Some(Phase::PositionCoarse.name()),
             rank: Some(5),
             margin: Some(0.0039),

@@ -41,7 +41,7 @@ fn by_grid(search: &Search<'_>, radius_m: f64) -> Option<Diagnosis> {
     let truth = search.truth_offset();
     let outside = |is_turned: bool| {
         RULE.found(&Outside {
-            distance_m: truth.right_m.hypot(truth.forward_m),
+            distance_m: truth.distance_m(),
             radius_m,
             yaw_deg: truth.yaw_rad.to_degrees(),
             yaw_range_deg: search.grid.yaw_range_deg,
@@ -60,33 +60,30 @@ fn by_grid(search: &Search<'_>, radius_m: f64) -> Option<Diagnosis> {
     }
 }
 
-#[derive(Serialize)]
-struct Outside {
+/// The truth is farther from the reference than the search goes.
+fn too_far(distance_m: f64, radius_m: f64) -> String {
+    let (distance, radius) = (metres(distance_m), metres(radius_m));
+    format!(
+        "The truth is outside of the search: {distance} from the reference, {radius} is searched."
+    )
+}
+
+evidence!(Outside {
     distance_m: f64,
     radius_m: f64,
     yaw_deg: f64,
     yaw_range_deg: f64,
     is_turned: bool,
-}
-
-impl fmt::Display for Outside {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        if !self.is_turned {
-            write!(
-                f,
-                "The truth is outside of the search: {} from the reference, {} is searched.",
-                metres(self.distance_m),
-                metres(self.radius_m)
-            )
-        } else {
-            write!(
-                f,
-                "The query is turned too far: its yaw is {:.1}° against the reference, and ±{:.1}° is searched.",
-                self.yaw_deg, self.yaw_range_deg
-            )
-        }
+} => {
+    if *is_turned {
+        format!(
+            "The query is turned too far: its yaw is {yaw_deg:.1}° against the reference, and \
+             ±{yaw_range_deg:.1}° is searched."
+        )
+    } else {
+        too_far(*distance_m, *radius_m)
     }
-}
+});
 
 evidence!(Uncovered { covered: usize, least_covered: u32 } =>
     "Too little of the cloud is in view near the truth: {covered} px, grid.coverage_floor needs \
@@ -100,28 +97,15 @@ fn by_starts(starts: &Starts, radius_m: f64) -> Option<Diagnosis> {
         .then(|| RULE.found(&Unreached { distance_m: starts.distance_m, radius_m }))
 }
 
-#[derive(Serialize)]
-struct Unreached {
-    distance_m: f64,
-    radius_m: f64,
-}
-
-impl fmt::Display for Unreached {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        if self.distance_m > self.radius_m {
-            write!(
-                f,
-                "The truth is outside of the search: {} from the reference, {} is searched.",
-                metres(self.distance_m),
-                metres(self.radius_m)
-            )
-        } else {
-            f.write_str(
-            "The search cannot end at the truth: too little of the cloud is visible there, or it leaves the disc.",
-        )
-        }
+evidence!(Unreached { distance_m: f64, radius_m: f64 } => {
+    if distance_m > radius_m {
+        too_far(*distance_m, *radius_m)
+    } else {
+        "The search cannot end at the truth: too little of the cloud is visible there, or it leaves the \
+         disc."
+            .to_owned()
     }
-}
+});
 
 fn remedies(ask: &Ask<'_>) -> Vec<Remedy> {
     let wider = [vec![ask.radius(1.5)], vec![ask.radius(2.0)]];

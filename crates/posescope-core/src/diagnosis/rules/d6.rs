@@ -27,21 +27,16 @@ fn test(case: &Case<'_>) -> Option<Diagnosis> {
     }))
 }
 
-#[derive(Serialize)]
-struct Changed {
+evidence!(Changed {
     judge: Option<&'static str>,
     cost_near_truth: f64,
     chance_level: f64,
     chance_deviation: f64,
     deviations: f64,
-}
-
-impl fmt::Display for Changed {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (near, chance) = pair(self.cost_near_truth, self.chance_level);
-        write!(
-            f,
-            "The photos look too different: near the truth the cost is {near}, no better than {chance} for shuffled pixels (lower is better)."
-        )
-    }
-}
+} => {
+    let (near, chance) = pair(*cost_near_truth, *chance_level);
+    format!(
+        "The photos look too different: near the truth the cost is {near}, no better than {chance} for \
+         shuffled pixels (lower is better)."
+    )
+});

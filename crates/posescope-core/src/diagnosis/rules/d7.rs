@@ -51,8 +51,7 @@ fn found(
     })
 }
 
-#[derive(Serialize)]
-struct Frozen {
+evidence!(Frozen {
     judge: Option<&'static str>,
     height_m: f64,
     /// How far the truth is from the searched pose at its place with its heading.
@@ -60,25 +59,19 @@ struct Frozen {
     cost_in_six_freedoms: Option<f64>,
     cost_elsewhere: Option<f64>,
     cost_near_truth: f64,
-}
-
-impl fmt::Display for Frozen {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match (self.cost_in_six_freedoms, self.cost_elsewhere) {
-            (Some(best), Some(elsewhere)) => {
-                let (best, elsewhere) = pair(best, elsewhere);
-                write!(
-                    f,
-                    "Height, pitch or roll are off, and the search keeps them fixed. With them free the truth would win: cost \
-                     {best} near it, {elsewhere} elsewhere (lower is better)."
-                )
-            }
-            _ => write!(
-                f,
-                "No searched pose is right: height, pitch and roll are not searched. The truth is {}, {:.1}° off in them.",
-                metres(self.frozen_error.translation_m),
-                self.frozen_error.rotation_deg
-            ),
+} => {
+    match (cost_in_six_freedoms, cost_elsewhere) {
+        (Some(best), Some(elsewhere)) => {
+            let (best, elsewhere) = pair(*best, *elsewhere);
+            format!(
+                "Height, pitch or roll are off, and the search keeps them fixed. With them free the \
+                 truth would win: cost {best} near it, {elsewhere} elsewhere (lower is better)."
+            )
         }
+        _ => format!(
+            "No searched pose is right: height, pitch and roll are not searched. The truth is {}, \
+             {:.1}° off in them.",
+            metres(frozen_error.translation_m), frozen_error.rotation_deg
+        ),
     }
-}
+});

@@ -33,7 +33,7 @@ fn on_rim(case: &Case<'_>) -> Option<Diagnosis> {
     let offset = case.subject.evidence.minimum?.offset;
     let (grid, radius_m) = (&case.subject.params.grid, case.subject.problem.uncertainty_radius_m);
     grid.is_on_rim(&offset, radius_m).then(|| {
-        let distance_m = offset.right_m.hypot(offset.forward_m);
+        let distance_m = offset.distance_m();
         RULE.found(&Rim {
             distance_m,
             radius_m,
@@ -44,31 +44,18 @@ fn on_rim(case: &Case<'_>) -> Option<Diagnosis> {
     })
 }
 
-#[derive(Serialize)]
-struct Rim {
+evidence!(Rim {
     distance_m: f64,
     radius_m: f64,
     yaw_deg: f64,
     yaw_range_deg: f64,
     is_position: bool,
-}
-
-impl fmt::Display for Rim {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        if self.is_position {
-            write!(
-                f,
-                "The search ended at its edge: {} from the reference, where its coarse grid ends at {}.",
-                metres(self.distance_m),
-                metres(self.radius_m)
-            )?;
-        } else {
-            write!(
-                f,
-                "The search ended at its edge: a yaw of {:.1}°, where its coarse grid ends at ±{:.1}°.",
-                self.yaw_deg, self.yaw_range_deg
-            )?;
-        }
-        f.write_str(" The minimum may lie outside.")
-    }
-}
+} => {
+    let edge = if *is_position {
+        let (distance, radius) = (metres(*distance_m), metres(*radius_m));
+        format!("{distance} from the reference, where its coarse grid ends at {radius}")
+    } else {
+        format!("a yaw of {yaw_deg:.1}°, where its coarse grid ends at ±{yaw_range_deg:.1}°")
+    };
+    format!("The search ended at its edge: {edge}. The minimum may lie outside.")
+});

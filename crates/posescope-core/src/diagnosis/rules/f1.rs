@@ -54,27 +54,20 @@ fn dragging(case: &FusionCase<'_>, error: PoseError) -> Option<Diagnosis> {
     }))
 }
 
-#[derive(Serialize)]
-struct Dragged {
+evidence!(Dragged {
     reference: String,
     weight: f64,
     own_error: PoseError,
     error_without: PoseError,
     error: PoseError,
-}
-
-impl fmt::Display for Dragged {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let [own, without, fused] =
-            [&self.own_error, &self.error_without, &self.error].map(|e| metres(e.translation_m));
-        write!(
-            f,
-            "Reference {} dragged the fused pose: alone it puts the query {own} off. Without it the fused pose is {without} \
-             off, with it {fused}.",
-            self.reference
-        )
-    }
-}
+} => {
+    let [own, without, fused] =
+        [own_error, error_without, error].map(|error| metres(error.translation_m));
+    format!(
+        "Reference {reference} dragged the fused pose: alone it puts the query {own} off. Without it the \
+         fused pose is {without} off, with it {fused}."
+    )
+});
 
 /// On which reference a wrong joint pose rests.
 fn resting(member: &Member<'_>, truth: &Pose, error: PoseError) -> Option<Diagnosis> {
@@ -89,27 +82,17 @@ fn resting(member: &Member<'_>, truth: &Pose, error: PoseError) -> Option<Diagno
     }))
 }
 
-#[derive(Serialize)]
-struct Resting {
+evidence!(Resting {
     reference: String,
     weight: f64,
     own_error: Option<PoseError>,
     error: PoseError,
     support: String,
-}
-
-impl fmt::Display for Resting {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            f,
-            "The joint pose is {} off and rests on reference {} (weight {:.2}). ",
-            metres(self.error.translation_m),
-            self.reference,
-            self.weight,
-        )?;
-        match &self.own_error {
-            Some(own) => write!(f, "Alone it puts the query {} off.", metres(own.translation_m)),
-            None => f.write_str("Alone it has no pose."),
-        }
-    }
-}
+} => {
+    let off = metres(error.translation_m);
+    let alone = match own_error {
+        Some(own) => format!("Alone it puts the query {} off.", metres(own.translation_m)),
+        None => "Alone it has no pose.".to_owned(),
+    };
+    format!("The joint pose is {off} off and rests on reference {reference} (weight {weight:.2}). {alone}")
+});

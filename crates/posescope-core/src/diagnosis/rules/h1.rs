@@ -1,7 +1,6 @@
 //! H1: a method that chooses between poses kept a wrong one.
 
 use super::*;
-use crate::method::Method;
 
 pub(super) const RULE: Rule = Rule {
     title: "the wrong method's pose was kept",
@@ -60,27 +59,21 @@ fn passed_over(case: &Case<'_>) -> Option<Diagnosis> {
     }))
 }
 
-#[derive(Serialize)]
-struct PassedOver {
+evidence!(PassedOver {
     kept: Method,
     cost_kept: f64,
     passed_over: Method,
     cost_passed_over: f64,
     error: PoseError,
-}
-
-impl fmt::Display for PassedOver {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (right, kept) = pair(self.cost_passed_over, self.cost_kept);
-        write!(
-            f,
-            "A right pose of {}, cost {right}, lost to a wrong one of {}, cost {kept} (lower is better).",
-            self.passed_over, self.kept
-        )?;
-        if self.cost_passed_over < self.cost_kept {
-            f.write_str(" The prior, or the credit of features, decided.")
-        } else {
-            Ok(())
-        }
-    }
-}
+} => {
+    let (right, lost_to) = pair(*cost_passed_over, *cost_kept);
+    let why = if cost_passed_over < cost_kept {
+        " The prior, or the credit of features, decided."
+    } else {
+        ""
+    };
+    format!(
+        "A right pose of {passed_over}, cost {right}, lost to a wrong one of {kept}, cost {lost_to} \
+         (lower is better).{why}"
+    )
+});

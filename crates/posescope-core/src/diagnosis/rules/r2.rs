@@ -29,21 +29,15 @@ fn test(case: &Case<'_>) -> Option<Diagnosis> {
         .then(|| RULE.found(&Keypoints { query, reference, limit }))
 }
 
-#[derive(Serialize)]
-struct Keypoints {
+evidence!(Keypoints {
     query: usize,
     reference: usize,
     #[serde(skip_serializing_if = "Option::is_none")]
     limit: Option<String>,
-}
-
-impl fmt::Display for Keypoints {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { query, reference, limit } = self;
-        write!(f, "Too few keypoints: {query} in the query, {reference} in the reference.")?;
-        limit.iter().try_for_each(|limit| write!(f, " The limit is {limit}."))
-    }
-}
+} => {
+    let limit = limit.as_ref().map(|limit| format!(" The limit is {limit}.")).unwrap_or_default();
+    format!("Too few keypoints: {query} in the query, {reference} in the reference.{limit}")
+});
 
 fn remedies(ask: &Ask<'_>) -> Vec<Remedy> {
     vec![vec![ask.more_keypoints(0.2)], vec![ask.more_keypoints(0.05)]]

@@ -38,9 +38,8 @@ evidence!(Depths { right: usize, wrong: usize, missing: usize, true_matches: Fun
 );
 
 pub(super) fn remedies(ask: &Ask<'_>) -> Vec<Remedy> {
-    let mut tried = vec![vec![
-        ask.set(ask.key("fb.depth_radius", "fb2.depth_radius"), 2.0 * ask.depth_radius_px()),
-    ]];
+    let radius = ask.key("fb.depth_radius", "fb2.depth_radius");
+    let mut tried = vec![vec![ask.set(radius, 2.0 * ask.matching().depth_radius_px)]];
     tried.push(match ask.family {
         Family::Guided => vec![ask.set("fb2.depth_spread", 3.0 * ask.params.fb2.depth_spread)],
         _ => vec![ask.word("fb.depth", "guarded")],

@@ -30,23 +30,12 @@ fn test(case: &Case<'_>) -> Option<Diagnosis> {
     Some(RULE.found(&Loose { deviation_m, inliers, true_matches: matches.funnel }))
 }
 
-#[derive(Serialize)]
-struct Loose {
-    deviation_m: Option<f64>,
-    inliers: usize,
-    true_matches: Funnel,
-}
-
-impl fmt::Display for Loose {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let inliers = self.inliers;
-        match self.deviation_m {
-            Some(deviation) => write!(
-                f,
-                "The {inliers} inliers leave the pose loose: its standard deviation is {deviation:.2} m, {FIXED_M} m is the limit. \
-                 They are too few or too close together."
-            ),
-            None => write!(f, "The {inliers} inliers leave the pose undetermined."),
-        }
+evidence!(Loose { deviation_m: Option<f64>, inliers: usize, true_matches: Funnel } => {
+    match deviation_m {
+        Some(deviation) => format!(
+            "The {inliers} inliers leave the pose loose: its standard deviation is {deviation:.2} m, \
+             {FIXED_M} m is the limit. They are too few or too close together."
+        ),
+        None => format!("The {inliers} inliers leave the pose undetermined."),
     }
-}
+});

@@ -48,28 +48,22 @@ fn test(case: &Case<'_>) -> Option<Diagnosis> {
     })
 }
 
-#[derive(Serialize)]
-struct Missed {
+evidence!(Missed {
     supports_truth: usize,
     inliers: usize,
     trials: Option<usize>,
     true_matches: Funnel,
-}
-
-impl fmt::Display for Missed {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (inliers, near) = (self.inliers, self.supports_truth);
-        write!(f, "MLESAC missed the right pose: it ended with {inliers} inliers")?;
-        if let Some(trials) = self.trials {
-            write!(f, " after {trials} trials")?;
-        }
-        write!(f, ". A pose near the truth has {near}.")
-    }
-}
+} => {
+    let after = trials.map(|trials| format!(" after {trials} trials")).unwrap_or_default();
+    format!(
+        "MLESAC missed the right pose: it ended with {inliers} inliers{after}. A pose near the truth has \
+         {supports_truth}."
+    )
+});
 
 fn remedies(ask: &Ask<'_>) -> Vec<Remedy> {
     let group = ask.key("fb", "fb2");
-    let trials = (ask.mlesac().max_trials * 10).clamp(20_000, 10_000_000);
+    let trials = (ask.matching().mlesac.max_trials * 10).clamp(20_000, 10_000_000);
     let set = |key: &str, value: &str| Change::Set(format!("{group}.{key}={value}"));
     vec![
         vec![set("max_trials", &trials.to_string())],

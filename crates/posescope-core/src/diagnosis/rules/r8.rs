@@ -35,40 +35,31 @@ fn depths_are_wrong([inliers, true_ones]: [u64; 2], wrong_depth: u64, right_dept
     2 * true_ones >= inliers && 2 * wrong_depth > right_depth
 }
 
-#[derive(Serialize)]
-struct Accepted {
+evidence!(Accepted {
     error: PoseError,
     inliers: u64,
     true_inliers: u64,
     supports_truth: u64,
     wrong_depth: u64,
     true_matches: Funnel,
-}
-
-impl fmt::Display for Accepted {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { inliers, true_inliers, supports_truth, wrong_depth, .. } = self;
-        let off = metres(self.error.translation_m);
-        write!(
-            f,
-            "A wrong pose was accepted: {inliers} matches agree on it, {off} off, {true_inliers} of them true. "
-        )?;
-        // A pose on true matches points at their depths or their spread, one on false matches at the photos.
-        if depths_are_wrong([*inliers, *true_inliers], *wrong_depth, *supports_truth) {
-            write!(
-                f,
-                "Of the true matches, {wrong_depth} have a wrong depth, {supports_truth} the right one."
-            )
-        } else if 2 * true_inliers >= *inliers {
-            f.write_str("They are too few or too close together to fix it.")
-        } else {
-            write!(
-                f,
-                "The truth explains {supports_truth}: something looks alike or moved, or the camera is not as stated."
-            )
-        }
-    }
-}
+} => {
+    let off = metres(error.translation_m);
+    // A pose on true matches points at their depths or their spread, one on false matches at the photos.
+    let why = if depths_are_wrong([*inliers, *true_inliers], *wrong_depth, *supports_truth) {
+        format!("Of the true matches, {wrong_depth} have a wrong depth, {supports_truth} the right one.")
+    } else if 2 * true_inliers >= *inliers {
+        "They are too few or too close together to fix it.".to_owned()
+    } else {
+        format!(
+            "The truth explains {supports_truth}: something looks alike or moved, or the camera is not as \
+             stated."
+        )
+    };
+    format!(
+        "A wrong pose was accepted: {inliers} matches agree on it, {off} off, {true_inliers} of them true. \
+         {why}"
+    )
+});
 
 fn remedies(ask: &Ask<'_>) -> Vec<Remedy> {
     let mut tried = vec![vec![ask.ratio(-0.1)], vec![ask.ratio(-0.2)]];

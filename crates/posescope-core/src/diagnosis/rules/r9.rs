@@ -1,7 +1,6 @@
 //! R9: a pose outside the prior.
 
 use super::*;
-use crate::estimator::Failure;
 
 pub(super) const RULE: Rule = Rule {
     title: "the pose is outside the prior",
@@ -31,30 +30,20 @@ fn test(case: &Case<'_>) -> Option<Diagnosis> {
     is_outside.then(|| RULE.found(&Outside { distance_m, radius_m, error: None }))
 }
 
-/// The pose that was found, or without an error the truth.
-#[derive(Serialize)]
-struct Outside {
-    distance_m: f64,
-    radius_m: f64,
-    error: Option<PoseError>,
-}
-
-impl fmt::Display for Outside {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (distance, radius) = (metres(self.distance_m), metres(self.radius_m));
-        match &self.error {
-            Some(error) => write!(
-                f,
-                "The pose was refused for its distance: {distance} from the reference, {radius} allowed. The refused pose is {} off.",
-                metres(error.translation_m)
-            ),
-            None => write!(
-                f,
-                "The truth is outside the prior: {distance} from the reference, {radius} allowed."
-            ),
-        }
+// Of the pose that was found, or without an error of the truth.
+evidence!(Outside { distance_m: f64, radius_m: f64, error: Option<PoseError> } => {
+    let (distance, radius) = (metres(*distance_m), metres(*radius_m));
+    match error {
+        Some(error) => format!(
+            "The pose was refused for its distance: {distance} from the reference, {radius} allowed. \
+             The refused pose is {} off.",
+            metres(error.translation_m)
+        ),
+        None => format!(
+            "The truth is outside the prior: {distance} from the reference, {radius} allowed."
+        ),
     }
-}
+});
 
 fn remedies(ask: &Ask<'_>) -> Vec<Remedy> {
     [1.5, 2.0, 3.0].map(|times| vec![ask.radius(times)]).into()

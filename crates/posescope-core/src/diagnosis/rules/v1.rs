@@ -36,38 +36,27 @@ fn test(case: &RankingCase<'_>) -> Option<Diagnosis> {
     }))
 }
 
-#[derive(Serialize)]
-struct Ranked {
+evidence!(Ranked {
     first: String,
     first_distance_m: Option<f64>,
     rank_of_right_place: Option<usize>,
     taken: usize,
     ranked: usize,
     radius_m: f64,
-}
-
-impl fmt::Display for Ranked {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self.rank_of_right_place {
-            Some(rank) => write!(
-                f,
-                "Retrieval ranked the right place {}, and only the first {} used.",
-                ordinal(rank),
-                match self.taken {
-                    1 => "is".to_owned(),
-                    taken => format!("{taken} are"),
-                }
-            )?,
-            None => write!(
-                f,
-                "Retrieval missed the right place: none of {} ranked frames is within {} of the truth.",
-                self.ranked,
-                metres(self.radius_m)
-            )?,
+} => {
+    let place = match (rank_of_right_place, taken) {
+        (Some(rank), 1) => {
+            format!("ranked the right place {}, and only the first is used", ordinal(*rank))
         }
-        match self.first_distance_m {
-            Some(m) => write!(f, " Ranked 1st is {}, {} from the query.", self.first, metres(m)),
-            None => write!(f, " Ranked 1st is {}.", self.first),
+        (Some(rank), _) => {
+            format!("ranked the right place {}, and only the first {taken} are used", ordinal(*rank))
         }
-    }
-}
+        (None, _) => format!(
+            "missed the right place: none of {ranked} ranked frames is within {} of the truth",
+            metres(*radius_m)
+        ),
+    };
+    let distance = first_distance_m.map(|m| format!(", {} from the query", metres(m)));
+    let distance = distance.unwrap_or_default();
+    format!("Retrieval {place}. Ranked 1st is {first}{distance}.")
+});

@@ -7,7 +7,6 @@ use crate::camera::Intrinsics;
 use crate::diagnosis::matches::TrueMatches;
 use crate::diagnosis::{Evidence, Subject};
 use crate::estimator::{Estimator, FeatureBased};
-use crate::method::Method;
 use crate::solver::Correspondence;
 use crate::stats::median;
 use crate::trace::Trace;

@@ -2,7 +2,6 @@
 
 use std::sync::Arc;
 
-use image::GrayImage;
 use nalgebra::Point3;
 
 use super::Direct;
@@ -12,9 +11,9 @@ use crate::estimator::{CostSummary, Failure, Halt};
 use crate::event::{DescentStepped, Moment, PhaseSearched, Stage, ViewRendered};
 use crate::geometry::Pose;
 use crate::grid::{Lattice, Offset, Phase, Scored, least_covered};
-use crate::image::{FloatImage, gaussian_smoothed};
+use crate::image::gaussian_smoothed;
 use crate::problem::Problem;
-use crate::render::{ColoredCloud, Objective as _, Score, Scorer};
+use crate::render::{Objective as _, Score, Scorer};
 use crate::trace::Trace;
 
 /// Where a descent stands.
@@ -50,10 +49,21 @@ impl Direct {
         if trace.wants::<PhaseSearched>() {
             self.show_surface(problem, &scorer, initial, trace)?;
         }
+        // Every nth point.
+        let stride = cloud.points.len().div_ceil(self.descent.max_points).max(1);
+        let points = cloud.points.iter().step_by(stride).map(|point| point.position);
+        let points: Vec<Point3<f32>> = points.collect();
         trace.stage(Stage::Descend, |trace| {
             for level in (0..self.descent.levels).rev() {
                 trace.checkpoint()?;
                 let start = standing.reference_from_camera.inverse();
+                // Both photos as the level has them.
+                let sigma_px = self.descent.sigma_px * f64::from(1 << level);
+                let [query, reference] = [&problem.query.photo, &problem.reference.photo]
+                    .map(|photo| gaussian_smoothed(&photo.gray, sigma_px));
+                let query = (&query, &problem.query.intrinsics);
+                let reference = (&reference, &problem.reference.intrinsics);
+                let view = View::new(query, reference, &points, &start);
                 let mut step = 0;
                 let told = |Step { camera_from_reference, cost: smooth_cost }| {
                     let pose = camera_from_reference.inverse();
@@ -73,15 +83,13 @@ impl Direct {
                     })?;
                     trace.emit(|| rendered(&standing, Moment::NewBest))
                 };
-                let copies = Copies::new(self, problem, level);
-                let view = copies.view(problem, &cloud, &start, self.descent.most_points);
-                let most_steps = self.descent.most_steps;
+                let max_steps = self.descent.max_steps;
                 match self.cost.statistic() {
                     Statistic::Histogram { bins, .. } => {
-                        information::descend(&view, bins, most_steps, told)
+                        information::descend(&view, bins, max_steps, told)
                     }
                     // Of other costs, the one that looks at differences can be descended.
-                    _ => photometric::descend(&view, most_steps, told),
+                    _ => photometric::descend(&view, max_steps, told),
                 }?;
             }
             Ok::<_, Halt>(())
@@ -115,7 +123,7 @@ impl Direct {
         })
     }
 
-    /// Tells the coarse positions of the grid with their costs, for whoever watches.
+    /// Emits the coarse positions of the grid with their costs, for observers.
     fn show_surface(
         &self,
         problem: &Problem,
@@ -134,41 +142,5 @@ impl Direct {
             trace.emit(|| PhaseSearched { surface: Arc::new(surface), best: None })?;
             Ok(())
         })
-    }
-}
-
-/// Both photos as a level has them.
-struct Copies {
-    query: FloatImage,
-    reference: FloatImage,
-}
-
-impl Copies {
-    fn new(direct: &Direct, problem: &Problem, level: usize) -> Self {
-        let sigma_px = direct.descent.sigma_px * f64::from(1 << level);
-        let copy = |photo: &GrayImage| gaussian_smoothed(photo, sigma_px);
-        Self {
-            query: copy(&problem.query.photo.gray),
-            reference: copy(&problem.reference.photo.gray),
-        }
-    }
-
-    /// What the query's copy shows of the coloured points, of which every nth is taken.
-    fn view(
-        &self,
-        problem: &Problem,
-        cloud: &ColoredCloud,
-        camera_from_reference: &Pose,
-        most_points: usize,
-    ) -> View<'_> {
-        let stride = cloud.points.len().div_ceil(most_points).max(1);
-        let points: Vec<Point3<f32>> =
-            cloud.points.iter().step_by(stride).map(|point| point.position).collect();
-        View::new(
-            (&self.query, &problem.query.intrinsics),
-            (&self.reference, &problem.reference.intrinsics),
-            &points,
-            camera_from_reference,
-        )
     }
 }

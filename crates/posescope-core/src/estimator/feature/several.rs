@@ -34,8 +34,8 @@ pub(in crate::estimator) struct Gathered {
 }
 
 impl FeatureBased {
-    /// The correspondences of a problem, as [`Estimator::estimate`] comes to them. Nothing is told of the
-    /// way: a run on the problem alone has done so.
+    /// The correspondences of a problem, as [`Estimator::estimate`] comes to them. No event is
+    /// emitted: a run on the problem alone has done so.
     pub(in crate::estimator) fn gather(&self, problem: &Problem) -> Result<Gathered, Failure> {
         let gathered = || {
             let trace = &mut Trace::off();
@@ -62,12 +62,12 @@ impl FeatureBased {
         })
     }
 
-    /// What MLESAC is told.
+    /// MLESAC's parameters.
     pub(in crate::estimator) fn mlesac(&self) -> &MlesacParams {
         &self.params.mlesac
     }
 
-    /// Why MLESAC has no consensus of so many correspondences.
+    /// Why MLESAC has no consensus of this many correspondences.
     pub(in crate::estimator) fn halt(
         error: MlesacError<Cancelled>,
         correspondences: usize,

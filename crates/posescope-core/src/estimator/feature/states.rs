@@ -5,8 +5,7 @@ use std::sync::Arc;
 use super::Pairing;
 use crate::depth::LiftedMatch;
 use crate::estimator::FeatureCounts;
-use crate::features::FeatureState;
-use crate::features::{Match, MatchVerdict};
+use crate::features::{FeatureState, Match, MatchVerdict};
 
 /// The state of each query feature, brought up to date by every stage until the one it ends in.
 #[derive(Default)]
@@ -41,10 +40,7 @@ impl FeatureStates {
     }
 
     pub(in crate::estimator) fn passed_ratio_test(&self) -> usize {
-        self.states
-            .iter()
-            .filter(|state| !matches!(state, FeatureState::RatioFailed { .. }))
-            .count()
+        self.states.iter().filter(|state| state.index() > 0).count()
     }
 
     pub(in crate::estimator) fn after_depth_lift(&mut self, lifted: &[LiftedMatch]) {
@@ -78,20 +74,14 @@ impl FeatureStates {
             ..FeatureCounts::default()
         };
         for state in &self.states {
-            let passed = match state {
-                FeatureState::RatioFailed { .. } => 0,
-                FeatureState::NotUnique { .. } => 1,
-                FeatureState::NoDepth { .. } => 2,
-                FeatureState::Outlier { .. } => 3,
-                FeatureState::Inlier { .. } => 4,
-            };
             let tests = [
                 &mut counts.ratio_passed,
                 &mut counts.unique,
                 &mut counts.with_depth,
                 &mut counts.inliers,
             ];
-            for count in tests.into_iter().take(passed) {
+            // It passed as many tests as there are states before it.
+            for count in tests.into_iter().take(state.index()) {
                 *count += 1;
             }
         }

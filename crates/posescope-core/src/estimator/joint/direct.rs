@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
-use super::{JointEstimator, JointOutcome, JointReference, between, lead};
+use super::{JointEstimator, JointPose, JointReference, between, lead};
 use crate::cost;
 use crate::estimator::direct::{Best, Direct, check_size, coarse_to_fine};
-use crate::estimator::{Failure, Halt, separate_failure};
+use crate::estimator::{Failure, Halt};
 use crate::fusion::share::Support;
 use crate::geometry::Pose;
 use crate::grid::{Lattice, Offset, ScoredLattice, least_covered, scan};
@@ -22,28 +22,14 @@ use crate::trace::{Cancelled, Trace};
 /// than the right one, and a grid at the average of the references was less exact.) At each hypothesis every reference draws its own view of the query and has its own cost; the
 /// joint cost is their mean, each weighed by the pixels that it covers. One that covers too little there,
 /// as [`coverage_floor`](crate::grid::GridParams::coverage_floor) says, abstains, and where fewer than
-/// half have a say there is no cost: a place that few can see would be cheap for that reason alone.
+/// half are eligible there is no cost: a place that few can see would have a low cost for that reason alone.
 ///
 /// The grid ends at a step and at the greatest yaw, and its height, pitch and roll are those of one
 /// reference; an average of several poses is bound to none of that. So the minimum of the grid, and the pose
 /// that each reference found alone, are refined under the joint cost by shrinking steps, and the cheapest is
 /// the answer. With one reference that shows something nothing is refined: the answer is the method's own.
-pub struct JointDirect {
+pub(in crate::estimator) struct JointDirect {
     direct: Direct,
-}
-
-impl JointEstimator for JointDirect {
-    fn estimate(
-        &self,
-        references: &[JointReference<'_>],
-        trace: &mut Trace<'_>,
-    ) -> Result<JointOutcome, Cancelled> {
-        let found = self.search(references, trace);
-        Ok(match separate_failure(found)? {
-            Ok((pose, supports)) => JointOutcome { pose: Ok(pose), supports },
-            Err(failure) => JointOutcome::failed(failure, references.len()),
-        })
-    }
 }
 
 /// The first step is that of the grid's fine lattice, the last what neither a photo nor a scan tells apart.
@@ -66,15 +52,28 @@ struct Member<'a> {
 
 impl JointDirect {
     /// The estimator of a registered cost.
-    pub fn new(entry: &cost::Entry, params: &Params) -> Self {
+    pub(in crate::estimator) fn new(entry: &cost::Entry, params: &Params) -> Self {
         Self { direct: Direct::new(entry, params) }
     }
 
-    fn search(
+    fn member(&self, index: usize, problem: &Problem, lead: &Problem) -> Member<'_> {
+        let scorer = self.direct.scorer_of(problem);
+        let at_reference = scorer.score(&[Pose::identity()])[0];
+        Member {
+            index,
+            scorer,
+            member_from_lead: between(problem, lead),
+            least_covered: least_covered(self.direct.grid.coverage_floor, at_reference.covered),
+        }
+    }
+}
+
+impl JointEstimator for JointDirect {
+    fn agree(
         &self,
         references: &[JointReference<'_>],
         trace: &mut Trace<'_>,
-    ) -> Result<(Pose, Vec<Option<Support>>), Halt> {
+    ) -> Result<JointPose, Halt> {
         let lead = references[lead(references)].problem;
         let (grid, radius_m) = (&self.direct.grid, lead.uncertainty_radius_m);
         check_size(grid, radius_m)?;
@@ -120,17 +119,6 @@ impl JointDirect {
             });
         }
         Ok((lead.world_from_query(&lead_from_query), supports))
-    }
-
-    fn member(&self, index: usize, problem: &Problem, lead: &Problem) -> Member<'_> {
-        let scorer = self.direct.scorer_of(problem);
-        let at_reference = scorer.score(&[Pose::identity()])[0];
-        Member {
-            index,
-            scorer,
-            member_from_lead: between(problem, lead),
-            least_covered: least_covered(self.direct.grid.coverage_floor, at_reference.covered),
-        }
     }
 }
 

@@ -1,15 +1,14 @@
 //! FB of several references: the correspondences of all in one MLESAC.
 
-use super::{JointEstimator, JointOutcome, JointReference, between, lead};
-use crate::estimator::feature::{FeatureBased, Gathered, MINIMUM};
-use crate::estimator::{Failure, Halt, separate_failure};
+use super::{JointEstimator, JointPose, JointReference, between, lead};
+use crate::estimator::feature::{FeatureBased, MINIMUM};
+use crate::estimator::{Failure, Halt};
 use crate::event::Stage;
 use crate::fusion::share::Support;
-use crate::geometry::Pose;
 use crate::params::Params;
 use crate::robust::{Consensus, mlesac};
 use crate::solver::Correspondence;
-use crate::trace::{Cancelled, Trace};
+use crate::trace::Trace;
 
 /// The feature-based estimator of several references.
 ///
@@ -18,44 +17,34 @@ use crate::trace::{Cancelled, Trace};
 /// none of them would. Whether it is more than chance is asked of keypoints of the query: one that several
 /// references explain is a single observation, and one that has several matches has as many occasions to
 /// agree by accident.
-pub struct JointFeatures {
+pub(in crate::estimator) struct JointFeatures {
     features: FeatureBased,
 }
 
 impl JointEstimator for JointFeatures {
-    fn estimate(
-        &self,
-        references: &[JointReference<'_>],
-        trace: &mut Trace<'_>,
-    ) -> Result<JointOutcome, Cancelled> {
-        let agreed = trace.stage(Stage::Consensus, |trace| self.agree(references, trace));
-        Ok(match separate_failure(agreed)? {
-            Ok((pose, supports)) => JointOutcome { pose: Ok(pose), supports },
-            Err(failure) => JointOutcome::failed(failure, references.len()),
-        })
-    }
-}
-
-/// The correspondences of all references in the frame of the lead's camera.
-struct Pool {
-    correspondences: Vec<Correspondence>,
-    /// The reference of each.
-    of: Vec<usize>,
-}
-
-impl JointFeatures {
-    /// The estimator with these parameters.
-    pub fn new(params: &Params) -> Self {
-        Self { features: FeatureBased::new(params) }
-    }
-
     fn agree(
         &self,
         references: &[JointReference<'_>],
         trace: &mut Trace<'_>,
-    ) -> Result<(Pose, Vec<Option<Support>>), Halt> {
+    ) -> Result<JointPose, Halt> {
+        trace.stage(Stage::Consensus, |trace| self.consensus(references, trace))
+    }
+}
+
+impl JointFeatures {
+    /// The estimator with these parameters.
+    pub(in crate::estimator) fn new(params: &Params) -> Self {
+        Self { features: FeatureBased::new(params) }
+    }
+
+    fn consensus(
+        &self,
+        references: &[JointReference<'_>],
+        trace: &mut Trace<'_>,
+    ) -> Result<JointPose, Halt> {
         let lead = references[lead(references)].problem;
-        let mut pool = Pool { correspondences: Vec::new(), of: Vec::new() };
+        // In the frame of the lead's camera, and the reference of each.
+        let (mut correspondences, mut origins) = (Vec::new(), Vec::new());
         let (mut unique, mut keypoints) = (0, 0);
         for (index, reference) in references.iter().enumerate() {
             trace.checkpoint()?;
@@ -63,17 +52,15 @@ impl JointFeatures {
             let Ok(gathered) = self.features.gather(reference.problem) else {
                 continue;
             };
-            let Gathered { correspondences, unique: own, query_keypoints } = gathered;
-            unique += own;
-            keypoints = query_keypoints;
+            unique += gathered.unique;
+            keypoints = gathered.query_keypoints;
             let lead_from_reference = between(lead, reference.problem);
-            for Correspondence { pixel, point } in correspondences {
+            for Correspondence { pixel, point } in gathered.correspondences {
                 let point = lead_from_reference * point;
-                pool.correspondences.push(Correspondence { pixel, point });
-                pool.of.push(index);
+                correspondences.push(Correspondence { pixel, point });
+                origins.push(index);
             }
         }
-        let correspondences = pool.correspondences.as_slice();
         if unique < MINIMUM {
             return Err(Halt::from(Failure::TooFewMatches { unique, keypoints }));
         }
@@ -85,7 +72,7 @@ impl JointFeatures {
         }
         trace.checkpoint()?;
         let consensus = mlesac(
-            correspondences,
+            &correspondences,
             &lead.query.intrinsics,
             self.features.mlesac(),
             lead.random_seed("mlesac"),
@@ -93,11 +80,11 @@ impl JointFeatures {
         );
         let consensus =
             consensus.map_err(|error| FeatureBased::halt(error, correspondences.len()))?;
-        let supports = pool.supports(&consensus, references.len());
+        let supports = supports(&origins, &consensus, references.len());
 
         let intrinsics = &lead.query.intrinsics;
         let beyond =
-            (self.features).beyond_chance(correspondences, &consensus.inliers, intrinsics, 0.0);
+            (self.features).beyond_chance(&correspondences, &consensus.inliers, intrinsics, 0.0);
         // Where the query can be, the reference says that explains most of it.
         let inliers = |index: usize| supports[index].map_or(0.0, |support| support.amount());
         let most = (0..references.len())
@@ -112,17 +99,15 @@ impl JointFeatures {
     }
 }
 
-impl Pool {
-    /// Inliers of each reference among its correspondences.
-    fn supports(&self, consensus: &Consensus, references: usize) -> Vec<Option<Support>> {
-        let mut counts = vec![(0, 0); references];
-        for &index in &self.of {
-            counts[index].1 += 1;
-        }
-        for &inlier in &consensus.inliers {
-            counts[self.of[inlier]].0 += 1;
-        }
-        let support = |(inliers, correspondences)| Support::Inliers { inliers, correspondences };
-        counts.into_iter().map(support).map(Some).collect()
+/// Inliers of each reference among its correspondences; `origins` is the reference of each correspondence.
+fn supports(origins: &[usize], consensus: &Consensus, references: usize) -> Vec<Option<Support>> {
+    let mut counts = vec![(0, 0); references];
+    for &index in origins {
+        counts[index].1 += 1;
     }
+    for &inlier in &consensus.inliers {
+        counts[origins[inlier]].0 += 1;
+    }
+    let support = |(inliers, correspondences)| Support::Inliers { inliers, correspondences };
+    counts.into_iter().map(support).map(Some).collect()
 }

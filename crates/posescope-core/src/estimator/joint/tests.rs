@@ -1,15 +1,10 @@
-use crate::params::Params;
-use std::sync::Arc;
-
 use super::*;
 use crate::camera::Intrinsics;
 use crate::cloud::Cloud;
 use crate::diagnosis::Code;
 use crate::estimator::{entry, methods};
-use crate::fusion::fuse_jointly;
 use crate::geometry::yaw;
 use crate::image::Photo;
-use crate::method::Method;
 use crate::problem::{Query, ReferenceTuple};
 use nalgebra::{Point2, Point3, Vector3};
 
@@ -106,7 +101,7 @@ fn jointly(
             alone: alone.as_ref().ok(),
         })
         .collect();
-    fuse_jointly(method, &params, &references, &mut Trace::off()).expect("nobody cancels")
+    estimate_jointly(method, &params, &references, &mut Trace::off()).expect("nobody cancels")
 }
 
 fn off_m(pose: &Pose) -> f64 {
@@ -233,8 +228,8 @@ fn a_method_that_takes_one_reference_at_a_time_says_so() {
     assert_eq!(jointly, ["fb", "pm", "mi", "hy", "nid"]);
     for name in ["fb2", "mi6", "robust"] {
         let method: Method = name.parse().expect("registered");
-        let (pose, shares) =
-            fuse_jointly(method, &params, &references, &mut Trace::off()).expect("nobody cancels");
+        let (pose, shares) = estimate_jointly(method, &params, &references, &mut Trace::off())
+            .expect("nobody cancels");
         assert_eq!(pose, Err(Failure::NotJoint { method }));
         assert_eq!(shares[0].outcome, ShareOutcome::Failed);
     }
@@ -244,6 +239,6 @@ fn a_method_that_takes_one_reference_at_a_time_says_so() {
 fn without_references_there_is_no_joint_pose() {
     let params = Params::default();
     let (pose, _) =
-        fuse_jointly(Method::FB, &params, &[], &mut Trace::off()).expect("nobody cancels");
+        estimate_jointly(Method::FB, &params, &[], &mut Trace::off()).expect("nobody cancels");
     assert_eq!(pose, Err(Failure::NoReference { radius_m: None }));
 }

@@ -8,10 +8,10 @@ use crate::features::PairMatches;
 use crate::fusion::{self, Fusion, Share, Way};
 use crate::geometry::{Pose, PoseError};
 use crate::localize::observer::checkpoint;
-use crate::localize::{LocalizeObserver, QueryResult, StageTimes, StageTimings, localize_jointly};
+use crate::localize::single::localize_jointly;
+use crate::localize::{LocalizeObserver, QueryResult, StageTimes, StageTimings};
 use crate::method::Method;
 use crate::problem::Problem;
-use crate::scene::Scene;
 use crate::trace::{Cancelled, Fanout, Sink, Trace};
 
 impl Localizer<'_> {
@@ -94,7 +94,6 @@ impl Localizer<'_> {
         let best = solved.iter().rev().max_by_key(|(_, matches, _)| *matches);
         let result = QueryResult {
             references: solved.iter().map(|(problem, ..)| problem.reference.name.clone()).collect(),
-            fusion: Some(fusion),
             initial_error: truth.zip(best).map(|(truth, (problem, ..))| {
                 PoseError::between(truth, &problem.reference.world_from_camera)
             }),
@@ -109,15 +108,7 @@ impl Localizer<'_> {
             per_reference: Some(
                 solved.iter().map(|(.., candidate)| candidate.result.nested()).collect(),
             ),
-            ..QueryResult::new(
-                self.references.name(),
-                &work.query.name,
-                method,
-                self.seed,
-                pose.as_ref(),
-                truth,
-                self.tolerance,
-            )
+            ..self.of_pose(work, method, Some(fusion), pose.as_ref())
         };
         let result = self.with_ranking_judged(result, request, truth);
         observer.end_fusion(&result);

@@ -4,8 +4,7 @@ use super::work::{Estimated, MethodOutcome, QueryWork};
 use super::{Localizer, Request};
 use crate::diagnosis::{Assessment, Grade, Subject, confidence, diagnose_ranking};
 use crate::geometry::Pose;
-use crate::localize::QueryResult;
-use crate::localize::result::evaluate_as;
+use crate::localize::{QueryResult, evaluate};
 use crate::method::Method;
 use crate::scene::Scene;
 
@@ -49,7 +48,7 @@ impl Localizer<'_> {
             },
             None => Assessment::of(&subject),
         };
-        let mut result = evaluate_as(self.references.name(), &subject, assessment);
+        let mut result = evaluate(self.references.name(), &subject, assessment);
         if let Ok(pose) = &outcome.pose {
             result.agreement = work.agreement(problem, method, pose);
         }

@@ -10,7 +10,7 @@ use crate::geometry::Pose;
 use crate::render::projection::Projection;
 use crate::render::{Device, Loaded, Score, Workload};
 
-/// Of so many hypotheses of a batch one is scored on the threads too.
+/// One hypothesis of this many of a batch is scored on the threads too.
 const CHECKED_ONE_IN: usize = 256;
 /// Hypotheses of a batch that are scored on the threads too, at least.
 const MIN_CHECKED: usize = 4;
@@ -38,7 +38,7 @@ impl Scorer<'_> {
         self
     }
 
-    /// How many of so many hypotheses to score at a time, so that a run can be stopped soon: a device takes
+    /// The batch size for a number of hypotheses, small enough that a run can be stopped soon: a device takes
     /// more than the threads.
     pub fn at_a_time_of(&self, hypotheses: usize) -> usize {
         let device = self.on_device.device.as_ref();

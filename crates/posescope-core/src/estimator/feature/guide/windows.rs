@@ -14,7 +14,7 @@ pub(super) struct Windows {
 }
 
 impl Windows {
-    /// Keypoints of a photo, in squares of so many pixels.
+    /// Keypoints of a photo, in squares of `side` \[px\].
     pub(super) fn new(keypoints: &[Keypoint], camera: &Intrinsics, side: f64) -> Self {
         let along = |length: u32| (f64::from(length) / side) as usize + 1;
         let (columns, rows) = (along(camera.width), along(camera.height));

@@ -1,3 +1,0 @@
-//! How methods find their poses.
-
-pub use crate::estimator::Family;
