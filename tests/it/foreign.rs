@@ -109,7 +109,7 @@ fn an_inverted_pose_is_told_by_its_convention() {
     assert!(!found.is_empty());
     for result in found {
         let first = &result.diagnosis[0];
-        let reading = "read as camera_from_world (inverted), it is 0.00 m off";
+        let reading = "read as camera_from_world (inverted), it is 0.00 m and 0.0° off";
         assert_eq!(first.code, Code::X1, "{}: {}", result.query, first.text);
         assert!(first.text.contains(reading), "{}", first.text);
     }
