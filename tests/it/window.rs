@@ -354,6 +354,8 @@ fn the_run_over_all_queries_and_a_run_with_old_settings_stop_soon() {
         let begun = Instant::now();
         command(window.state_mut());
         window.step();
+        // A note lasts for so many frames only.
+        let is_told = is_said(&window, "its settings were changed");
         assert_eq!(app(&window).queries.progress(), None);
         wait(&mut window, is_alone);
         assert!(begun.elapsed() < Duration::from_secs(20));
@@ -365,13 +367,13 @@ fn the_run_over_all_queries_and_a_run_with_old_settings_stop_soon() {
         window.step();
         assert_eq!(app(&window).queries.progress(), Some((0, 3)));
         wait(&mut window, |app| !is_alone(app));
+        is_told
     };
     // The first time there is nothing to stop but the session, which waits at its first event.
-    stop_by(&|app| app.app_state_mut().set_seed(8));
-    stop_by(&|app| app.act("Run all queries, or stop"));
+    assert!(!stop_by(&|app| app.app_state_mut().set_seed(8)));
+    assert!(!stop_by(&|app| app.act("Run all queries, or stop")));
     stop_by(&|app| app.app_state_mut().set_param("grid.yaw_step", "2"));
-    stop_by(&|app| app.app_state_mut().set_references(vec![2]));
-    assert!(is_said(&window, "its settings were changed"));
+    assert!(stop_by(&|app| app.app_state_mut().set_references(vec![2])));
 }
 
 #[test]
