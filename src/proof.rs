@@ -27,6 +27,7 @@ use crate::problem::Problem;
 use crate::trace::Record;
 
 pub use layout::{MARK, Place, free_corner, label_place, title_end};
+#[cfg(feature = "app")]
 pub(crate) use maps::between;
 
 /// The kinds of event that proofs are made from.

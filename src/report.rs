@@ -279,7 +279,7 @@ fn drawn_failure(
     let request = Request {
         radius_m,
         references: references.ok()?.into(),
-        fusions: result.fusion.iter().cloned().collect(),
+        fusions: result.fusion.into_iter().collect(),
         setting: None,
     };
     let mut witness = Witness::default();
