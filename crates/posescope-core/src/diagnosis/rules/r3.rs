@@ -57,7 +57,7 @@ impl fmt::Display for Matches {
         let (of, lost_by) = match self.lost_at {
             Step::View => ("reference keypoints with a depth", "are outside the query's view"),
             Step::Detect => ("reference keypoints in the query's view", "were not detected there"),
-            Step::Match => ("keypoints detected in both photos", "match a wrong one"),
+            Step::Match => ("keypoints detected in both photos", "have a wrong nearest neighbour"),
             Step::Ratio => ("true nearest neighbours", "fail the ratio test"),
             Step::Unique => ("true matches", "are not mutually best"),
         };
