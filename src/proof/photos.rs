@@ -357,8 +357,8 @@ pub(super) fn cloud_on_photo(case: &ProofCase<'_>) -> Option<ProofPicture> {
     })
 }
 
-/// The cloud on the reference's own photo. Its edges lie on those of the photo, unless the cloud or its place is wrong:
-/// then no method can work, and what else is said is a consequence.
+/// The cloud on the reference's own photo. Its edges lie on those of the photo. If they do not, the cloud or its place
+/// is wrong, no method can work, and all other verdicts follow from that.
 pub(super) fn reference_cloud(case: &ProofCase<'_>) -> Panel {
     let reference = &case.problem.reference;
     let (photo, points) =

@@ -115,6 +115,33 @@ fn an_inverted_pose_is_told_by_its_convention() {
     }
 }
 
+/// Axes forward, left and up. The place is right, so the heading alone tells.
+#[test]
+fn camera_axes_of_a_robot_are_told_by_their_convention() {
+    let sequence = SmallSequence::write();
+    let poses = fs::read_to_string(sequence.poses()).expect("readable");
+    let turned: String = poses
+        .lines()
+        .map(|line| {
+            let m: Vec<f64> = line.split(' ').map(|word| word.parse().expect("a number")).collect();
+            let row = |i: usize| format!("{} {} {} {}", m[i + 2], -m[i], -m[i + 1], m[i + 3]);
+            [0, 4, 8].map(row).join(" ") + "\n"
+        })
+        .collect();
+    write(sequence.path().join("poses.txt"), turned);
+    let all = "sequences/42 --all --reference 4 --method other --estimates other=poses.txt";
+    let found = results(sequence.path(), all);
+    assert!(!found.is_empty());
+    for result in found {
+        let first = &result.diagnosis[0];
+        let reading =
+            "read as camera axes (z, -x, -y), it is 0.00 m and 0.0° off, not 0.00 m and 120.0°";
+        assert_eq!(first.code, Code::X1, "{}: {}", result.query, first.text);
+        assert!(first.text.contains(reading), "{}", first.text);
+        assert_eq!(result.off().as_deref(), Some("120.00°"), "{}", result.query);
+    }
+}
+
 #[test]
 fn all_four_texts_say_the_same() {
     let (sequence, found) = small();
