@@ -114,6 +114,7 @@ fn a_wrong_focal_length_is_named_before_the_cloud() {
     crate::binary::write(&scene, lines.collect::<String>());
     let words = "run street --query-scene made/overcast --query 350 --reference 347 --method fb";
     let said = said(words);
-    let expected = "X1 The query camera is suspect: with a focal length of 719 px in place of 610 px it explains";
+    let expected =
+        "X1 The query camera is suspect: its focal length should be 719 px, not 610. That explains";
     crate::binary::has(&said, expected);
 }

@@ -270,27 +270,26 @@ evidence!(OtherCamera {
     camera: Intrinsics,
     stated: Intrinsics,
 } =>
-    "The query camera is suspect: with {} it explains {explained_otherwise} matches at the truth, not \
+    "The query camera is suspect: {}. That explains {explained_otherwise} matches at the truth, not \
      {explained}.",
-    otherwise_stated(camera, stated)
+    what_it_should_be(camera, stated)
 );
 
-/// In what a camera differs from the stated one, to the pixel.
-fn otherwise_stated(camera: &Intrinsics, stated: &Intrinsics) -> String {
+/// What differs between two cameras, to the pixel.
+fn what_it_should_be(camera: &Intrinsics, stated: &Intrinsics) -> String {
     let mut differences = Vec::new();
     if (camera.fx / stated.fx - 1.0).abs() > SAME_FOCAL_LENGTH {
-        differences
-            .push(format!("a focal length of {:.0} px in place of {:.0} px", camera.fx, stated.fx));
+        let lengths = format!("{:.0} px, not {:.0}", camera.fx, stated.fx);
+        differences.push(("its focal length", lengths));
     }
     if (camera.cx - stated.cx).hypot(camera.cy - stated.cy) > SAME_CENTRE_PX {
-        let centre = |of: &Intrinsics| format!("({:.0}, {:.0}) px", of.cx, of.cy);
-        differences.push(format!(
-            "the centre at {} in place of {}",
-            centre(camera),
-            centre(stated)
-        ));
+        let centre = |of: &Intrinsics| format!("({:.0}, {:.0})", of.cx, of.cy);
+        differences.push(("its centre", format!("{}, not {}", centre(camera), centre(stated))));
     }
-    differences.join(" and ")
+    match differences.as_slice() {
+        [(first, is), (second, are)] => format!("{first} should be {is}, and {second} {are}"),
+        others => others.iter().map(|(what, is)| format!("{what} should be {is}")).collect(),
+    }
 }
 
 /// The camera of one focal length and any centre that explains most matches from a pose.
