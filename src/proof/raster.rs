@@ -2,7 +2,7 @@
 
 use std::sync::LazyLock;
 
-use image::imageops::{self, FilterType};
+use image::imageops;
 use image::{Rgb, RgbImage};
 use skrifa::instance::{LocationRef, Size};
 use skrifa::{FontRef, MetadataProvider as _};
@@ -70,8 +70,17 @@ impl ProofPicture {
 /// Puts the panel's picture into its place.
 fn paste(canvas: &mut RgbImage, panel: &Panel, place: &Place) {
     let size = [place.width, place.height].map(|length| (length.round() as u32).max(1));
-    let filter = if panel.has_cells { FilterType::Nearest } else { FilterType::Triangle };
-    let picture = imageops::resize(panel.picture.as_ref(), size[0], size[1], filter);
+    let picture = panel.picture.as_ref();
+    let picture = if panel.has_cells {
+        let [width, height] = size;
+        let cell = |x, y| [x * picture.width() / width, y * picture.height() / height];
+        RgbImage::from_fn(width, height, |x, y| {
+            let [column, row] = cell(x, y);
+            *picture.get_pixel(column, row)
+        })
+    } else {
+        imageops::thumbnail(picture, size[0], size[1])
+    };
     imageops::replace(canvas, &picture, place.left.round() as i64, place.top.round() as i64);
 }
 
