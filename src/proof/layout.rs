@@ -98,7 +98,9 @@ impl ProofPicture {
             let place = Place { top: large.top + large.height + GAP, height: strip, ..left };
             places.push(place.below_title().fitted(below));
         }
-        let beside_left = left.width + GAP;
+        // What the large panel leaves free is for the small ones.
+        let taken = places.iter().fold(0.0, |taken: f32, place| taken.max(place.width));
+        let beside_left = taken + GAP;
         let width = (all.width - beside_left - GAP * (columns - 1) as f32) / columns as f32;
         for (at, panels) in
             self.beside.chunks(self.beside.len().div_ceil(columns).max(1)).enumerate()

@@ -241,23 +241,14 @@ fn moved_query(place: &Place<'_>, case: &mut Case, from: usize, moved: Pose) -> 
 }
 
 fn turned_query(place: &Place<'_>, case: &mut Case, left_deg: f64) -> Option<()> {
-    let turn = yaw(left_deg.to_radians());
-    moved_query(
-        place,
-        case,
-        place.street()?.query,
-        Pose::from_parts(Translation3::identity(), turn),
-    )
+    let turned = Pose::from_parts(Translation3::identity(), yaw(left_deg.to_radians()));
+    moved_query(place, case, place.street()?.query, turned)
 }
 
 fn raised_camera(place: &Place<'_>, case: &mut Case) -> Option<()> {
     let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), -5_f64.to_radians());
-    moved_query(
-        place,
-        case,
-        place.street()?.query,
-        Pose::from_parts(Translation3::new(0.0, -1.5, 0.0), down),
-    )
+    let raised = Pose::from_parts(Translation3::new(0.0, -1.5, 0.0), down);
+    moved_query(place, case, place.street()?.query, raised)
 }
 
 /// The query is moved half a coarse step against the reference and turned.

@@ -63,13 +63,7 @@ pub fn run(options: &Options) -> Result<(), Failure> {
         let mut request =
             Retriever::request(references.as_ref(), &index_options, &Default::default(), &params);
         request.frames.retain(|frame| !held_out.contains(frame));
-        let started = Instant::now();
-        Retriever::build(references.as_ref(), &path, &request, &params, |p| {
-            if p.done == p.total || p.done % 50 < 16 {
-                let seconds = started.elapsed().as_secs();
-                eprintln!("{} {} of {}, {seconds} s", p.step.name(), p.done, p.total);
-            }
-        })?;
+        Retriever::build(references.as_ref(), &path, &request, &params, |_| {})?;
     }
     let index = Index::open(&path, params.retrieval.checks)?;
     let mut rows = Vec::new();

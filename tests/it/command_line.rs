@@ -233,7 +233,8 @@ fn parameters_keep_their_names_whole_at_eighty_columns() {
 #[test]
 fn an_evaluation_fits_eighty_columns_and_is_markdown_in_a_pipe() {
     let sequence = SmallSequence::write();
-    let line = |out| format!("eval sequences/42 --method fb,mi --out {out}");
+    let line =
+        |out| format!("eval sequences/42 --method fb,mi --radius 3 --keep-failures 0 --out {out}");
     let narrow = printed(&sequence, &line("a"), Some("80"));
     expect_narrow(&narrow);
     assert!(!narrow.contains('|'), "{narrow}");

@@ -9,7 +9,7 @@ const NOWHERE: [(&str, &str); 2] =
 
 /// An evaluation into a folder of the name of what it computes on.
 fn eval(compute: &str) -> String {
-    let methods = "--method pm,mi,hy,nid --radius 3 --reference random:2 --query 3";
+    let methods = "--method pm,mi,hy,nid --radius 2 --reference random:2 --query 3";
     let grid = "--set grid.coarse_step=0.5 -q";
     format!("eval sequences/42 {methods} {grid} --compute {compute} --out {compute}")
 }

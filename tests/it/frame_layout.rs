@@ -53,8 +53,12 @@ fn rect(window: &Harness<'_, App>, label: &str) -> Rect {
 
 #[test]
 fn the_canvas_has_the_room_and_the_toolbar_is_one_line_at_every_size() {
+    let mut window = window(SIZES[0].0, Setup { query: GREY, ..setup() });
     for (size, share) in SIZES {
-        let window = window(size, Setup { query: GREY, ..setup() });
+        window.set_size(size.into());
+        window.run_steps(3);
+        wait(&mut window, |app| !app.app_state().is_working_out());
+        window.run_steps(3);
         let canvas = window.state().canvas();
         let area = |rect: Rect| rect.width() * rect.height();
         let own = area(canvas) / (size[0] * size[1]);
@@ -83,8 +87,10 @@ fn eight_methods_and_three_references_have_their_places() {
     setup.task.protocol.methods =
         names.map(|name| name.parse::<Method>().expect("a method")).to_vec();
     setup.chosen = vec![0, 2].into();
+    let mut window = window(SIZES[0].0, setup);
     for (size, _) in SIZES {
-        let mut window = window(size, setup.clone());
+        window.set_size(size.into());
+        window.run_steps(3);
         let whole = Rect::from_min_size(egui::Pos2::ZERO, size.into());
         let mut cells: Vec<Rect> = Vec::new();
         for name in names {

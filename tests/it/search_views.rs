@@ -457,9 +457,11 @@ fn the_dense_map_is_the_cheapest_heading_of_each_position_and_takes_the_camera_t
 
 #[test]
 fn a_dense_map_that_nobody_looks_at_stands_still_and_is_gone_on_with() {
-    let mut window = after("surface");
-    move_to_end(&mut window, Method::MI);
+    let mut setup = setup();
+    setup.task.params.assign("grid.yaw_range=3").expect("a parameter");
+    let mut window = finished(setup);
     window.state_mut().app_state_mut().show_alone(Some("surface"));
+    move_to_end(&mut window, Method::MI);
     // Many more hypotheses than can be scored between two frames.
     window.key_press(egui::Key::F);
     let has_begun = |app: &App| {

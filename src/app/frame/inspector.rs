@@ -15,7 +15,7 @@ use crate::app::state::AppState;
 use crate::app::theme;
 use crate::app::view_options::Tab;
 use crate::diagnosis::{Code, Confidence, Diagnosis, Grade, confidence};
-use crate::localize::{Helped, QueryResult};
+use crate::localize::{Explanation, Helped, QueryResult};
 use crate::params::Params;
 use crate::run::Protocol;
 use crate::session::Run;
@@ -284,16 +284,8 @@ fn helped(
             ui.push_id(("remedy", &helped.args), |ui| remedy(ui, commands, helped));
         }
     }
-    let failed = explanation.runs.saturating_sub(explanation.helped.len());
     heading(ui, "Tried, did not help");
-    let words = match (failed, explanation.complete) {
-        (0, _) => "none".to_owned(),
-        (failed, true) => format!("{failed} of {} remedies", explanation.runs),
-        (failed, false) => {
-            format!("{failed} of {} remedies, then the search was stopped", explanation.runs)
-        }
-    };
-    ui.weak(words);
+    ui.weak(without_help(explanation));
     if !explanation.helped.is_empty() {
         ui.weak("Found with the help of the truth. Click one to run it.");
     } else if explanation.complete {
@@ -301,6 +293,20 @@ fn helped(
         ui.label(result.advice(primary));
         ui.label(NO_SETTING_HELPS);
     }
+}
+
+/// The remedies that made nothing right, by name where this run tried them.
+fn without_help(explanation: &Explanation) -> String {
+    let number = explanation.runs.saturating_sub(explanation.helped.len());
+    let mut words = match explanation.failed.as_slice() {
+        _ if number == 0 => "none".to_owned(),
+        [] => format!("{number} of {} remedies", explanation.runs),
+        failed => failed.iter().map(|args| short(args)).collect::<Vec<_>>().join(", "),
+    };
+    if !explanation.complete {
+        words.push_str(", then the search was stopped");
+    }
+    words
 }
 
 fn remedy(ui: &mut Ui, commands: &Queue, helped: &Helped) {

@@ -85,6 +85,9 @@ pub struct QueryResult {
 pub struct Explanation {
     /// What made it right, in the order in which it was tried.
     pub helped: Vec<Helped>,
+    /// The arguments of each run that made nothing right; not in files.
+    #[serde(skip)]
+    pub failed: Vec<Vec<String>>,
     /// How often the query was localised again.
     pub runs: usize,
     /// Whether all was tried that was to be; a run that was cancelled did not come to its end.
@@ -433,7 +436,7 @@ mod tests {
             error: PoseError { translation_m, rotation_deg: 1.0, max_euler_deg: 1.0 },
         };
         let helped = vec![helped("a", 0.5), helped("b", 0.2), helped("c", 0.2)];
-        let explanation = Explanation { helped, runs: 3, complete: true };
+        let explanation = Explanation { helped, failed: Vec::new(), runs: 3, complete: true };
         assert_eq!(explanation.best().expect("two helped").args, ["b"]);
         assert_eq!(Explanation::default().best(), None);
     }

@@ -1,4 +1,4 @@
-//! R5: the inliers do not fix the pose.
+//! R5: the inliers do not determine the pose.
 
 use super::*;
 
@@ -6,7 +6,7 @@ use super::*;
 pub(super) const FIXED_M: f64 = 0.3;
 
 pub(super) const RULE: Rule = Rule {
-    title: "the inliers do not fix the pose",
+    title: "the inliers do not determine the pose",
     advice: "get more matches, and better spread ones",
     applies_to: Family::MATCHING,
     test: Test::Method(test),

@@ -48,11 +48,11 @@ evidence!(Accepted {
     let why = if depths_are_wrong([*inliers, *true_inliers], *wrong_depth, *supports_truth) {
         format!("Of the true matches, {wrong_depth} have a wrong depth, {supports_truth} the right one.")
     } else if 2 * true_inliers >= *inliers {
-        "They are too few or too close together to fix it.".to_owned()
+        "They are too few or too close together to determine it.".to_owned()
     } else {
         format!(
-            "The truth explains {supports_truth}: something looks alike or moved, or the camera is not as \
-             stated."
+            "The truth explains {supports_truth}: something looks alike or moved, or the camera or cloud is \
+             not as stated."
         )
     };
     format!(
@@ -88,9 +88,9 @@ mod tests {
             assert_eq!(found.proof() == Proof::DepthPatch, found.text.contains("wrong depth"));
             found.text
         };
-        let elsewhere = "The truth explains 21: something looks alike or moved, or the camera is not as stated.";
+        let elsewhere = "The truth explains 21: something looks alike or moved, or the camera or cloud is not as stated.";
         assert!(said(14, 18).ends_with("18 have a wrong depth, 21 the right one."));
-        assert!(said(14, 10).ends_with("They are too few or too close together to fix it."));
+        assert!(said(14, 10).ends_with("They are too few or too close together to determine it."));
         assert!(said(3, 27).ends_with(elsewhere));
     }
 }

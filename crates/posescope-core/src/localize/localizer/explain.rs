@@ -60,8 +60,11 @@ impl Localizer<'_> {
             observer.explaining(result, tried, candidates.len());
             checkpoint(observer)?;
             explanation.runs += 1;
-            if let Some(error) = changed.run(self, query) {
-                explanation.helped.push(Helped { args: changed.args.clone(), error });
+            match changed.run(self, query) {
+                Some(error) => {
+                    explanation.helped.push(Helped { args: changed.args.clone(), error });
+                }
+                None => explanation.failed.push(changed.args.clone()),
             }
         }
         explanation.complete = true;
