@@ -54,7 +54,7 @@ impl Place {
 
 impl ProofPicture {
     /// The place of each panel's picture in an area of this size, in the order of [`Self::panels`]; titles stand
-    /// right above. The others stand below the large panel or to its right, wherever it becomes larger.
+    /// right above. The others stand below the large panel or to its right, wherever all become larger.
     pub fn places(&self, width: f32, height: f32) -> Vec<Place> {
         self.better(width, height, worth)
     }
@@ -75,18 +75,23 @@ impl ProofPicture {
             return self.side_by_side(all, 1.0, 1);
         }
         let mut best = self.stacked(all);
-        for share in LARGE_SHARES {
-            for columns in 1..=self.beside.len().min(2) {
-                let places = self.side_by_side(all, share, columns);
-                if worth(&places) >= worth(&best) {
-                    best = places;
-                }
+        let mut hold = |places: Vec<Place>| {
+            if worth(&places) >= worth(&best) {
+                best = places;
+            }
+        };
+        for columns in 1..=self.beside.len().min(2) {
+            for share in LARGE_SHARES {
+                hold(self.side_by_side(all, share, columns));
+            }
+            if let Some(below) = &self.below {
+                hold(self.large_alone(all, below, columns));
             }
         }
         best
     }
 
-    /// The large panel on a share of the width, the small ones beside it in columns.
+    /// The large panel on a share of the width with its strip below, the small ones beside them in columns.
     fn side_by_side(&self, all: Place, share: f32, columns: usize) -> Vec<Place> {
         let left = Place { width: (all.width - GAP) * share, ..all };
         let strip = self.below.as_ref().map(|below| left.width / below.aspect() + TITLE + GAP);
@@ -98,17 +103,29 @@ impl ProofPicture {
             let place = Place { top: large.top + large.height + GAP, height: strip, ..left };
             places.push(place.below_title().fitted(below));
         }
-        // What the large panel leaves free is for the small ones.
         let taken = places.iter().fold(0.0, |taken: f32, place| taken.max(place.width));
-        let beside_left = taken + GAP;
-        let width = (all.width - beside_left - GAP * (columns - 1) as f32) / columns as f32;
-        for (at, panels) in
-            self.beside.chunks(self.beside.len().div_ceil(columns).max(1)).enumerate()
-        {
-            let column = Place { left: beside_left + at as f32 * (width + GAP), width, ..all };
-            places.extend(column_of(panels, column));
-        }
+        places.extend(self.columns(right_of(all, taken), columns));
         places
+    }
+
+    /// The large panel on the whole height, all others beside it: the small ones in columns, below them the strip.
+    fn large_alone(&self, all: Place, strip: &Panel, columns: usize) -> Vec<Place> {
+        let most = Place { width: (all.width - GAP) * LARGE_SHARES[0], ..all };
+        let large = most.below_title().fitted(&self.large);
+        let right = right_of(all, large.width);
+        let strip_height = (right.width / strip.aspect() + TITLE).min(0.4 * all.height);
+        let upper = Place { height: all.height - strip_height - GAP, ..right };
+        let small = self.columns(upper, columns);
+        let place = Place { top: bottom(&small) + GAP, height: strip_height, ..right };
+        [vec![large, place.below_title().fitted(strip)], small].concat()
+    }
+
+    /// The small panels in columns.
+    fn columns(&self, all: Place, columns: usize) -> Vec<Place> {
+        let width = (all.width - GAP * (columns - 1) as f32) / columns as f32;
+        let column = |at: usize| Place { left: all.left + at as f32 * (width + GAP), width, ..all };
+        let chunks = self.beside.chunks(self.beside.len().div_ceil(columns).max(1)).enumerate();
+        chunks.flat_map(|(at, panels)| column_of(panels, column(at))).collect()
     }
 
     fn stacked(&self, all: Place) -> Vec<Place> {
@@ -145,6 +162,11 @@ impl ProofPicture {
 fn worth(places: &[Place]) -> f32 {
     let small: f32 = places.iter().skip(1).map(Place::area).sum();
     places.first().map_or(0.0, Place::area) + 0.5 * small
+}
+
+/// What a panel of this width at the left leaves.
+fn right_of(all: Place, taken: f32) -> Place {
+    Place { left: all.left + taken + GAP, width: (all.width - taken - GAP).max(1.0), ..all }
 }
 
 /// The lower end of the lowest place.

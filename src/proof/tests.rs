@@ -311,6 +311,42 @@ fn a_suspect_camera_is_drawn_beside_the_better_one() {
     assert!(places[0].width >= places[2].width, "{places:?}");
 }
 
+/// A square map takes the height, and the small panels have two columns where one would make them narrow.
+#[test]
+fn a_square_panel_is_as_high_as_the_area_and_the_others_share_the_rest() {
+    let photo = crate::image::Photo::from_gray(image::GrayImage::new(1241, 376));
+    let picture = ProofPicture {
+        large: Panel::plain("map", 560, 560),
+        below: Some(Panel::plain("way", 640, 160)),
+        beside: (0..4).map(|_| Panel::photo("view", &photo)).collect(),
+    };
+    let places = picture.places(900.0, 440.0);
+    let [large, way, small @ ..] = places.as_slice() else { panic!("{places:?}") };
+    assert!(large.height > 0.9 * 440.0, "{large:?}");
+    assert!(way.left > large.left + large.width, "{way:?}");
+    assert!(small[0].left + small[0].width < small[2].left, "{small:?}");
+    assert!(small.iter().all(|place| place.width > 200.0), "{small:?}");
+}
+
+/// A verdict on one of several references is proved by that one.
+#[test]
+fn the_reference_that_a_verdict_names_is_shown() {
+    let (first, mut result) = neighbours(Method::FB);
+    let (second, _) = localized(["street"; 2], ["000002", "000000"], 5.0, Method::FB);
+    let problems = [first.problems[0].clone(), second.problems[0].clone()];
+    let mut shown = |evidence: serde_json::Value| {
+        result.diagnosis = vec![crate::diagnosis::Diagnosis {
+            code: crate::diagnosis::Code::F1,
+            text: String::new(),
+            evidence,
+        }];
+        super::problem_of(&result, &problems).map(|problem| problem.reference.name.clone())
+    };
+    assert_eq!(shown(serde_json::json!({ "reference": "000002" })).as_deref(), Some("000002"));
+    assert_eq!(shown(serde_json::json!({ "reference": "other" })).as_deref(), Some("000001"));
+    assert_eq!(shown(serde_json::json!({})).as_deref(), Some("000001"));
+}
+
 /// The truth at the reference: one label for both.
 #[test]
 fn reference_and_truth_at_one_place_share_a_label() {

@@ -332,6 +332,19 @@ fn remedy(ui: &mut Ui, commands: &Queue, helped: &Helped) {
 mod tests {
     use super::*;
 
+    #[test]
+    fn remedies_that_failed_are_named_where_this_run_tried_them() {
+        let args = |value: &str| vec!["--set".to_owned(), format!("fb.ratio={value}")];
+        let mut explanation = Explanation { runs: 2, complete: true, ..Explanation::default() };
+        assert_eq!(without_help(&explanation), "2 of 2 remedies");
+        explanation.failed = vec![args("0.7"), args("0.6")];
+        assert_eq!(without_help(&explanation), "fb.ratio=0.7, fb.ratio=0.6");
+        explanation.complete = false;
+        let stopped = "fb.ratio=0.7, fb.ratio=0.6, then the search was stopped";
+        assert_eq!(without_help(&explanation), stopped);
+        assert_eq!(without_help(&Explanation { complete: true, ..Explanation::default() }), "none");
+    }
+
     /// Words that are wider than the inspector are wrapped; nothing is pushed out of the window.
     #[test]
     fn the_numbers_of_a_verdict_stay_within_the_inspector() {

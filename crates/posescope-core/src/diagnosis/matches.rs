@@ -350,6 +350,13 @@ mod tests {
     }
 
     #[test]
+    fn a_stricter_inlier_threshold_makes_no_match_false() {
+        let usual = MlesacParams::default().inlier_threshold_px;
+        assert_eq!(true_match_px(0.1 * usual), true_match_px(usual));
+        assert_eq!(true_match_px(2.0 * usual), 2.0 * true_match_px(usual));
+    }
+
+    #[test]
     fn matches_without_a_depth_are_lost_where_the_cloud_is_sparser_than_clouds_are() {
         assert_eq!([0, 19].map(lost), [40, 40]);
         assert_eq!([20, 120].map(lost), [0, 0]);
