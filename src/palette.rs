@@ -196,7 +196,7 @@ mod tests {
     #[test]
     fn colours_stay_apart_for_colour_blind_eyes() {
         // Four times what can just be seen.
-        const LEAST: f64 = 9.2;
+        const MIN: f64 = 9.2;
         let of_methods = Method::PAPER.map(|own| ("method", method(own)));
         let grades = [("right", TRUTH), ("wrong", ESTIMATE), ("selected", ACCENT)];
         let colors = of_methods.into_iter().chain(grades);
@@ -207,7 +207,7 @@ mod tests {
                 for (other, second) in &colors[at + 1..] {
                     let (a, b) = (lab(*color, eye), lab(*second, eye));
                     let apart = a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt();
-                    assert!(apart >= LEAST, "{name} {color:?} and {other} {second:?}: {apart:.1}");
+                    assert!(apart >= MIN, "{name} {color:?} and {other} {second:?}: {apart:.1}");
                 }
             }
         }

@@ -28,7 +28,7 @@ use pictures::{DrawnProof, Witness, thumbnail};
 pub const PICTURES: usize = 16;
 
 /// The most queries with a photo in the report: more would make it too large to send, and take longer than the run.
-const MOST_PHOTOS: usize = 250;
+const MAX_PHOTOS: usize = 250;
 
 /// The name of the file in a run folder.
 pub const REPORT: &str = "report.html";
@@ -114,9 +114,9 @@ impl RunReport {
             Ok(scenes) => {
                 thumbnails = self::thumbnails(&run, &scenes, &results);
                 let queries = results.iter().map(|one| one.query + 1).max();
-                if let Some(queries) = queries.filter(|queries| *queries > MOST_PHOTOS) {
+                if let Some(queries) = queries.filter(|queries| *queries > MAX_PHOTOS) {
                     notes.push(format!(
-                        "Only the first {MOST_PHOTOS} of {queries} queries have photos"
+                        "Only the first {MAX_PHOTOS} of {queries} queries have photos"
                     ));
                 }
                 let drawn = &worst[..pictures.min(worst.len())];
@@ -225,7 +225,7 @@ fn thumbnails(
 ) -> BTreeMap<usize, String> {
     let mut seen = BTreeSet::new();
     let firsts: Vec<&ReportedResult> =
-        results.iter().filter(|one| seen.insert(one.query)).take(MOST_PHOTOS).collect();
+        results.iter().filter(|one| seen.insert(one.query)).take(MAX_PHOTOS).collect();
     let painted = firsts.par_iter().filter_map(|one| {
         let scene = scenes.of_queries(run.pair_of(&one.result)?);
         let photo = scene.photo(scene.find(&one.result.query).ok()?).ok()?;

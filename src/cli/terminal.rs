@@ -54,12 +54,12 @@ impl Terminal {
     /// The width of a line of results in characters: `COLUMNS`, or that of the terminal; `None` in a pipe.
     pub fn width(&self) -> Option<usize> {
         /// Narrower lines are unreadable.
-        const LEAST: usize = 40;
+        const MIN: usize = 40;
         let columns = std::env::var("COLUMNS").ok();
         let requested = columns.and_then(|columns| columns.parse::<usize>().ok());
         let terminal = || terminal_size::terminal_size_of(std::io::stdout());
         let width = requested.or_else(|| Some(usize::from(terminal()?.0.0)));
-        width.map(|width| width.max(LEAST))
+        width.map(|width| width.max(MIN))
     }
 
     /// A progress bar over `steps` steps, hidden if stderr is not a terminal.

@@ -11,7 +11,7 @@ use nalgebra::{Point2, Point3};
 use crate::camera::Intrinsics;
 
 /// The fewest points in view for a measurement.
-const FEWEST_POINTS: usize = 150;
+const MIN_POINTS: usize = 150;
 
 /// The strength of image edges. It fades with the distance, so edges a few pixels away still count.
 pub(super) type EdgeMap = ImageBuffer<Luma<f32>, Vec<f32>>;
@@ -94,7 +94,7 @@ pub(super) struct Seen {
 pub(super) fn edge_agreement(map: &EdgeMap, seen: &[Seen]) -> Option<f64> {
     let inside: Vec<(Seen, f64)> =
         seen.iter().filter_map(|seen| Some((*seen, value(map, &seen.pixel)?))).collect();
-    if inside.len() < FEWEST_POINTS {
+    if inside.len() < MIN_POINTS {
         return None;
     }
     let weights = depth_edges(map.width() as usize, map.height() as usize, &inside);
@@ -105,7 +105,7 @@ pub(super) fn edge_agreement(map: &EdgeMap, seen: &[Seen]) -> Option<f64> {
         at_all += strength;
     }
     let mean = at_all / inside.len() as f64;
-    if weight_sum < FEWEST_POINTS as f64 / 10.0 || mean <= 0.0 {
+    if weight_sum < MIN_POINTS as f64 / 10.0 || mean <= 0.0 {
         return None;
     }
     Some((at_edges / weight_sum / mean).max(1e-3).ln())
@@ -164,7 +164,7 @@ pub(super) fn carried_agreement(
             Some((a, b))
         })
         .collect();
-    if pairs.len() < least.max(FEWEST_POINTS) {
+    if pairs.len() < least.max(MIN_POINTS) {
         return None;
     }
     let count = pairs.len() as f64;

@@ -18,14 +18,14 @@ const ANCHORS: usize = 8;
 const PARTNERS: [isize; 4] = [1, 3, -1, -3];
 const CARRIED_TO: usize = 2;
 /// The most points of a cloud; edges need a dense one.
-const MOST_POINTS: usize = 40_000;
+const MAX_POINTS: usize = 40_000;
 /// Every how many points one is carried to other frames.
 const CARRIED: usize = 4;
 
 /// The least mean gain of another reading over the frames.
 const TELLING_GAIN: f64 = 0.04;
 /// The fewest frames that a reading with a free number is fitted to.
-const FEWEST_FRAMES: usize = 4;
+const MIN_FRAMES: usize = 4;
 /// The least mean gain in standard errors of the mean.
 const CERTAIN: f64 = 2.5;
 
@@ -111,7 +111,7 @@ impl Sample {
                     && scene.has_cloud(frame)
                 {
                     let cloud = scene.cloud(frame)?;
-                    let step = cloud.points.len().div_ceil(MOST_POINTS).max(1);
+                    let step = cloud.points.len().div_ceil(MAX_POINTS).max(1);
                     let points = cloud.points.iter().step_by(step);
                     place.insert(points.map(|point| point.cast()).collect());
                 }
@@ -195,7 +195,7 @@ impl Sample {
         let mut found = Vec::new();
         let aside: Vec<f64> = (-20..=20).map(|step| 0.05 * f64::from(step)).collect();
         if let Some(right_m) = self.best_of(&aside, &|right_m| Change::Aside(right_m))
-            && right_m.abs() > LEAST_ASIDE_M
+            && right_m.abs() > MIN_ASIDE_M
         {
             found.push(Reading {
                 mistake: Mistake::OtherStereoCamera,
@@ -210,7 +210,7 @@ impl Sample {
         }
         let bends: Vec<f64> = (-16..=16).map(|step| 0.03 * f64::from(step)).collect();
         if let Some(k1) = self.best_of(&bends, &Change::Lens)
-            && self.bends_by_px(k1) > LEAST_PX
+            && self.bends_by_px(k1) > MIN_PX
         {
             found.push(Reading {
                 mistake: Mistake::UndistortedTwice,
@@ -246,7 +246,7 @@ impl Sample {
         }
         let moved_px =
             f64::hypot(right, down).max((times - 1.0_f64).abs() * f64::from(first.width) / 2.0);
-        (moved_px > LEAST_PX).then(|| Reading {
+        (moved_px > MIN_PX).then(|| Reading {
             mistake: Mistake::WrongCamera,
             remedy: format!(
                 "use a focal length of {:.0} px instead of {:.0} and a centre at ({:.0}, {:.0}) instead of \
@@ -279,9 +279,9 @@ fn partners(anchor: usize, count: usize) -> impl Iterator<Item = usize> {
 }
 
 /// Smaller shifts of a camera are ignored \[m\].
-const LEAST_ASIDE_M: f64 = 0.12;
+const MIN_ASIDE_M: f64 = 0.12;
 /// Smaller shifts of pixels are ignored \[px\].
-const LEAST_PX: f64 = 8.0;
+const MIN_PX: f64 = 8.0;
 /// The weight of edges for mistakes within a frame.
 const IN_FRAME: f64 = 1.0;
 
@@ -300,11 +300,11 @@ fn gain(stated: &[Agreement], other: &[Agreement], change: &Change) -> Option<f6
         .collect();
     let count = gains.len() as f64;
     // With few frames, a chance fit of two must not count as a mistake.
-    if gains.len() < FEWEST_FRAMES.min(stated.len()).max(2) || gains.len() * 2 < stated.len() {
+    if gains.len() < MIN_FRAMES.min(stated.len()).max(2) || gains.len() * 2 < stated.len() {
         return None;
     }
     let has_number = matches!(change, Change::Aside(_) | Change::Camera { .. } | Change::Lens(_));
-    if has_number && gains.len() < FEWEST_FRAMES {
+    if has_number && gains.len() < MIN_FRAMES {
         return None;
     }
     let mean = gains.iter().sum::<f64>() / count;

@@ -61,10 +61,10 @@ impl ProofPicture {
 
     /// The places on a page of this width, and the height that they take: those that fill more of it.
     pub fn on_page(&self, width: f32) -> (Vec<Place>, f32) {
-        const MOST: f32 = 1.2;
+        const MAX: f32 = 1.2;
         let filled =
             |places: &[Place]| places.iter().map(Place::area).sum::<f32>() / bottom(places);
-        let places = self.better(width, MOST * width, filled);
+        let places = self.better(width, MAX * width, filled);
         let height = bottom(&places).ceil();
         (places, height)
     }

@@ -19,7 +19,7 @@ use crate::palette::{self, Rgb as Color};
 use crate::picture;
 
 /// Lines of one kind at most; more hide each other.
-const MOST_LINES: usize = 80;
+const MAX_LINES: usize = 80;
 /// Side of a patch \[px of the photo\], and how much it is enlarged.
 const PATCH: u32 = 48;
 const ENLARGED: u32 = 6;
@@ -136,7 +136,7 @@ pub(super) fn matches(case: &ProofCase<'_>) -> Option<ProofPicture> {
     ];
     for (color, width, is_kind) in kinds {
         let of_kind: Vec<&Matched<'_>> = matches.all.iter().filter(|one| is_kind(one)).collect();
-        let stride = of_kind.len().div_ceil(MOST_LINES).max(1);
+        let stride = of_kind.len().div_ceil(MAX_LINES).max(1);
         for one in of_kind.into_iter().step_by(stride) {
             let [x, y] = place(one.reference);
             panel.line(color, width, [place(one.query), [x, y + top as f32]]);

@@ -11,7 +11,7 @@ use crate::palette;
 const SIDE: u32 = 560;
 const BORDER: f64 = 40.0;
 /// Half of what a map shows at least \[m\].
-const LEAST_REACH_M: f64 = 2.0;
+const MIN_REACH_M: f64 = 2.0;
 /// What is nearer to the reference than this has one label with it \[px\].
 const SAME_PX: f32 = 8.0;
 /// Ranked frames that are shown.
@@ -33,7 +33,7 @@ impl Map {
         };
         let (across, along) = (ends(0), ends(1));
         let reach_m = f64::max(across.1 - across.0, along.1 - along.0) / 2.0;
-        let px_per_m = (f64::from(SIDE) / 2.0 - BORDER) / reach_m.max(LEAST_REACH_M);
+        let px_per_m = (f64::from(SIDE) / 2.0 - BORDER) / reach_m.max(MIN_REACH_M);
         let mut map = Self {
             panel: Panel::plain("", SIDE, SIDE),
             centre_m: [(across.0 + across.1) / 2.0, (along.0 + along.1) / 2.0],

@@ -7,7 +7,7 @@ use crate::image::{Degradation, DegradationError};
 use crate::params::Params;
 
 /// The most values; more are probably a mistyped step.
-const MOST: f64 = 1000.0;
+const MAX: f64 = 1000.0;
 
 /// A parameter or a step of the degradation, and its values.
 #[derive(Clone, Debug, PartialEq)]
@@ -90,7 +90,7 @@ impl FromStr for Sweep {
         let (first, last, width) = (number(from)?, number(to)?, number(step)?);
         // 0.5 to 0.9 by 0.05 must include 0.9 in spite of rounding.
         let steps = ((last - first) / width + 1e-9).floor();
-        if !(width > 0.0 && (0.0..MOST).contains(&steps)) {
+        if !(width > 0.0 && (0.0..MAX).contains(&steps)) {
             return Err(wrong());
         }
         let decimals = |text: &str| text.split_once('.').map_or(0, |(_, digits)| digits.len());

@@ -16,7 +16,7 @@ use nalgebra::{Point3, Vector3};
 use super::SceneError;
 
 /// The most points of a cloud, which take 1.2 GB.
-pub(super) const MOST_POINTS: usize = 100_000_000;
+pub(super) const MAX_POINTS: usize = 100_000_000;
 
 /// A cloud in the frame of its file, which may be that of a map.
 ///
@@ -40,8 +40,8 @@ impl MapCloud {
         if self.points.is_empty() {
             self.origin = point.map(f64::round);
         }
-        if self.points.len() == MOST_POINTS {
-            return Err(format!("at most {MOST_POINTS} points expected; split or thin the cloud"));
+        if self.points.len() == MAX_POINTS {
+            return Err(format!("at most {MAX_POINTS} points expected; split or thin the cloud"));
         }
         self.points.push(Point3::from(point - self.origin).cast());
         Ok(())

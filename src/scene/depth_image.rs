@@ -14,7 +14,7 @@ use crate::geometry::Pose;
 /// The most points from a depth image, about as many as a scan of 64 beams has in view. All 307,200 pixels of a
 /// 640 × 480 image would make a search fifteen times slower without gain: a view is splatted with discs of several
 /// pixels.
-const MOST_POINTS: u32 = 20_000;
+const MAX_POINTS: u32 = 20_000;
 
 /// The depth images of a scene: 16-bit grey PNG.
 pub(super) struct DepthImages {
@@ -68,7 +68,7 @@ impl Clouds for DepthImages {
 /// The step in pixels, along both axes, between points.
 pub(super) fn step((width, height): (u32, u32)) -> u32 {
     let pixels = f64::from(width) * f64::from(height);
-    (pixels / f64::from(MOST_POINTS)).sqrt().ceil().max(1.0) as u32
+    (pixels / f64::from(MAX_POINTS)).sqrt().ceil().max(1.0) as u32
 }
 
 type DepthImage = image::ImageBuffer<image::Luma<u16>, Vec<u16>>;
@@ -97,7 +97,7 @@ mod tests {
         for size in [(640, 480), (1280, 720), (1920, 1080), (8000, 8000)] {
             let step = step(size);
             let points = (size.0 / step) * (size.1 / step);
-            assert!((10_000..=MOST_POINTS).contains(&points), "{size:?}: {points}");
+            assert!((10_000..=MAX_POINTS).contains(&points), "{size:?}: {points}");
         }
         assert_eq!(step((100, 100)), 1);
     }

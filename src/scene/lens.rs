@@ -53,7 +53,7 @@ pub(super) struct Lens {
 
 impl Lens {
     /// The greatest magnification of a photo to avoid a blank border.
-    const MOST_ZOOM: f64 = 2.0;
+    const MAX_ZOOM: f64 = 2.0;
 
     /// The pinhole camera has the photo's size and principal point. Its focal length is that of the photo, or a greater
     /// one to avoid a blank border, which would be an edge that the world does not have.
@@ -66,7 +66,7 @@ impl Lens {
             distortion,
             pinhole: Intrinsics { fx: source.fx * zoom, fy: source.fy * zoom, ..source },
         };
-        let (mut blank, mut full) = (1.0, Self::MOST_ZOOM);
+        let (mut blank, mut full) = (1.0, Self::MAX_ZOOM);
         let widest = with_zoom(full);
         if !widest.has_no_blank() {
             return Err(format!("a distortion that can be removed expected, {distortion:?} found"));

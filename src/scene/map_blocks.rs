@@ -13,7 +13,7 @@ use crate::geometry::Pose;
 /// one without scale, have smaller blocks.
 const SIDE_M: f32 = 8.0;
 /// The least number of blocks along the longest axis.
-const LEAST_BLOCKS: f32 = 32.0;
+const MIN_BLOCKS: f32 = 32.0;
 
 /// A map with its points sorted by block. It needs only a few bytes per block more than the points.
 pub(super) struct MapBlocks {
@@ -37,7 +37,7 @@ impl MapBlocks {
             along().fold(f32::MIN, f32::max) - along().fold(f32::MAX, f32::min)
         });
         let longest = extent.fold(0.0, f32::max);
-        let side = SIDE_M.min(longest / LEAST_BLOCKS).max(f32::MIN_POSITIVE);
+        let side = SIDE_M.min(longest / MIN_BLOCKS).max(f32::MIN_POSITIVE);
         let key = |point: &Point3<f32>| [0, 1, 2].map(|axis| (point[axis] / side).floor() as i32);
         // By all coordinates: the order must not depend on the number of threads.
         points.par_sort_unstable_by(|a, b| {

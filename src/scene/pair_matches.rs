@@ -24,7 +24,7 @@ use super::folder::entries;
 pub use self::text::write_matches;
 
 /// The most keypoints of a photo, more than any photo of 8,000 × 8,000 pixels has.
-const MOST_KEYPOINTS: usize = 1 << 20;
+const MAX_KEYPOINTS: usize = 1 << 20;
 
 /// Which photo of a pair comes first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -53,9 +53,9 @@ impl RawMatches {
             )));
         }
         let most = self.first.len().max(self.second.len());
-        if most > MOST_KEYPOINTS {
+        if most > MAX_KEYPOINTS {
             return Err(error(format!(
-                "at most {MOST_KEYPOINTS} keypoints in a photo expected, {most} found"
+                "at most {MAX_KEYPOINTS} keypoints in a photo expected, {most} found"
             )));
         }
         let mut named = self.partners.iter().flatten();

@@ -8,7 +8,7 @@ use crate::geometry::Pose;
 pub(super) const SAME_MOMENT_S: f64 = 0.02;
 /// The most candidates per time, more than any camera takes in a moment. It limits the work for a file with the same
 /// time in all lines.
-const MOST_CANDIDATES: usize = 64;
+const MAX_CANDIDATES: usize = 64;
 /// The longest interval for interpolation \[s\]. Motion capture has a pose every 10 ms, a tracked camera every 33 ms.
 const INTERPOLATED_S: f64 = 0.1;
 
@@ -89,7 +89,7 @@ pub(super) fn associated(times: &[f64], others: &[f64]) -> Vec<Option<usize>> {
         let first = others.partition_point(|other| *other < time - SAME_MOMENT_S);
         let near = others[first..].iter().enumerate();
         let near =
-            near.take_while(|(_, other)| **other <= time + SAME_MOMENT_S).take(MOST_CANDIDATES);
+            near.take_while(|(_, other)| **other <= time + SAME_MOMENT_S).take(MAX_CANDIDATES);
         pairs.extend(near.map(|(other, at)| ((at - time).abs(), index, first + other)));
     }
     pairs.sort_by(|a, b| a.0.total_cmp(&b.0).then((a.1, a.2).cmp(&(b.1, b.2))));

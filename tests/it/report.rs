@@ -37,11 +37,11 @@ fn has_in_order(page: &str, words: &str) {
 #[test]
 fn the_proof_of_a_fusion_is_drawn_around_the_reference_that_dragged_it() {
     let sequence = SmallSequence::write();
-    let asked = "--method mi --radius 3 -q --query 4 --reference 5 --reference 7 --fusion avg";
+    let asked = "--method mi --radius 3 -q --query 4 --reference nearest:2 --fusion avg";
     sequence.run(&format!("eval sequences/42 {asked} --right 1.5m,5deg --out run")).ok();
     let page = sequence.text("run/report.html");
-    has(&page, "reference 000007 dragged");
-    has(&page, "Reference 000007");
+    has(&page, "Reference 000007 dragged the fused pose");
+    has(&page, "Query; Reference 000007\"");
 }
 
 /// Where recordings can be looked at without a viewer of one's own: the version that writes them.

@@ -186,7 +186,7 @@ fn everywhere(window: &mut Harness<'_, App>, mut see: impl FnMut(&Harness<'_, Ap
 
 #[test]
 fn every_word_can_be_read_on_its_ground_in_both_themes() {
-    const LEAST: f64 = 4.5;
+    const MIN: f64 = 4.5;
     let mut window = finished(SMALL, 1.0);
     let mut unreadable = std::collections::BTreeSet::new();
     let mut judged = 0;
@@ -208,7 +208,7 @@ fn every_word_can_be_read_on_its_ground_in_both_themes() {
                     }
                     let seen = Color32::blend(ground, color);
                     let contrast = contrast(seen, ground);
-                    if contrast < LEAST && !text.words.trim().is_empty() {
+                    if contrast < MIN && !text.words.trim().is_empty() {
                         let words: String = text.words.chars().take(40).collect();
                         unreadable.insert(format!(
                             "{theme:?} {place}: {contrast:.1} {color:?} on {ground:?}: {words}"

@@ -119,7 +119,7 @@ impl Plane {
         const FOCAL: f32 = 719.0;
         /// Distance of two samples, and the most of them.
         const STEP: f32 = 1.7;
-        const MOST: f32 = 15.0;
+        const MAX: f32 = 15.0;
         let focal = FOCAL * self.scale();
         let (cx, cy) = (0.49 * self.columns as f32, 0.49 * self.rows as f32);
         let pixel = |row: usize, column: usize| {
@@ -127,7 +127,7 @@ impl Plane {
             // The length is `r` times this.
             let share = (dx * dx + dy * dy).sqrt() * way / (TUBE * focal);
             let length = (dx * dx + dy * dy).sqrt() * share;
-            let steps = (length / STEP).min(MOST) as u32 as f32;
+            let steps = (length / STEP).min(MAX) as u32 as f32;
             if steps < 1.0 {
                 return self.levels[row * self.columns + column];
             }

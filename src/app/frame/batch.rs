@@ -20,7 +20,7 @@ use crate::palette;
 /// Height of a bar with its gap \[points\].
 const BAR: f32 = 22.0;
 /// Bars and causes that are drawn, at most.
-const MOST: usize = 8;
+const MAX: usize = 8;
 
 pub(crate) fn left(ui: &mut Ui, state: &AppState, commands: &Queue, panes: &mut Panes) {
     let results: Vec<QueryResult> = state
@@ -44,7 +44,7 @@ pub(crate) fn left(ui: &mut Ui, state: &AppState, commands: &Queue, panes: &mut 
         }
     });
     ui.add_space(4.0);
-    let rows = overview.bars.len().max(overview.causes.len()).min(MOST);
+    let rows = overview.bars.len().max(overview.causes.len()).min(MAX);
     let (area, _) =
         ui.allocate_exact_size(vec2(ui.available_width(), rows as f32 * BAR + 6.0), Sense::hover());
     let (bars, causes) = area.split_left_right_at_fraction(0.5);
@@ -56,7 +56,7 @@ pub(crate) fn left(ui: &mut Ui, state: &AppState, commands: &Queue, panes: &mut 
 /// One bar for each method: right, unmeasured, wrong, no pose.
 fn draw_bars(ui: &Ui, overview: &Overview, area: Rect) {
     const NAME: f32 = 64.0;
-    for (row, bar) in overview.bars.iter().take(MOST).enumerate() {
+    for (row, bar) in overview.bars.iter().take(MAX).enumerate() {
         let words = Grade::ALL.iter().filter(|grade| bar.count(**grade) > 0);
         let words: Vec<String> =
             words.map(|grade| format!("{} {grade}", bar.count(*grade))).collect();
@@ -117,7 +117,7 @@ fn draw_causes(ui: &Ui, overview: &Overview, area: Rect) {
     const COUNT: f32 = 36.0;
     let most = overview.causes.first().map_or(1, |(_, times)| *times);
     let names = area.width() * 0.62;
-    for (row, (code, times)) in overview.causes.iter().take(MOST).enumerate() {
+    for (row, (code, times)) in overview.causes.iter().take(MAX).enumerate() {
         let title = capital(code.title());
         let spoken = format!("{title} ({code}): {times} results");
         let (painter, line) = bar_row(ui, area, row, spoken, &title, names - 8.0);

@@ -69,7 +69,7 @@ impl ActionSearch {
     }
 
     fn content(&mut self, ui: &mut Ui, state: &AppState, commands: &Queue) -> bool {
-        const MOST: usize = 12;
+        const MAX: usize = 12;
         ui.set_width(420.0);
         let pressed = |ui: &Ui, key| ui.input_mut(|input| input.consume_key(Modifiers::NONE, key));
         let (down, up, enter) =
@@ -89,7 +89,7 @@ impl ActionSearch {
             self.chosen = 0;
         }
         let found = found(&self.typed);
-        let found = &found[..found.len().min(MOST)];
+        let found = &found[..found.len().min(MAX)];
         self.chosen = match (down, up) {
             (true, _) => (self.chosen + 1).min(found.len().saturating_sub(1)),
             (_, true) => self.chosen.saturating_sub(1),

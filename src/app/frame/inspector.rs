@@ -116,7 +116,7 @@ fn why(ui: &mut Ui, state: &AppState, commands: &Queue) {
 
 /// The settings that are not at their defaults: they may be the cause.
 fn changed(ui: &mut Ui, run: &Run) {
-    const MOST: usize = 5;
+    const MAX: usize = 5;
     let default_m = Protocol::default().radius_m();
     let radius = (run.radius_m != default_m)
         .then(|| format!("--radius {} (default {default_m})", run.radius_m));
@@ -129,10 +129,10 @@ fn changed(ui: &mut Ui, run: &Run) {
         return;
     }
     heading(ui, "Changed from the default");
-    for change in changes.iter().take(MOST) {
+    for change in changes.iter().take(MAX) {
         ui.label(RichText::new(change).monospace().size(12.0));
     }
-    if let Some(more) = changes.len().checked_sub(MOST + 1) {
+    if let Some(more) = changes.len().checked_sub(MAX + 1) {
         ui.weak(format!("and {} more", more + 1));
     }
 }

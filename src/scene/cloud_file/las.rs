@@ -13,7 +13,7 @@ use super::{MapCloud, expect_room};
 /// Points per decoded batch.
 const BATCH: u64 = 65_536;
 /// The smallest size of an uncompressed point \[bytes\].
-const LEAST_RECORD: u64 = 20;
+const MIN_RECORD: u64 = 20;
 
 /// Reads the points. The decoder panics on damaged data, which becomes an error.
 pub(super) fn read(path: &Path, size: u64) -> Result<MapCloud, String> {
@@ -98,7 +98,7 @@ fn expect_chunks(file: &mut (impl Read + Seek), size: u64, layout: &LazVlr) -> R
     let table = u64::try_from(table).ok().filter(|table| *table >= first);
     if let Some(table) = table {
         let chunks = u32::from_le_bytes(bytes_at(file, table.saturating_add(4))?);
-        if u64::from(chunks) > size / LEAST_RECORD {
+        if u64::from(chunks) > size / MIN_RECORD {
             return Err(format!(
                 "{chunks} chunks of points expected, but the file has only {size} bytes"
             ));

@@ -9,7 +9,7 @@ use pcd_rs::{DataKind, DynReader, DynRecord, Field, PcdMeta};
 use super::{MapCloud, expect_room};
 
 /// The highest compression ratio of LZF: a back reference of 3 bytes encodes at most 264 bytes.
-const MOST_COMPRESSED: u64 = 88;
+const MAX_COMPRESSED: u64 = 88;
 
 /// Whether a file begins like a PCD file: comments, then the version.
 pub(super) fn is_pcd(start: &[u8]) -> bool {
@@ -32,7 +32,7 @@ pub(super) fn read(path: &Path, size: u64) -> Result<MapCloud, String> {
         let [compressed, whole] =
             [0, 4].map(|at| u64::from(u32::from_le_bytes([0, 1, 2, 3].map(|i| lengths[at + i]))));
         let promised = meta.num_points.checked_mul(record);
-        if compressed > size || whole / MOST_COMPRESSED > compressed || promised != Some(whole) {
+        if compressed > size || whole / MAX_COMPRESSED > compressed || promised != Some(whole) {
             return Err(format!(
                 "{} points of {record} bytes expected, but {compressed} bytes that make {whole} are \
                  announced in a file of {size}",

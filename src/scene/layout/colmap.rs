@@ -14,7 +14,7 @@ use crate::scene::SceneError;
 pub(super) const LAYOUT: Layout = Layout { name: "colmap", place: str::to_owned, create };
 
 /// The most points per frame: a photo has some thousand features.
-const MOST_POINTS: usize = 2000;
+const MAX_POINTS: usize = 2000;
 
 /// A pixel, and the point there in the world frame \[m\].
 type Observation = (Point2<f64>, Point3<f64>);
@@ -51,7 +51,7 @@ impl Writer {
                 Some((pixel, world_from_camera * position))
             })
             .collect();
-        let step = in_view.len().div_ceil(MOST_POINTS).max(1);
+        let step = in_view.len().div_ceil(MAX_POINTS).max(1);
         let some = in_view.into_iter().step_by(step).collect();
         let mut observed = self.observed.lock().unwrap_or_else(PoisonError::into_inner);
         observed.insert(shot.index, some);

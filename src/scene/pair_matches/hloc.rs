@@ -7,13 +7,13 @@ use std::path::{Path, PathBuf};
 use half::f16;
 use hdf5_pure::{Dataset, File, Group};
 
-use super::{MOST_KEYPOINTS, RawMatches};
+use super::{MAX_KEYPOINTS, RawMatches};
 use crate::scene::SceneError;
 
 /// How deep groups are searched for images.
 const DEEPEST: usize = 8;
 /// The most images and pairs; limits the search in a damaged file.
-const MOST_ENTRIES: usize = 1 << 20;
+const MAX_ENTRIES: usize = 1 << 20;
 
 /// The open files, and their content by name.
 pub(super) struct HlocFiles {
@@ -134,8 +134,8 @@ fn walk(group: &Group, path: &mut Vec<String>, found: &mut Found) -> Result<(), 
     if let (true, [first, second]) = (sets.iter().any(|name| name == "matches0"), path.as_slice()) {
         found.matches.push([first.clone(), second.clone()]);
     }
-    if found.keypoints.len().max(found.matches.len()) > MOST_ENTRIES {
-        return Err(format!("at most {MOST_ENTRIES} images or pairs expected"));
+    if found.keypoints.len().max(found.matches.len()) > MAX_ENTRIES {
+        return Err(format!("at most {MAX_ENTRIES} images or pairs expected"));
     }
     if path.len() == DEEPEST {
         return Ok(());
@@ -154,9 +154,9 @@ fn check_size(set: &Dataset) -> Result<Vec<u64>, String> {
     let shape = set.shape().map_err(text_of)?;
     let count = shape.iter().try_fold(1_u64, |all, &side| all.checked_mul(side));
     match count {
-        Some(count) if count <= 2 * MOST_KEYPOINTS as u64 => Ok(shape),
+        Some(count) if count <= 2 * MAX_KEYPOINTS as u64 => Ok(shape),
         _ => Err(format!(
-            "at most {MOST_KEYPOINTS} keypoints in a photo expected, an array of {shape:?} found"
+            "at most {MAX_KEYPOINTS} keypoints in a photo expected, an array of {shape:?} found"
         )),
     }
 }

@@ -7,12 +7,12 @@ use std::path::Path;
 
 use zip::ZipArchive;
 
-use super::{MOST_KEYPOINTS, RawMatches};
+use super::{MAX_KEYPOINTS, RawMatches};
 use crate::scene::SceneError;
 use crate::scene::lines::excerpt;
 
 /// The largest array \[bytes\]: two numbers of eight bytes for the most keypoints.
-const MOST_BYTES: u64 = 16 * MOST_KEYPOINTS as u64 + 4096;
+const MAX_BYTES: u64 = 16 * MAX_KEYPOINTS as u64 + 4096;
 
 pub(super) fn read(path: &Path) -> Result<RawMatches, SceneError> {
     let error = |expected: String| SceneError::expected(path, expected.replace('\n', " "));
@@ -24,10 +24,10 @@ pub(super) fn read(path: &Path) -> Result<RawMatches, SceneError> {
         let entry = entry.map_err(|why| why.to_string())?;
         // The announced size may be wrong, so reading is limited.
         let mut bytes = Vec::new();
-        let read = entry.take(MOST_BYTES + 1).read_to_end(&mut bytes);
+        let read = entry.take(MAX_BYTES + 1).read_to_end(&mut bytes);
         read.map_err(|why| why.to_string())?;
-        if bytes.len() as u64 > MOST_BYTES {
-            return Err(format!("an array of at most {MOST_BYTES} bytes expected"));
+        if bytes.len() as u64 > MAX_BYTES {
+            return Err(format!("an array of at most {MAX_BYTES} bytes expected"));
         }
         Array::parse(&bytes)
     };

@@ -25,7 +25,7 @@ const LIDAR_RADIUS_PX: f64 = 15.0;
 /// Half the side of a patch in scales: a little more than the window of the descriptor, 20 scales.
 const HALF_PATCH_SCALES: f32 = 11.0;
 /// Half the side of a patch is not below this \[px\]: the LiDAR points fit in.
-const LEAST_HALF_PATCH_PX: f32 = 16.0;
+const MIN_HALF_PATCH_PX: f32 = 16.0;
 
 /// The LiDAR points around the keypoint that was shown last.
 #[derive(Default)]
@@ -114,7 +114,7 @@ impl Detail {
         let reference = subject.reference();
         // The same number of scales in both, so that a true match looks the same.
         let least = reference.map_or(query.scale, |other| other.scale.min(query.scale));
-        let scales = HALF_PATCH_SCALES.max(LEAST_HALF_PATCH_PX / least.max(0.1));
+        let scales = HALF_PATCH_SCALES.max(MIN_HALF_PATCH_PX / least.max(0.1));
         let [query_photo, reference_photo] = subject.photos;
         let at = patch(ui, "query patch", query, scales, query_photo);
         if let Some(truth) = &subject.truth {

@@ -10,7 +10,7 @@ use crate::render::Score;
 use crate::session::Run;
 
 /// Costs that differ by less are equal: the search calls them flat.
-const LEAST_DIFFERENCE: f64 = 1e-9;
+const MIN_DIFFERENCE: f64 = 1e-9;
 
 /// The colour of a cell below the coverage floor.
 pub(super) const BELOW_FLOOR: Color32 = Color32::from_gray(110);
@@ -89,7 +89,7 @@ impl Scale {
 
 /// 1 for the lowest cost, 0 for the highest; what differs by rounding alone has one colour.
 fn merit(least: f64, greatest: f64, cost: f64) -> f64 {
-    if greatest - least > LEAST_DIFFERENCE { (greatest - cost) / (greatest - least) } else { 1.0 }
+    if greatest - least > MIN_DIFFERENCE { (greatest - cost) / (greatest - least) } else { 1.0 }
 }
 
 /// A cost with four decimals where it is small, fewer where it is large.
