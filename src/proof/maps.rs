@@ -338,7 +338,7 @@ impl Seen {
 fn view_panel(query: &GrayImage, seen: &Seen) -> Panel {
     let view = &seen.comparison.view;
     let covered = view.pixels.len();
-    let title = format!("Map seen from the {}, covers {covered} px", seen.words());
+    let title = format!("Map seen from the {}, {covered} px", seen.words());
     Panel::new(title, picture::over(query, view))
 }
 

@@ -363,10 +363,7 @@ pub(super) fn reference_cloud(case: &ProofCase<'_>) -> Panel {
     let reference = &case.problem.reference;
     let (photo, points) =
         cloud_picture(&reference.photo, &reference.intrinsics, case, &Pose::identity());
-    Panel::new(
-        format!("The cloud on reference {}, by depth: {points} points", reference.name),
-        photo,
-    )
+    Panel::new(format!("Cloud on reference {}: {points} points", reference.name), photo)
 }
 
 /// Where the verdict names another camera: the cloud on the query's photo, seen from the truth by both.
