@@ -3,11 +3,16 @@
 use std::sync::Arc;
 
 use posescope::app::{Results, Setup, Tab};
-use posescope::localize::QueryResult;
+use posescope::camera::Intrinsics;
+use posescope::diagnosis::{Evidence, Subject, Tolerance, diagnose};
+use posescope::localize::{QueryResult, localize_traced};
 use posescope::measure::{Field, measure, read_rows};
 use posescope::method::Method;
+use posescope::params::Params;
+use posescope::problem::Problem;
 use posescope::run::read_results;
 use posescope::scene::{self, Scene};
+use posescope::trace::Trace;
 
 use crate::small_sequence::SmallSequence;
 use crate::window::{finished, is_said, results, run_until_idle, send, setup, window_with_results};
@@ -117,4 +122,38 @@ fn a_wrong_focal_length_is_named_before_the_cloud() {
     let expected =
         "X1 The query camera is suspect: its focal length should be 719 px, not 610. That explains";
     crate::binary::has(&said, expected);
+}
+
+/// The calibration belongs to another lens, or to photos of another size: matches are true, and have no right depth.
+#[test]
+fn a_focal_length_that_is_wrong_for_both_photos_is_named() {
+    let street = scene::open("street", None).expect("is built in");
+    let truth = street.pose(30).expect("is known");
+    let stated = street.intrinsics(30);
+    for (scale, of_centre) in [(2.0, 2.0), (2.0, 1.0), (0.6, 1.0)] {
+        let camera = Intrinsics {
+            fx: scale * stated.fx,
+            fy: scale * stated.fy,
+            cx: of_centre * stated.cx,
+            cy: of_centre * stated.cy,
+            ..stated
+        };
+        let mut query = (*street.query(30).expect("a photo")).clone();
+        let mut reference = (*street.reference(24).expect("a cloud")).clone();
+        (query.intrinsics, reference.intrinsics) = (camera, camera);
+        let problem = Problem::new(query, reference, 15.0).expect("a radius");
+        let (params, mut evidence) = (Params::default(), Evidence::default());
+        let mut trace = Trace::to(&mut evidence);
+        let outcome = localize_traced(&problem, Method::FB, &params, &mut trace);
+        let outcome = outcome.expect("nobody cancels");
+        let subject = Subject::new(&problem, Method::FB, &params, &outcome, &evidence);
+        let tolerance = Tolerance { translation_m: 1.0, rotation_deg: 5.0 };
+        let found = diagnose(&subject.against(Some(&truth), tolerance));
+        let named = &found[0];
+        assert!(named.text.starts_with("The camera of both photos is suspect"), "{found:?}");
+        let camera: Intrinsics =
+            serde_json::from_value(named.evidence["camera"].clone()).expect("a camera");
+        assert!((camera.fx / stated.fx - 1.0).abs() < 0.06, "{scale}: {camera:?}");
+        assert!((camera.cx / stated.cx - 1.0).abs() < 0.04, "{scale}: {camera:?}");
+    }
 }

@@ -5,6 +5,7 @@ use serde::Serialize;
 
 use super::Subject;
 use crate::camera::Intrinsics;
+use crate::depth::{LiftedMatch, ProjectedCloudIndex};
 use crate::estimator::projected_cloud;
 use crate::features::{Features, MatchVerdict};
 use crate::geometry::Pose;
@@ -264,6 +265,62 @@ fn lifted_keypoints(
             Some(tuple.intrinsics.unproject(&pixel, depths.nearest))
         })
         .collect()
+}
+
+/// The unique matches with the cloud, to ask how many a camera of both photos would explain.
+pub(super) struct Pairs {
+    /// Of each match, the pixel in the query and that in the reference.
+    pixels: Vec<[Point2<f64>; 2]>,
+    cloud: ProjectedCloudIndex,
+    /// The camera whose pixels the cloud has: that of the reference with a wider image.
+    wide: Intrinsics,
+    query_from_reference: Pose,
+    radius_px: f64,
+    threshold_px: f64,
+}
+
+impl Pairs {
+    /// `None` where the method did not reach matching, or the truth is unknown.
+    pub(super) fn of(subject: &Subject<'_>, matching: &Matching<'_>) -> Option<Self> {
+        let evidence = subject.evidence;
+        let (query, reference) = (evidence.query.as_ref()?, evidence.reference.as_ref()?);
+        let pixels = |lifted: &LiftedMatch| {
+            [query.keypoints[lifted.query].pixel(), reference.keypoints[lifted.reference].pixel()]
+        };
+        let tuple = &subject.problem.reference;
+        let stated = &tuple.intrinsics;
+        let wide = Intrinsics {
+            cx: stated.cx + f64::from(stated.width),
+            cy: stated.cy + f64::from(stated.height),
+            width: 3 * stated.width,
+            height: 3 * stated.height,
+            ..*stated
+        };
+        Some(Self {
+            pixels: evidence.lifted.as_deref()?.iter().map(pixels).collect(),
+            cloud: ProjectedCloudIndex::new(&tuple.cloud, &wide),
+            wide,
+            query_from_reference: subject.reference_from_truth()?.inverse(),
+            radius_px: matching.depth_radius_px,
+            threshold_px: true_match_px(matching.mlesac.inlier_threshold_px),
+        })
+    }
+
+    /// How many matches the truth explains with the depths of the cloud, if both photos are of this camera.
+    pub(super) fn explained_by(&self, camera: &Intrinsics) -> usize {
+        let radius_px = self.radius_px * self.wide.fx / camera.fx;
+        let is_explained = |[pixel, seen]: &&[Point2<f64>; 2]| {
+            let point = self
+                .wide
+                .project(&camera.unproject(seen, 1.0))
+                .and_then(|at| self.cloud.read(&at, radius_px).within)
+                .map(|depths| camera.unproject(seen, depths.nearest));
+            let there =
+                point.and_then(|point| camera.project(&(self.query_from_reference * point)));
+            there.is_some_and(|there| (there - pixel).norm() <= self.threshold_px)
+        };
+        self.pixels.iter().filter(is_explained).count()
+    }
 }
 
 /// How many of the predicted places have a query keypoint.

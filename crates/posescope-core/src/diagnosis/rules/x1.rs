@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Quaternion, Rotation3, Translation3, UnitQuaternion, Vec
 
 use super::*;
 use crate::camera::Intrinsics;
-use crate::diagnosis::matches::TrueMatches;
+use crate::diagnosis::matches::{Pairs, TrueMatches};
 use crate::diagnosis::{Evidence, Subject};
 use crate::estimator::{Estimator, FeatureBased};
 use crate::solver::Correspondence;
@@ -35,6 +35,7 @@ fn test(case: &Case<'_>) -> Option<Diagnosis> {
             // Seen by a wrong camera, the depths of the right cloud look wrong too.
             poses(case)
                 .or_else(|| camera_by_matches(case, matches))
+                .or_else(|| camera_of_both(case, matches))
                 .or_else(|| cloud(matches))
                 .or_else(|| truth_by_matches(case, matches))
         }
@@ -231,8 +232,75 @@ fn camera_by_fb(case: &Case<'_>) -> Option<Diagnosis> {
     let (outcome, evidence) = (&outcome, &evidence);
     let subject = Subject { method: Method::FB, outcome, evidence, ..subject.clone() };
     let case = Case::new(&subject, Family::Features, None);
-    camera_by_matches(&case, case.matches()?)
+    let matches = case.matches()?;
+    camera_by_matches(&case, matches).or_else(|| camera_of_both(&case, matches))
 }
+
+/// With another focal length of one camera for both photos, the cloud gives far more true matches their depths.
+///
+/// A camera of photos of another size has its centre scaled too.
+fn camera_of_both(case: &Case<'_>, matches: &TrueMatches) -> Option<Diagnosis> {
+    /// Steps of the focal length, as exponents of 2: first on both sides of the stated one, then around the best.
+    const COARSE: f64 = 0.125;
+    const COARSE_STEPS: i32 = 12;
+    const FINE: f64 = 0.03;
+    const FINE_STEPS: i32 = 4;
+    let problem = case.subject.problem;
+    let [query, reference] = [problem.query.intrinsics, problem.reference.intrinsics];
+    let is_one_camera = query == reference;
+    let before = matches.funnel.lifted;
+    let lost = matches.wrong_depth + matches.no_depth;
+    if !is_one_camera || lost < 2 * FEW_MATCHES || lost < before {
+        return None;
+    }
+    let pairs = Pairs::of(case.subject, &case.matching())?;
+    let scaled = |exponent: f64, with_centre: bool| {
+        let scale = exponent.exp2();
+        let of_centre = if with_centre { scale } else { 1.0 };
+        Intrinsics {
+            fx: scale * reference.fx,
+            fy: scale * reference.fy,
+            cx: of_centre * reference.cx,
+            cy: of_centre * reference.cy,
+            ..reference
+        }
+    };
+    let count = |(exponent, with_centre): (f64, bool)| {
+        (pairs.explained_by(&scaled(exponent, with_centre)), exponent, with_centre)
+    };
+    let most = |candidates: &mut dyn Iterator<Item = (f64, bool)>| {
+        candidates.map(count).max_by(|a, b| a.0.cmp(&b.0).then(b.1.abs().total_cmp(&a.1.abs())))
+    };
+    let grid = |around: f64, step: f64, steps: i32| {
+        (-steps..=steps).map(move |at| around + step * f64::from(at))
+    };
+    let coarse = &mut grid(0.0, COARSE, COARSE_STEPS).flat_map(|at| [(at, false), (at, true)]);
+    let (_, exponent, with_centre) = most(coarse)?;
+    let fine = &mut grid(exponent, FINE, FINE_STEPS).map(|at| (at, with_centre));
+    let (after, exponent, _) = most(fine)?;
+    let camera = scaled(exponent, with_centre);
+    let is_more = after >= before + 2 * FEW_MATCHES && 5 * after >= 8 * before && 2 * after >= lost;
+    let is_other = (camera.fx / reference.fx - 1.0).abs() > 2.0 * SAME_FOCAL_LENGTH;
+    (is_more && is_other).then(|| {
+        RULE.found(&CameraOfBoth {
+            right_depth: before,
+            right_depth_otherwise: after,
+            camera,
+            stated: reference,
+        })
+    })
+}
+
+evidence!(CameraOfBoth {
+    right_depth: usize,
+    right_depth_otherwise: usize,
+    camera: Intrinsics,
+    stated: Intrinsics,
+} =>
+    "The camera of both photos is suspect: {}. That gives {right_depth_otherwise} true matches the right depth, \
+     not {right_depth}.",
+    what_it_should_be(camera, stated)
+);
 
 /// From the true pose, another focal length and principal point explain far more matches.
 fn camera_by_matches(case: &Case<'_>, matches: &TrueMatches) -> Option<Diagnosis> {
