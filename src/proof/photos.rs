@@ -337,11 +337,15 @@ pub(super) fn cloud_on_photo(case: &ProofCase<'_>) -> Option<ProofPicture> {
     if let Some(cameras) = cloud_by_two_cameras(case) {
         return Some(cameras);
     }
-    let query = &case.problem.query;
+    let (query, of_reference) = (&case.problem.query, &case.problem.reference.intrinsics);
     let large = reference_cloud(case);
     let on_query = |what: &str, query_from_reference: &Pose| {
-        let (picture, points) =
-            cloud_picture(&query.photo, &query.intrinsics, case, query_from_reference);
+        let (picture, points) = cloud_picture(
+            &query.photo,
+            [&query.intrinsics, of_reference],
+            case,
+            query_from_reference,
+        );
         Panel::new(
             format!("The same points in the query, from the {what}: {points} points"),
             picture,
@@ -362,29 +366,30 @@ pub(super) fn cloud_on_photo(case: &ProofCase<'_>) -> Option<ProofPicture> {
 pub(super) fn reference_cloud(case: &ProofCase<'_>) -> Panel {
     let reference = &case.problem.reference;
     let (photo, points) =
-        cloud_picture(&reference.photo, &reference.intrinsics, case, &Pose::identity());
+        cloud_picture(&reference.photo, [&reference.intrinsics; 2], case, &Pose::identity());
     Panel::new(format!("Cloud on reference {}: {points} points", reference.name), photo)
 }
 
-/// Where the verdict names another camera: the cloud on the query's photo, seen from the truth by both.
+/// Where the verdict names another camera, of the query or of both photos: the cloud on the query's photo, seen from the
+/// truth as stated and as named.
 fn cloud_by_two_cameras(case: &ProofCase<'_>) -> Option<ProofPicture> {
     let query = &case.problem.query;
-    let named = case.result.diagnosis.first()?.evidence.get("camera")?;
-    let camera: Intrinsics = serde_json::from_value(named.clone()).ok()?;
+    let evidence = &case.result.diagnosis.first()?.evidence;
+    let camera: Intrinsics = serde_json::from_value(evidence.get("camera")?.clone()).ok()?;
+    let stated = [query.intrinsics, case.problem.reference.intrinsics];
+    let is_of_both = evidence.get("right_depth_otherwise").is_some();
+    let named = [camera, if is_of_both { camera } else { stated[1] }];
     let query_from_reference = case.query_from_reference()?;
-    let seen_by = |what: &str, camera: &Intrinsics| {
-        Panel::new(
-            format!("{what}: {:.0} px", camera.fx),
-            cloud_picture(&query.photo, camera, case, &query_from_reference).0,
-        )
+    let seen_by = |what: &str, [camera, of_reference]: [Intrinsics; 2]| {
+        let Intrinsics { fx, cx, cy, .. } = camera;
+        let title = format!("{what}: {fx:.0} px, centre ({cx:.0}, {cy:.0})");
+        let cameras = [&camera, &of_reference];
+        Panel::new(title, cloud_picture(&query.photo, cameras, case, &query_from_reference).0)
     };
     Some(ProofPicture {
-        large: seen_by(
-            "The cloud on the query photo at the truth, by the stated focal length",
-            &query.intrinsics,
-        ),
+        large: seen_by("The cloud on the query at the truth, by the stated camera", stated),
         below: Some(depth_legend()),
-        beside: vec![seen_by("The same by a better focal length", &camera)],
+        beside: vec![seen_by("The same by a better camera", named)],
     })
 }
 
@@ -412,7 +417,7 @@ fn depth_legend() -> Panel {
 /// ones above; and how many are in the picture. What the scan holds beside and behind, no method sees.
 fn cloud_picture(
     photo: &Arc<Photo>,
-    camera: &Intrinsics,
+    [camera, of_reference]: [&Intrinsics; 2],
     case: &ProofCase<'_>,
     camera_from_reference: &Pose,
 ) -> (RgbImage, usize) {
@@ -423,8 +428,8 @@ fn cloud_picture(
     let reference = &case.problem.reference;
     let points = reference.cloud.points.iter().map(|point| point.cast::<f64>());
     let shown = points.filter(|point| {
-        let pixel = reference.intrinsics.project(point);
-        pixel.is_some_and(|pixel| reference.intrinsics.contains(&pixel))
+        let pixel = of_reference.project(point);
+        pixel.is_some_and(|pixel| of_reference.contains(&pixel))
     });
     let seen = shown.filter_map(|point| {
         let point = camera_from_reference * point;

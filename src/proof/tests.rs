@@ -300,8 +300,8 @@ fn a_suspect_camera_is_drawn_beside_the_better_one() {
         panic!("{} panels", picture.beside.len());
     };
     let says = |panel: &Panel, camera: &crate::camera::Intrinsics| {
-        let words = format!("{:.0} px", camera.fx);
-        assert!(panel.title.ends_with(&words), "{}", panel.title);
+        let words = format!(": {:.0} px, centre ({:.0}, ", camera.fx, camera.cx);
+        assert!(panel.title.contains(&words), "{}", panel.title);
     };
     says(&picture.large, &stated);
     says(better, &other);
