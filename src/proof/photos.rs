@@ -231,7 +231,7 @@ pub(super) fn depth_patches(case: &ProofCase<'_>) -> Option<ProofPicture> {
         format!(
             "Depths of the cloud. Matches: {with_depth} {judged}, {missing} without a depth (white)"
         ),
-        cloud_picture(&reference.photo, &reference.intrinsics, case, &Pose::identity()).0,
+        cloud_picture(&reference.photo, [&reference.intrinsics; 2], case, &Pose::identity()).0,
     );
     for one in &doubtful {
         let color = match one.point {
