@@ -87,6 +87,7 @@ pub struct Protocol {
             help_heading = "References",
             value_name = "METRES",
             value_delimiter = ',',
+            allow_negative_numbers = true,
             value_parser = crate::run::positive
         )
     )]
@@ -99,6 +100,7 @@ pub struct Protocol {
             long = "prior",
             help_heading = "References",
             value_name = "METRES",
+            allow_negative_numbers = true,
             value_parser = crate::run::positive
         )
     )]
@@ -186,6 +188,7 @@ pub struct Protocol {
             long = "failure-radius",
             help_heading = "Judging",
             value_name = "METRES",
+            allow_negative_numbers = true,
             value_parser = crate::run::positive,
             hide_short_help = true
         )
@@ -201,6 +204,7 @@ pub struct Protocol {
             long,
             help_heading = "Judging",
             value_name = "PROBABILITY",
+            allow_negative_numbers = true,
             value_parser = crate::run::probability
         )
     )]

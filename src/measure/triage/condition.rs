@@ -203,6 +203,9 @@ impl Parser<'_> {
             _ => return Err(format!("a value expected for `{}`", field.name)),
         };
         if field.decimals.is_none() {
+            if matches!(relation, Relation::Is | Relation::IsNot) {
+                field.check(&value.to_lowercase()).map_err(|error| error.to_string())?;
+            }
             return Ok(Tree::Words(field, relation, value.to_lowercase()));
         }
         let number = value.parse().ok().filter(|number: &f64| number.is_finite());
@@ -243,6 +246,9 @@ mod tests {
         assert!(error("error 1").contains("a relation expected"));
         assert!(error("error >").contains("a value expected"));
         assert!(error("error > far").contains("a number expected"));
+        assert!(error("grade = wrng").contains("right, unmeasured, wrong or no pose expected"));
+        assert!(error("confidence != high").contains("trusted, unsure or low"));
+        assert!(error("code = D99").contains("D99"));
         assert!(error("error ~ 1").contains("is for words"));
         assert!(error("(error > 1").contains("`)` expected"));
         assert!(error("error > 1 error < 2").contains("`and` or `or` expected before `error`"));

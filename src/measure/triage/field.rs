@@ -2,6 +2,7 @@
 
 use std::cmp::Ordering;
 
+use crate::diagnosis::{Code, Confidence, Grade};
 use crate::localize::QueryResult;
 use crate::table::Align;
 use crate::text::UnknownWord;
@@ -15,6 +16,7 @@ pub struct Field {
     /// Digits after the decimal point; `None` for text.
     pub decimals: Option<usize>,
     read: Read,
+    check: fn(&str) -> Result<(), UnknownWord>,
 }
 
 impl PartialEq for Field {
@@ -69,13 +71,16 @@ impl Field {
         words("fusion", "the fusion", |r| {
             r.fusion.as_ref().map_or(String::new(), ToString::to_string)
         }),
-        words("grade", "right, wrong, no pose or unmeasured", |r| r.grade.to_string()),
+        words("grade", "right, wrong, no pose or unmeasured", |r| r.grade.to_string())
+            .only(|word| word.parse::<Grade>().map(drop)),
         words("confidence", "trusted, unsure or low", |r| {
             r.confidence_word().map_or(String::new(), |word| word.to_string())
-        }),
+        })
+        .only(|word| word.parse::<Confidence>().map(drop)),
         words("code", "the primary verdict", |r| {
             r.diagnosis.first().map_or(String::new(), |d| d.code.to_string())
-        }),
+        })
+        .only(|word| word.to_uppercase().parse::<Code>().map(drop)),
         words("cause", "the primary verdict as a phrase", |r| {
             r.diagnosis.first().map_or(String::new(), |d| d.code.title().to_owned())
         }),
@@ -141,6 +146,19 @@ impl Field {
         all.find(|field| field.name == name).ok_or_else(|| UnknownWord::among(name, "field", names))
     }
 
+    /// Whether it can have this value. No word at all stands for a missing one.
+    ///
+    /// # Errors
+    /// A word that it never has; the error lists those that it has.
+    pub(super) fn check(&self, word: &str) -> Result<(), UnknownWord> {
+        if word.is_empty() { Ok(()) } else { (self.check)(word) }
+    }
+
+    /// The same field, of which only these values make sense.
+    const fn only(self, check: fn(&str) -> Result<(), UnknownWord>) -> Self {
+        Self { check, ..self }
+    }
+
     /// The alignment of its column in a table.
     pub fn align(&self) -> Align {
         match self.decimals {
@@ -190,7 +208,7 @@ enum Read {
 }
 
 const fn words(name: &'static str, about: &'static str, read: fn(&QueryResult) -> String) -> Field {
-    Field { name, about, decimals: None, read: Read::Words(read) }
+    Field { name, about, decimals: None, read: Read::Words(read), check: |_| Ok(()) }
 }
 
 const fn number(
@@ -199,5 +217,5 @@ const fn number(
     decimals: usize,
     read: fn(&QueryResult) -> Option<f64>,
 ) -> Field {
-    Field { name, about, decimals: Some(decimals), read: Read::Number(read) }
+    Field { name, about, decimals: Some(decimals), read: Read::Number(read), check: |_| Ok(()) }
 }
