@@ -4,6 +4,7 @@ mod chance;
 mod diff;
 #[cfg(feature = "cli")]
 mod export;
+mod findings;
 mod gate;
 mod groups;
 #[cfg(feature = "cli")]
@@ -30,6 +31,7 @@ pub use crate::relation::Relation;
 pub use diff::{Change, Difference, Migration, RunComparison, migrations, verdict_name};
 #[cfg(feature = "cli")]
 pub use export::{Export, ExportError, ExportedFile, Format, export};
+pub use findings::{Finding, findings};
 pub use gate::{Gate, GateResult};
 pub use known::{KnownFailures, KnownReport};
 pub use metrics::{Group, Measures, RECALL_LIMITS, Spread, measure};

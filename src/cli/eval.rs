@@ -322,6 +322,9 @@ fn good_unless(failures: &[String]) -> Result<(), CliError> {
 }
 
 fn show(report: &Report, run: &RunFile, width: Option<usize>) -> Result<(), CliError> {
+    for finding in &report.findings {
+        output::print(&format!("Finding: {}", finding.text))?;
+    }
     // The summary of an experiment has a line for every combination: too long for a terminal.
     let skipped = usize::from(run.protocol.preset.is_some());
     for figures in report.tables.iter().skip(skipped) {

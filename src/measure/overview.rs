@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use super::findings::{Finding, findings};
 use super::groups::grouped;
 use crate::diagnosis::{Code, Grade};
 use crate::localize::QueryResult;
@@ -9,6 +10,8 @@ use crate::localize::QueryResult;
 /// What a run came to.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Overview {
+    /// Mistakes of a whole scene.
+    pub findings: Vec<Finding>,
     /// How the best method did, why its worst failures failed, and what mends most of them.
     pub headline: String,
     /// One bar for each method, in the order of the results.
@@ -51,7 +54,7 @@ impl Overview {
         let mut causes = causes(results.iter().filter(|result| result.grade.is_failure()));
         // A stable sort: causes that are as frequent stay in the order in which they occur.
         causes.sort_by_key(|(_, times)| std::cmp::Reverse(*times));
-        Self { headline: headline(results, &bars), bars, causes }
+        Self { findings: findings(results), headline: headline(results, &bars), bars, causes }
     }
 }
 

@@ -6,6 +6,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use super::diff::{Change, RunComparison};
+use super::findings::{Finding, findings};
 use super::gate::{Gate, GateResult};
 use super::known::{KnownFailures, KnownReport};
 use super::metrics::{Measures, measure};
@@ -28,6 +29,8 @@ const SUMMARY: &str = "summary.json";
 pub struct Report {
     /// The figures by group and method.
     pub measures: Vec<Measures>,
+    /// The mistakes that several queries agree on.
+    pub findings: Vec<Finding>,
     /// The outcomes of the gates.
     pub gate_results: Vec<GateResult>,
     /// The known failures.
@@ -45,6 +48,9 @@ impl Report {
         let mut text = String::new();
         if !self.gate_results.is_empty() {
             text += &(GateResult::table(&self.gate_results).to_markdown() + "\n");
+        }
+        for finding in &self.findings {
+            text += &format!("**{}**\n\n", plain(&finding.text));
         }
         let verdicts = self.tables.iter().find(|table| table.name == "verdicts");
         for mut table in brief(&self.measures).into_iter().chain(verdicts.cloned()) {
@@ -89,6 +95,8 @@ struct Summary<'a> {
     groups: &'a [Measures],
     #[serde(skip_serializing_if = "<[_]>::is_empty")]
     gates: &'a [GateResult],
+    #[serde(skip_serializing_if = "<[_]>::is_empty")]
+    findings: &'a [Finding],
 }
 
 /// The part of a summary that is read back.
@@ -140,11 +148,13 @@ pub fn write_report(
     let gated = measured(timed.filter(|(row, _)| !known.has(row)).collect());
     let gate_results: Vec<GateResult> = gates.iter().map(|gate| gate.check(&gated)).collect();
     let known_report = known.report(&rows);
+    let findings = findings(&rows.iter().collect::<Vec<_>>());
     let summary = Summary {
         schema: SUMMARY_SCHEMA,
         failure_radius_m: run.failure_radius_m(),
         groups: &measures,
         gates: &gate_results,
+        findings: &findings,
     };
     let json = serde_json::to_vec_pretty(&summary);
     let json = json.map_err(|error| FolderError::io(folder)(error.into()))?;
@@ -157,6 +167,7 @@ pub fn write_report(
     Ok(Report {
         tables: tables(&results, run.protocol.preset.map(|one| one.name())),
         measures: results.measures,
+        findings,
         gate_results,
         known: known_report,
     })

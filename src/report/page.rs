@@ -37,6 +37,7 @@ pub(super) fn page(report: &RunReport) -> String {
             body {
                 header {
                     h1 { (title) }
+                    @for finding in &overview.findings { p.headline { b.wrong { (finding.text) } } }
                     p.headline { (with_code(&overview.headline)) }
                     nav aria-label="Parts of the report" {
                         @if !report.gates.is_empty() { a href="#gates" { "Gates" } " " }

@@ -31,6 +31,10 @@ pub(crate) fn left(ui: &mut Ui, state: &AppState, commands: &Queue, panes: &mut 
         .collect();
     let overview = Overview::of(&results.iter().collect::<Vec<_>>());
     ui.add_space(4.0);
+    for finding in &overview.findings {
+        let color = theme::text(ui.visuals(), theme::ESTIMATE);
+        ui.label(RichText::new(&finding.text).size(15.0).color(color));
+    }
     ui.horizontal_wrapped(|ui| {
         let headline =
             RichText::new(&overview.headline).size(15.0).color(ui.visuals().strong_text_color());
