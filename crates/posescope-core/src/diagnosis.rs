@@ -186,5 +186,13 @@ fn tried(case: &Case<'_>, grade: Grade) -> Vec<Diagnosis> {
             found.push(verdict);
         }
     }
+    // What yields goes behind the last of those that it yields to.
+    for at in (0..found.len()).rev() {
+        let yields_to = (found[at].code.rule().yields_to)(&found[at].evidence);
+        let last = found.iter().rposition(|other| yields_to.contains(&other.code));
+        if let Some(last) = last.filter(|&last| last > at) {
+            found[at..=last].rotate_left(1);
+        }
+    }
     found
 }

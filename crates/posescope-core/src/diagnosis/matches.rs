@@ -338,10 +338,13 @@ fn detected(query: &Features, predicted: &[Option<Point2<f64>>], threshold_px: f
     predicted.iter().flatten().filter(has_keypoint).count()
 }
 
-/// The epipolar lines of the true pose.
+/// The epipolar lines of the true pose, each as far as it has points in front of both cameras.
 struct Epipolar {
     /// Takes a reference pixel (homogeneous) to its line in the query.
     fundamental: Matrix3<f64>,
+    query_from_reference: Pose,
+    query: Intrinsics,
+    reference: Intrinsics,
     threshold_px: f64,
 }
 
@@ -363,6 +366,9 @@ impl Epipolar {
         };
         Self {
             fundamental: inverse(query).transpose() * essential * inverse(reference),
+            query_from_reference,
+            query: *query,
+            reference: *reference,
             threshold_px,
         }
     }
@@ -379,11 +385,28 @@ impl Epipolar {
         hits as f64 / (OTHERS * count).max(1) as f64
     }
 
-    /// Whether a query pixel lies on the line of a reference pixel.
+    /// Whether a query pixel lies on the line of a reference pixel, and their point is in front of both cameras.
     fn explains(&self, reference: &Point2<f64>, query: &Point2<f64>) -> bool {
         let line = self.fundamental * reference.to_homogeneous();
         let distance = line.dot(&query.to_homogeneous()).abs() / line.x.hypot(line.y);
-        distance <= self.threshold_px / TRUE_MATCH_THRESHOLDS
+        let threshold_px = self.threshold_px / TRUE_MATCH_THRESHOLDS;
+        distance <= threshold_px && self.is_in_front(reference, query, threshold_px)
+    }
+
+    /// Whether a pixel on the line is on the side of the vanishing point that has points in front of both cameras.
+    fn is_in_front(&self, reference: &Point2<f64>, query: &Point2<f64>, slack_px: f64) -> bool {
+        /// The inverse depth \[1/m\] of a point so far away that it stands for the direction of all nearer ones.
+        const FAR: f64 = 1e-3;
+        let ray = self.reference.unproject(reference, 1.0);
+        let at = |inverse_depth: f64| {
+            let Pose { rotation, translation } = self.query_from_reference;
+            self.query.project(&(rotation * ray + inverse_depth * translation.vector))
+        };
+        let (Some(vanishing), Some(nearer)) = (at(0.0), at(FAR)) else {
+            return false;
+        };
+        let towards = nearer - vanishing;
+        (query - vanishing).dot(&towards) >= -slack_px * towards.norm()
     }
 }
 
@@ -404,6 +427,20 @@ mod tests {
             reference_keypoints: 200,
         };
         matches.lost_for_depth()
+    }
+
+    #[test]
+    fn a_match_whose_point_is_behind_the_cameras_is_not_explained() {
+        let camera =
+            Intrinsics { fx: 100.0, fy: 100.0, cx: 99.5, cy: 49.5, width: 200, height: 100 };
+        // The query is one metre ahead of the reference: what both see moves away from the centre.
+        let epipolar = Epipolar::new(&Pose::translation(0.0, 0.0, 1.0), &camera, &camera, 4.0);
+        let seen = Point2::new(119.5, 49.5);
+        let explains = |x: f64, y: f64| epipolar.explains(&seen, &Point2::new(x, y));
+        assert!(explains(124.5, 49.5), "five metres away");
+        assert!(explains(119.0, 49.5), "as far away as noise lets it be");
+        assert!(!explains(110.0, 49.5), "on the line, but behind");
+        assert!(!explains(124.5, 55.0), "off the line");
     }
 
     #[test]

@@ -124,6 +124,8 @@ pub struct Rule {
     pub needs_truth: bool,
     /// Whether no later rule is tried once this one fired.
     pub is_conclusive: bool,
+    /// The verdicts that come before this one if they fire too, for what was found.
+    pub yields_to: fn(&serde_json::Value) -> &'static [Code],
     /// The test.
     pub test: Test,
     /// The stage that decided it.
@@ -148,6 +150,7 @@ impl Rule {
             applies_to: &[],
             needs_truth: true,
             is_conclusive: false,
+            yields_to: |_| &[],
             test: Test::Reported,
             decided_at: DecidedAt::End,
             proof: Proof::DecidingStage,

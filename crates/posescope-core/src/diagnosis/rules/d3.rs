@@ -14,6 +14,9 @@ pub(super) const RULE: Rule = Rule {
         Family::Starts => Some("raise mi6.starts or mi6.coarse_yaws, or lower grid.coarse_step"),
         _ => None,
     },
+    advice_on: |found| {
+        found.get("fine_range_m").map(|_| "raise grid.fine_range to half of grid.coarse_step at least")
+    },
     applies_to: Family::COSTED,
     is_conclusive: true,
     test: Test::Method(test),
@@ -34,6 +37,8 @@ fn test(case: &Case<'_>) -> Option<Diagnosis> {
 fn by_grid(search: &Search<'_>) -> Option<Diagnosis> {
     let rivals = search.rivals().filter(|rivals| rivals.is_missed)?;
     let lost = lost_in(search, &rivals.near);
+    // Then places between coarse cells are in no fine grid.
+    let is_narrow = 2.0 * search.grid.fine_range_m < search.grid.coarse_step_m;
     Some(RULE.found(&Missed {
         cost_near_truth: rivals.near.cost,
         cost_at_result: search.result_cost?,
@@ -42,6 +47,8 @@ fn by_grid(search: &Search<'_>) -> Option<Diagnosis> {
         lost_in: lost.phase.map(Phase::name),
         rank: lost.rank,
         margin: lost.margin,
+        fine_range_m: is_narrow.then_some(search.grid.fine_range_m),
+        coarse_step_m: is_narrow.then_some(search.grid.coarse_step_m),
     }))
 }
 
@@ -56,15 +63,25 @@ evidence!(Missed {
     rank: Option<usize>,
     /// What that cell costs more than the lowest.
     margin: Option<f64>,
+    /// Half the width of the fine grid, where it does not reach the places between coarse cells.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    fine_range_m: Option<f64>,
+    /// The step between coarse cells then.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    coarse_step_m: Option<f64>,
 } => {
     let (near, result) = pair(*cost_near_truth, *cost_at_result);
-    let why = match (rank, lost_in) {
-        (Some(rank), _) => {
+    let narrow = fine_range_m.zip(*coarse_step_m);
+    let why = match (narrow, rank, lost_in) {
+        (Some((range, step)), ..) => {
+            format!(" The fine grid reaches {range} m, less than half a coarse step of {step} m.")
+        }
+        (None, Some(rank), _) => {
             let rank = ordinal(*rank);
             format!(" The coarse grid ranked the right cell {rank}, and only the 1st is refined.")
         }
-        (None, Some(phase)) => format!(" It went wrong in the phase “{phase}”."),
-        (None, None) => String::new(),
+        (None, None, Some(phase)) => format!(" It went wrong in the phase “{phase}”."),
+        (None, None, None) => String::new(),
     };
     format!(
         "The search missed it: cost {near} near the truth, {result} at the result (lower is better).{why}"
@@ -188,7 +205,10 @@ fn remedies(ask: &Ask<'_>) -> Vec<Remedy> {
         }
         _ => {
             let (rounds, dense) = (ask.rounds(), ask.dense());
-            vec![
+            let grid = &ask.params.grid;
+            let is_narrow = 2.0 * grid.fine_range_m < grid.coarse_step_m;
+            let wide = is_narrow.then(|| vec![ask.set("grid.fine_range", grid.coarse_step_m)]);
+            let others = vec![
                 vec![rounds.clone()],
                 vec![dense.clone()],
                 vec![dense.clone(), rounds.clone()],
@@ -196,7 +216,8 @@ fn remedies(ask: &Ask<'_>) -> Vec<Remedy> {
                 vec![splat],
                 vec![ask.wide_yaw(), rounds],
                 vec![dense, floor],
-            ]
+            ];
+            wide.into_iter().chain(others).collect()
         }
     }
 }
@@ -215,11 +236,19 @@ mod tests {
             lost_in: Some(Phase::PositionCoarse.name()),
             rank: Some(5),
             margin: Some(0.0039),
+            fine_range_m: None,
+            coarse_step_m: None,
         };
         assert_eq!(
             missed.to_string(),
             "The search missed it: cost 0.915 near the truth, 0.927 at the result (lower is better). \
              The coarse grid ranked the right cell 5th, and only the 1st is refined."
+        );
+        let narrow = Missed { fine_range_m: Some(0.2), coarse_step_m: Some(1.0), ..missed };
+        assert_eq!(
+            narrow.to_string(),
+            "The search missed it: cost 0.915 near the truth, 0.927 at the result (lower is better). \
+             The fine grid reaches 0.2 m, less than half a coarse step of 1 m."
         );
     }
 }

@@ -17,6 +17,11 @@ pub(super) const RULE: Rule = Rule {
     applies_to: Family::ALL,
     needs_truth: false,
     test: Test::Method(test),
+    // What one query says of a camera, of poses or of a cloud may be chance, and these need none of it. Units are
+    // read off the cloud.
+    yields_to: |found| {
+        if found.get("unit").is_some() { &[] } else { &[Code::R1, Code::D4, Code::D7] }
+    },
     proof: Proof::CloudOnPhoto,
     ..Rule::new(Code::X1)
 };
