@@ -34,7 +34,8 @@ mod view_crop;
 use std::path::{Path, PathBuf};
 
 pub use posescope_core::scene::{
-    CachedScene, DegradedScene, Entry, FrameStore, Scene, SceneError, degraded, frame_range,
+    CachedScene, DegradedScene, Entry, FrameStore, Lengths, Scene, SceneError, SceneSize, degraded,
+    frame_range,
 };
 pub use posescope_street as street;
 

@@ -16,7 +16,6 @@ use crate::grid::Phase;
 use crate::image::Degradation;
 use crate::localize::References;
 use crate::method::Method;
-use crate::params::Params;
 use crate::session::{Breakpoint, Breakpoints, Part, RunMode, RunState};
 
 impl AppState {
@@ -298,7 +297,7 @@ impl AppState {
 
     /// Sets all parameters to their defaults.
     pub fn reset_params(&mut self) {
-        self.setup.task.params = Params::default();
+        self.setup.task.params = self.setup.task.params.defaults();
         self.restart_run();
     }
 

@@ -185,6 +185,7 @@ impl ConfigArgs {
 mod tests {
     use super::*;
     use posescope::method::Method;
+    use posescope::scene::SceneSize;
     use posescope::session::Task;
 
     #[test]
@@ -196,7 +197,9 @@ mod tests {
     fn task(words: &[&str]) -> Task {
         let words = ["posescope"].iter().chain(words);
         match Arguments::try_parse_from(words).map(|parsed| parsed.command) {
-            Ok(Some(Command::Run(args))) => args.task.task(&args.scene).expect("good parameters"),
+            Ok(Some(Command::Run(args))) => {
+                args.task.task(&args.scene, &SceneSize::PAPER).expect("good parameters")
+            }
             other => panic!("{other:?}"),
         }
     }

@@ -19,7 +19,7 @@ use posescope::run::{
     Draw, Execution, Preset, Protocol, RUN_SCHEMA, RunError, RunFile, RunFolder, ScenePair, Scenes,
     Sweep, defaults, inputs, known, merge,
 };
-use posescope::scene::Retriever;
+use posescope::scene::{Retriever, SceneSize};
 use posescope::session::command_line;
 
 use super::args::{EvalArgs, EvalCommand, JudgingArgs};
@@ -28,6 +28,7 @@ use super::event_export::EventExport;
 use super::failure::CliError;
 use super::failures::{self, FailureRecordings};
 use super::interrupt::Interrupt;
+use super::opened;
 use super::output;
 use super::table;
 use super::terminal::Terminal;
@@ -99,7 +100,7 @@ fn execute(
 ) -> Result<RunFile, CliError> {
     let PlannedRun { run, scenes, params } = match &args.rerun_failed {
         Some(before) => again::plan(args, before)?,
-        None => plan(args, swept)?,
+        None => plan(args, swept, terminal)?,
     };
     let scenes = scenes.with_protocol(&run.protocol)?;
     let indices = indices(&run, &scenes, &params)?;
@@ -153,13 +154,28 @@ fn execute(
 }
 
 /// The run that the arguments ask for, with all defaults filled in, at one value of a sweep.
-fn plan(args: &EvalArgs, swept: Option<(&Sweep, &str)>) -> Result<PlannedRun, CliError> {
-    let mut params = args.config.resolve()?;
+fn plan(
+    args: &EvalArgs,
+    swept: Option<(&Sweep, &str)>,
+    terminal: &Terminal,
+) -> Result<PlannedRun, CliError> {
     let given = args.protocol.over(Protocol::default())?;
+    args.config.resolve()?;
     let scenes = Scenes::open(&args.scenes, &given.query_scene, given.format.as_deref())?;
     let first = scenes.references.first();
+    let size = first.map_or(SceneSize::PAPER, |scene| SceneSize::of(scene.as_ref()));
+    let mut params = args.config.over(Params::at_scale(size.scale))?;
     let defaults = defaults(given.preset, first.map_or("", |scene| scene.name()));
-    let mut protocol = args.protocol.over(defaults)?;
+    let mut protocol = args.protocol.over(defaults.at_size(&size))?;
+    if let Some(line) = opened::size_line(&size, &protocol, &params) {
+        terminal.say(|| line);
+    }
+    let camera = first.filter(|scene| !scene.frames().is_empty()).map(|scene| scene.intrinsics(0));
+    if let Some(warning) =
+        camera.and_then(|camera| opened::misfit(&size, &protocol, &params, &camera))
+    {
+        log::warn!("{warning}");
+    }
     if protocol.is_by_hand() {
         return Err(CliError::Usage(
             "eval chooses references for each query: --reference takes random:K, nearest:K, matches:K or \

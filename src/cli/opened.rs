@@ -3,12 +3,71 @@
 use std::path::Path;
 use std::sync::Arc;
 
+use posescope::camera::Intrinsics;
 use posescope::localize::Selection;
-use posescope::scene::{LoosePhotos, Scene, SceneError};
+use posescope::params::Params;
+use posescope::run::Protocol;
+use posescope::scene::{LoosePhotos, Scene, SceneError, SceneSize};
 use posescope::session::{Task, TaskScenes};
 
 use super::args::TaskArgs;
 use super::failure::CliError;
+
+/// What follows from the size of a scene, in one line; nothing for a scene of the paper's scale.
+pub fn size_line(size: &SceneSize, protocol: &Protocol, params: &Params) -> Option<String> {
+    let unit = if size.scale.is_metric() { " m" } else { "" };
+    let depth = size.depth_m.filter(|_| *size != SceneSize::PAPER)?;
+    let grid = &params.grid;
+    Some(format!(
+        "What the cameras see is {depth:.1}{unit} away: search radius {}{unit}, steps {}{unit} and {}{unit}, right \
+         within {}{unit} and {}°; --radius, --set and --right change this",
+        protocol.radius_m(),
+        grid.coarse_step_m,
+        grid.fine_step_m,
+        protocol.right.translation_m,
+        protocol.right.rotation_deg,
+    ))
+}
+
+/// Why a search with these settings cannot work in a scene of this size, with the settings that fit.
+pub fn misfit(
+    size: &SceneSize,
+    protocol: &Protocol,
+    params: &Params,
+    camera: &Intrinsics,
+) -> Option<String> {
+    /// A coarse step moves what the camera sees by no more than this share of the photo. In the paper's scenes it is
+    /// 5 %; basins of the costs are a few times as wide.
+    const MAX_SHIFT: f64 = 0.15;
+    let depth = size.depth_m?;
+    let (fitting, grid) = (params.defaults(), &params.grid);
+    let shift = camera.fx * grid.coarse_step_m / depth / f64::from(camera.width);
+    if shift > MAX_SHIFT {
+        return Some(format!(
+            "a coarse step of {} moves what the camera sees by {:.0} % of the photo, too far for the search; \
+             --set grid.coarse_step={} fits",
+            grid.coarse_step_m,
+            100.0 * shift,
+            fitting.grid.coarse_step_m
+        ));
+    }
+    let (radius_m, fitting_m) = (protocol.radius_m(), size.radius_m());
+    let reach_m = size.extent_m? + depth;
+    if radius_m > reach_m.max(fitting_m) {
+        return Some(format!(
+            "a radius of {radius_m} reaches beyond the whole map; --radius {fitting_m} fits"
+        ));
+    }
+    let turn_deg = size.turn_deg?;
+    (turn_deg > grid.yaw_range_deg).then(|| {
+        format!(
+            "neighbouring frames are turned by {turn_deg:.0}°, and pm and mi search headings within {}°; \
+             --set grid.yaw_range={:.0} fits",
+            grid.yaw_range_deg,
+            (1.5 * turn_deg).min(180.0).ceil()
+        )
+    })
+}
 
 /// A task with its scenes and the named queries.
 pub struct OpenedTask {
@@ -16,12 +75,14 @@ pub struct OpenedTask {
     pub scenes: TaskScenes,
     /// The named queries, as positions in their scene.
     pub queries: Vec<usize>,
+    /// The size of the references' scene.
+    pub size: SceneSize,
 }
 
 /// Opens the scenes and queries of the arguments. A query that is a file and not a frame of its scene is a
 /// loose photo; either all queries are frames or all are photos.
 pub fn open(args: &TaskArgs, scene: &str, queries: &[String]) -> Result<OpenedTask, CliError> {
-    let mut task = args.task(scene)?;
+    let mut task = args.task(scene, &SceneSize::PAPER)?;
     let mut first: Option<Arc<dyn Scene>> = None;
     if args.camera.is_none() && queries.iter().any(|query| Path::new(query).is_file()) {
         // The name of a frame means the frame. A file with an extension is a photo even where a frame has its number.
@@ -63,6 +124,12 @@ pub fn open(args: &TaskArgs, scene: &str, queries: &[String]) -> Result<OpenedTa
         }
     }
     let scenes = task.open(&|argument| first.clone().filter(|_| argument == scene))?;
+    let size = SceneSize::of(scenes.references.as_ref());
+    if size != SceneSize::PAPER {
+        let Task { protocol, params, .. } = args.task(scene, &size)?;
+        task.protocol = Protocol { references: task.protocol.references, ..protocol };
+        task.params = params;
+    }
     let queries = match &task.photos {
         Some(photos) => (0..photos.paths.len()).collect(),
         None => queries
@@ -70,5 +137,5 @@ pub fn open(args: &TaskArgs, scene: &str, queries: &[String]) -> Result<OpenedTa
             .map(|name| scenes.queries.find(name))
             .collect::<Result<_, SceneError>>()?,
     };
-    Ok(OpenedTask { task, scenes, queries })
+    Ok(OpenedTask { task, scenes, queries, size })
 }

@@ -36,7 +36,7 @@ struct Plan<'a> {
 type PlannedQuery = (usize, References);
 
 pub fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), CliError> {
-    let OpenedTask { task, scenes, queries: wanted } =
+    let OpenedTask { task, scenes, queries: wanted, size } =
         opened::open(&args.task, &args.scene, &args.query)?;
     let queries = scenes.queries.as_ref();
     if wanted.is_empty() && !args.all {
@@ -62,6 +62,14 @@ pub fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), CliError> {
         }
         tasks => tasks?,
     };
+    if let Some(line) = opened::size_line(&size, &task.protocol, &task.params) {
+        terminal.say(|| line);
+    }
+    let camera = tasks.first().map(|&(query, _)| queries.intrinsics(query));
+    let misfit = |camera| opened::misfit(&size, &task.protocol, &task.params, &camera);
+    if let Some(warning) = camera.and_then(misfit) {
+        log::warn!("{warning}");
+    }
     if !args.task.protocol.has("references")
         && matches!(task.protocol.selection(), Selection::Random(_))
     {

@@ -26,7 +26,8 @@ const CELL_PX: u32 = 3;
 
 pub fn surface(args: &RunArgs, out: &Path, terminal: &Terminal) -> Result<(), CliError> {
     let is_table = is_table(out)?;
-    let OpenedTask { task, scenes, queries } = opened::open(&args.task, &args.scene, &args.query)?;
+    let OpenedTask { task, scenes, queries, .. } =
+        opened::open(&args.task, &args.scene, &args.query)?;
     let method = method(args.task.protocol.has("methods"), &task.protocol.methods)?;
     let (references, queried) = (scenes.references.as_ref(), scenes.queries.as_ref());
     let named: Vec<&str> = task.protocol.named_references().collect();

@@ -72,7 +72,7 @@ fn results_of(folder: &Path, pair: &ScenePair, queries: &dyn Scene) -> Result<Re
 
 fn of_a_scene(args: &ViewArgs) -> Result<Setup, CliError> {
     let named: Vec<String> = args.query.iter().cloned().collect();
-    let OpenedTask { task, scenes, queries: named } =
+    let OpenedTask { task, scenes, queries: named, .. } =
         opened::open(&args.task, &args.scene, &named)?;
     let offered = (0..scenes.queries.frames().len()).collect();
     let references = task.protocol.named_references();

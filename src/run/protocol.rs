@@ -16,7 +16,7 @@ use crate::fusion::Fusion;
 use crate::image::Degradation;
 use crate::localize::{Chooser, Localizer, Ranking, Selection};
 use crate::method::Method;
-use crate::scene::{MatchFolder, Scene, SceneError, degraded, located, read_estimates};
+use crate::scene::{MatchFolder, Scene, SceneError, SceneSize, degraded, located, read_estimates};
 use crate::text::UnknownWord;
 
 /// How each query is localised. This one struct defines the options of the command line, the table
@@ -310,6 +310,24 @@ impl Protocol {
         let ours = estimator::methods().filter(|method| self.methods.contains(method));
         self.methods = ours.chain(others).collect();
         Ok(self)
+    }
+
+    /// These defaults for a scene of this size.
+    #[must_use]
+    pub fn at_size(self, size: &SceneSize) -> Self {
+        let length = |paper_m| size.scale.length(paper_m);
+        let radii_m = match self.preset {
+            Some(_) => self.radii_m.iter().copied().map(length).collect(),
+            None => vec![size.radius_m()],
+        };
+        let right = Tolerance { translation_m: length(self.right.translation_m), ..self.right };
+        Self {
+            radii_m,
+            prior_m: self.prior_m.map(length),
+            failure_radius_m: self.failure_radius_m.map(length),
+            right,
+            ..self
+        }
     }
 
     /// The first uncertainty radius \[m\].

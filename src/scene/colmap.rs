@@ -20,7 +20,7 @@ pub(super) use self::text::{camera as camera_of_line, image_lines};
 use super::file_scene::{Clouds, FileScene, Frame};
 use super::folder::{folder_name, within};
 use super::lens::developed_camera;
-use super::{Entry, Scene, SceneError};
+use super::{Entry, Lengths, Scene, SceneError};
 use crate::cloud::Cloud;
 
 pub(super) const ENTRY: Entry = Entry {
@@ -157,6 +157,10 @@ struct ObservedPoints {
 impl Clouds for ObservedPoints {
     fn has(&self, index: usize) -> bool {
         !self.observed[index].is_empty()
+    }
+
+    fn lengths(&self) -> Lengths {
+        Lengths::Model
     }
 
     fn place<'a>(&'a self, _index: usize, _frame: &'a Frame) -> &'a Path {

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::folder::stem;
-use super::{Scene, SceneError, photo_file};
+use super::{Lengths, Scene, SceneError, photo_file};
 use crate::camera::Intrinsics;
 use crate::cloud::Cloud;
 use crate::geometry::Pose;
@@ -61,6 +61,11 @@ pub(super) trait Clouds: Send + Sync {
     /// What a frame without a cloud lacks, if that is more than the file at its path.
     fn missing(&self) -> Option<&str> {
         None
+    }
+
+    /// What the lengths of the scene are.
+    fn lengths(&self) -> Lengths {
+        Lengths::Metres
     }
 
     /// Reads the cloud of a frame that has one, in the camera's frame \[m\].
@@ -146,6 +151,10 @@ impl<C: Clouds> Scene for FileScene<C> {
             });
         }
         self.clouds.read(frame, &self.frames[frame])
+    }
+
+    fn lengths(&self) -> Lengths {
+        self.clouds.lengths()
     }
 
     /// Includes the sizes of the photos' files: different photos rarely have the same size in bytes. Modification times

@@ -4,10 +4,10 @@ use std::path::{Path, PathBuf};
 
 use nalgebra::{Matrix3, Matrix3x4, Point3, Translation3, UnitQuaternion, Vector3};
 
-use super::SceneError;
 use super::file_scene::{Clouds, Frame};
 use super::lens::pinhole;
 use super::lines::TextFile;
+use super::{Lengths, SceneError};
 use crate::camera::Intrinsics;
 use crate::cloud::Cloud;
 use crate::geometry::Pose;
@@ -103,6 +103,10 @@ pub(super) struct Scans {
 impl Clouds for Scans {
     fn has(&self, index: usize) -> bool {
         self.missing.is_none() && self.paths[index].is_file()
+    }
+
+    fn lengths(&self) -> Lengths {
+        Lengths::Street
     }
 
     fn place<'a>(&'a self, index: usize, _frame: &'a Frame) -> &'a Path {

@@ -17,7 +17,7 @@ use self::exif::Exif;
 use super::file_scene::{Clouds, Develop, FileScene, Frame};
 use super::folder::stem;
 use super::lens::{developed_camera, pinhole};
-use super::{Scene, SceneError, photo_file};
+use super::{Lengths, Scene, SceneError, photo_file};
 use crate::cloud::Cloud;
 use crate::image::Photo;
 
@@ -133,6 +133,10 @@ struct NoClouds;
 impl Clouds for NoClouds {
     fn has(&self, _index: usize) -> bool {
         false
+    }
+
+    fn lengths(&self) -> Lengths {
+        Lengths::Street
     }
 
     fn missing(&self) -> Option<&str> {

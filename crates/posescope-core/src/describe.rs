@@ -7,6 +7,8 @@ use std::fmt;
 use std::ops::RangeInclusive;
 use std::str::FromStr;
 
+use crate::scale::Scale;
+
 /// What a parameter is called, measured in and good for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
@@ -92,6 +94,17 @@ impl<'a> Field<'a> {
             }
         };
         Described { key: self.about.name.to_owned(), about: self.about, value, domain }
+    }
+
+    /// Scales a length, or what is given per length.
+    pub(crate) fn scale(self, scale: Scale) {
+        if let Place::Number(value, _) = self.place {
+            *value = match self.about.unit {
+                "m" => scale.length(*value),
+                "°/m" => scale.per_length(*value),
+                _ => *value,
+            };
+        }
     }
 
     /// Sets the parameter; `None` where the text is no value of it.

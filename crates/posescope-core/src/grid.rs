@@ -33,11 +33,11 @@ parameters! {
     #[derive(Clone, Debug, PartialEq)]
     pub struct GridParams {
         /// Step of the coarse positions.
-        pub coarse_step_m: f64 = 1.0 => number("coarse_step", "m", 0.05..=10.0),
+        pub coarse_step_m: f64 = 1.0 => number("coarse_step", "m", 1e-6..=1e4),
         /// Half width of the square of fine positions.
-        pub fine_range_m: f64 = 1.0 => number("fine_range", "m", 0.0..=10.0),
+        pub fine_range_m: f64 = 1.0 => number("fine_range", "m", 0.0..=1e4),
         /// Step of the fine positions.
-        pub fine_step_m: f64 = 0.2 => number("fine_step", "m", 0.01..=5.0),
+        pub fine_step_m: f64 = 0.2 => number("fine_step", "m", 1e-6..=1e4),
         /// Half range of the coarse yaw angles.
         pub yaw_range_deg: f64 = 10.0 => number("yaw_range", "°", 0.0..=180.0),
         /// Step of the coarse yaw angles.
@@ -63,7 +63,7 @@ parameters! {
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct SurfaceParams {
         /// Step of the positions within the uncertainty radius.
-        pub step_m: f64 = 0.1 => number("step", "m", 0.001..=100.0),
+        pub step_m: f64 = 0.1 => number("step", "m", 1e-6..=1e4),
         /// Step of the headings within `grid.yaw_range`.
         pub yaw_step_deg: f64 = 0.5 => number("yaw_step", "°", 0.01..=90.0),
     }

@@ -209,6 +209,8 @@ pub mod recent;
 #[doc(hidden)]
 pub mod render;
 #[doc(hidden)]
+pub mod scale;
+#[doc(hidden)]
 pub mod scene;
 #[doc(hidden)]
 pub mod text;

@@ -10,6 +10,7 @@ use crate::describe::{Describe, list, set};
 use crate::features::SurfParams;
 use crate::grid::{GridParams, SurfaceParams};
 use crate::retrieval::{IndexParams, RetrievalParams};
+use crate::scale::Scale;
 
 pub use crate::descent::DescentParams;
 pub use crate::describe::{About, Described, Domain, ParamError, Value};
@@ -21,6 +22,8 @@ pub use crate::render::RenderParams;
 #[derive(Clone, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct Params {
+    /// How large the scene is.
+    pub scale: Scale,
     /// `surf`: detector and descriptor.
     pub surf: SurfParams,
     /// `fb`: matching, depth lift, consensus, acceptance.
@@ -50,6 +53,9 @@ pub struct Params {
     pub surface: SurfaceParams,
 }
 
+/// The table of the scale in a configuration.
+const SCALE: &str = "scale";
+
 /// Reads a configuration over the defaults, as [`Params::merge_toml`] does.
 impl FromStr for Params {
     type Err = ParamError;
@@ -62,6 +68,24 @@ impl FromStr for Params {
 }
 
 impl Params {
+    /// The defaults for a scene of this scale: lengths follow it.
+    pub fn at_scale(scale: Scale) -> Self {
+        let mut params = Self { scale, ..Self::default() };
+        if !scale.is_paper() {
+            params.visit_groups(|_, group| {
+                for field in group.fields() {
+                    field.scale(scale);
+                }
+            });
+        }
+        params
+    }
+
+    /// The defaults at the scale of these parameters.
+    pub fn defaults(&self) -> Self {
+        Self::at_scale(self.scale)
+    }
+
     /// Calls `visit` with each group and its parameters.
     #[doc(hidden)]
     pub fn visit_groups(&mut self, mut visit: impl FnMut(&'static str, &mut dyn Describe)) {
@@ -139,6 +163,16 @@ impl Params {
         let table: toml::Table =
             text.parse().map_err(|error: toml::de::Error| ParamError::Syntax(error.to_string()))?;
         for (group, entries) in &table {
+            if group == SCALE {
+                let scale =
+                    entries.clone().try_into().ok().filter(|scale: &Scale| scale.is_sound());
+                self.scale = scale.ok_or_else(|| ParamError::BadValue {
+                    key: group.clone(),
+                    expected: "metre = LENGTH and is_metric = true | false".to_owned(),
+                    given: entries.to_string(),
+                })?;
+                continue;
+            }
             let Some(entries) = entries.as_table() else {
                 return Err(ParamError::Syntax(format!(
                     "`{group}` is outside a group; parameters belong to tables such as [fb]"
@@ -158,6 +192,10 @@ impl Params {
     /// The configuration that [`Self::merge_toml`] reads back to these parameters.
     pub fn to_toml(&self) -> String {
         let mut text = String::new();
+        if !self.scale.is_paper() {
+            let (metre, is_metric) = (self.scale.metre(), self.scale.is_metric());
+            text += &format!("[{SCALE}]\nmetre = {metre:?}\nis_metric = {is_metric}\n\n");
+        }
         let mut group = String::new();
         for row in self.list() {
             let (row_group, name) = row.key.split_once('.').unwrap_or(("", &row.key));
@@ -178,9 +216,9 @@ impl Params {
         text
     }
 
-    /// The assignments that turn the defaults into these parameters.
+    /// The assignments that turn the defaults at this scale into these parameters.
     pub fn changes(&self) -> Vec<String> {
-        let defaults = Self::default().list();
+        let defaults = self.defaults().list();
         self.list()
             .into_iter()
             .zip(defaults)
@@ -238,6 +276,25 @@ mod tests {
             params.changes(),
             ["surf.upright=false", "fb.ratio=0.7", "fb.accept=paper", "mi.bins=32"]
         );
+    }
+
+    #[test]
+    fn lengths_follow_the_scale_and_are_no_change() {
+        let room = Params::at_scale(Scale::of_depth(1.8, true));
+        assert_eq!((room.grid.coarse_step_m, room.grid.fine_step_m), (0.1, 0.02));
+        assert_eq!((room.mi6.deg_per_m, room.grid.yaw_step_deg), (30.0, 1.0));
+        assert_eq!(room.changes(), [""; 0]);
+        let mut changed = room.clone();
+        changed.assign("grid.coarse_step=1").expect("a good value");
+        assert_eq!(changed.changes(), ["grid.coarse_step=1"]);
+        assert_eq!(changed.to_toml().parse(), Ok(changed));
+        for depth in [0.0, 1e9] {
+            let extreme = Params::at_scale(Scale::of_depth(depth, false));
+            assert_eq!(extreme.to_toml().parse(), Ok(extreme), "{depth}");
+        }
+        for wrong in ["scale = 1.0", "[scale]\nmetre = -1.0\nis_metric = true"] {
+            assert!(wrong.parse::<Params>().is_err(), "{wrong}");
+        }
     }
 
     #[test]

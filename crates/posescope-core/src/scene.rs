@@ -4,6 +4,7 @@ mod degraded;
 mod error;
 mod frames;
 mod inner;
+mod measured;
 
 use std::sync::Arc;
 
@@ -13,6 +14,7 @@ use xxhash_rust::xxh3::Xxh3;
 pub use degraded::{DegradedScene, degraded};
 pub use error::SceneError;
 pub use frames::{CachedScene, FrameStore};
+pub use measured::SceneSize;
 
 use crate::camera::Intrinsics;
 use crate::cloud::Cloud;
@@ -81,6 +83,11 @@ pub trait Scene: Send + Sync {
         reference_of(self, frame, world_from_camera, &query)
     }
 
+    /// What its lengths are.
+    fn lengths(&self) -> Lengths {
+        Lengths::Street
+    }
+
     /// The scene as one whose photos are degraded, if they are.
     fn as_degraded(&self) -> Option<&DegradedScene> {
         None
@@ -91,6 +98,17 @@ pub trait Scene: Send + Sync {
     fn fingerprint(&self) -> u64 {
         fingerprint(self, &[])
     }
+}
+
+/// What the lengths of a scene are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Lengths {
+    /// Metres on a street, as in the paper.
+    Street,
+    /// Metres.
+    Metres,
+    /// The unit of a model that was made from photos alone.
+    Model,
 }
 
 fn pose_of(scene: &(impl Scene + ?Sized), frame: usize) -> Result<Pose, SceneError> {

@@ -49,7 +49,7 @@ impl ParametersView {
             if context.is_present() { &context.setup.task.params } else { &context.run.params };
         let degradation = context.setup.task.protocol.degrade;
         let rows = all(&degradation, params);
-        let default = Params::default();
+        let default = params.defaults();
         let defaults = all(&Degradation::default(), &default);
         // A beside the present run, and the other way round.
         let kept = context.state.kept.as_ref().map(|kept| &kept.run.params);

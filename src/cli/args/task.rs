@@ -3,8 +3,9 @@
 use std::path::PathBuf;
 
 use clap::{Args, Parser as _};
+use posescope::params::Params;
 use posescope::run::Protocol;
-use posescope::scene::CameraArgument;
+use posescope::scene::{CameraArgument, SceneSize};
 use posescope::session::{Breakpoint, Task};
 
 use super::{Arguments, Command, ConfigArgs, Given};
@@ -104,10 +105,10 @@ const ONLY_EVAL: [(&str, &str); 3] =
     [("limit", "--limit"), ("preset", "--preset"), ("failure_radius_m", "--failure-radius")];
 
 impl TaskArgs {
-    /// The task that these arguments describe for a scene.
-    pub fn task(&self, scene: &str) -> Result<Task, CliError> {
+    /// The task that these arguments describe for a scene of this size.
+    pub fn task(&self, scene: &str, size: &SceneSize) -> Result<Task, CliError> {
         self.refuse_many_queries()?;
-        let protocol = self.protocol.over(Protocol::default())?;
+        let protocol = self.protocol.over(Protocol::default().at_size(size))?;
         let several = [
             ("--radius", protocol.radii_m.len()),
             ("--query-scene", protocol.query_scene.len()),
@@ -120,7 +121,7 @@ impl TaskArgs {
         }
         Ok(Task {
             protocol,
-            params: self.config.resolve()?,
+            params: self.config.over(Params::at_scale(size.scale))?,
             breakpoints: self.breakpoints.clone(),
             ..Task::of(scene)
         })

@@ -4,11 +4,11 @@ use std::path::{Path, PathBuf};
 
 use nalgebra::Point3;
 
-use super::super::SceneError;
 use super::super::file_scene::{Clouds, Frame};
 use super::super::folder::numbered;
 use super::super::trajectory::Trajectory;
 use super::super::view_crop::in_view;
+use super::super::{Lengths, SceneError};
 use super::sdk::Sdk;
 use crate::cloud::Cloud;
 use crate::geometry::Pose;
@@ -75,6 +75,10 @@ impl Clouds for Scans {
     fn has(&self, index: usize) -> bool {
         let time = self.times[index];
         self.motion.at(time as f64).is_some() && !self.around(time).is_empty()
+    }
+
+    fn lengths(&self) -> Lengths {
+        Lengths::Street
     }
 
     fn missing(&self) -> Option<&str> {

@@ -117,7 +117,10 @@ impl Ask<'_> {
     }
 }
 
-/// Rounds to three decimals, as shown on the command line.
+/// Rounds to three decimals, and small numbers to three digits, as shown on the command line.
 fn rounded(value: f64) -> f64 {
+    if value.abs() < 0.1 {
+        return format!("{value:.2e}").parse().unwrap_or(value);
+    }
     (value * 1000.0).round() / 1000.0
 }

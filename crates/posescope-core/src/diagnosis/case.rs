@@ -49,6 +49,11 @@ impl<'a> Case<'a> {
         }
     }
 
+    /// A length of a rule, at the scale of the scene.
+    pub(super) fn length(&self, paper_m: f64) -> f64 {
+        self.subject.params.scale.length(paper_m)
+    }
+
     /// The parts of the hybrid that the method is, if it is one.
     pub(super) fn hybrid(&self) -> Option<HybridParts> {
         estimator::find(self.subject.method)?.hybrid()

@@ -137,8 +137,12 @@ impl PoseConfidence {
         }
     }
 
-    /// That of a subject's pose; `None` without a pose, and for a method that was not calibrated.
+    /// That of a subject's pose; `None` without a pose, for a method that was not calibrated, and for a scene of
+    /// another scale than those of the calibration.
     pub(super) fn of(subject: &Subject<'_>) -> Option<Self> {
+        if !subject.params.scale.is_paper() {
+            return None;
+        }
         let (signals, rest) = left_behind(subject)?;
         let values: Vec<f64> = signals.iter().map(|(_, value)| *value).collect();
         let probability = probability(responsible(subject.method, subject.outcome), &values)?;

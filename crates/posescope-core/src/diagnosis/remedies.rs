@@ -57,7 +57,7 @@ pub fn remedies(
 
 /// The parameters of these groups that differ from their defaults, back at them.
 fn reset(groups: &[&str], params: &Params) -> Option<Remedy> {
-    let changed = params.list().into_iter().zip(Params::default().list());
+    let changed = params.list().into_iter().zip(params.defaults().list());
     let changed = changed.filter(|(now, default)| {
         let group = now.key.split('.').next().unwrap_or_default();
         groups.contains(&group) && now.value != default.value

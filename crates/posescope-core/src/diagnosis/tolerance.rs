@@ -41,15 +41,17 @@ impl FromStr for Tolerance {
     type Err = UnknownWord;
 
     fn from_str(text: &str) -> Result<Self, UnknownWord> {
-        let number = |text: &str, unit: &str| -> Option<f64> {
-            let number: f64 = text.trim().strip_suffix(unit)?.trim().parse().ok()?;
+        let number = |text: &str| -> Option<f64> {
+            let number: f64 = text.trim().parse().ok()?;
             (number.is_finite() && number > 0.0).then_some(number)
         };
         text.split_once(',')
             .and_then(|(metres, degrees)| {
+                // A scene without metric scale has lengths without a unit.
+                let metres = metres.trim();
                 Some(Self {
-                    translation_m: number(metres, "m")?,
-                    rotation_deg: number(degrees, "deg")?,
+                    translation_m: number(metres.strip_suffix('m').unwrap_or(metres))?,
+                    rotation_deg: number(degrees.trim().strip_suffix("deg")?)?,
                 })
             })
             .ok_or_else(|| UnknownWord {
@@ -70,7 +72,9 @@ mod tests {
     fn a_tolerance_is_read_back_and_what_is_none_is_refused() {
         let tolerance = Tolerance { translation_m: 0.25, rotation_deg: 2.0 };
         assert_eq!(tolerance.to_string(), "0.25m,2deg");
-        assert_eq!("0.25m, 2deg".parse(), Ok(tolerance));
+        for same in ["0.25m, 2deg", "0.25,2deg"] {
+            assert_eq!(same.parse(), Ok(tolerance));
+        }
         for text in ["1m", "1,5", "0m,5deg", "1m,-5deg", "nanm,5deg", ""] {
             assert!(text.parse::<Tolerance>().is_err(), "{text}");
         }

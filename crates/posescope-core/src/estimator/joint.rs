@@ -26,7 +26,7 @@ use crate::problem::Problem;
 use crate::trace::{Cancelled, Trace};
 
 /// A reference whose own pose is farther from the joint one than this was outvoted \[m\]: as far off as a
-/// pose may be that the probability of being right is about.
+/// pose may be that the probability of being right is about, at the paper's scale.
 const ELSEWHERE_M: f64 = 1.0;
 
 /// One of the references of a joint estimate.
@@ -76,7 +76,8 @@ pub(crate) fn estimate_jointly(
             Err(failure) => (Err(failure), vec![None; references.len()]),
         };
         let found = pose.as_ref().ok().copied();
-        let shares = shares(found.as_ref(), &supports, references);
+        let elsewhere_m = params.scale.length(ELSEWHERE_M);
+        let shares = shares(found.as_ref(), &supports, references, elsewhere_m);
         trace.emit(|| ReferencesFused {
             fusion: JOINT,
             shares: Arc::from(shares.as_slice()),
@@ -94,6 +95,7 @@ fn shares(
     pose: Option<&Pose>,
     supports: &[Option<Support>],
     references: &[JointReference<'_>],
+    elsewhere_m: f64,
 ) -> Vec<Share> {
     let amount = |support: &Option<Support>| support.map_or(0.0, |support| support.amount());
     let total: f64 = supports.iter().map(amount).sum();
@@ -105,7 +107,11 @@ fn shares(
             let outcome = match (pose, reference.alone) {
                 (None, _) => ShareOutcome::Failed,
                 (Some(_), _) if weight <= 0.0 => ShareOutcome::Unsupportive,
-                (Some(pose), Some(alone)) if is_elsewhere(pose, alone) => ShareOutcome::Outvoted,
+                (Some(pose), Some(alone))
+                    if PoseError::between(pose, alone).translation_m > elsewhere_m =>
+                {
+                    ShareOutcome::Outvoted
+                }
                 (Some(_), _) => ShareOutcome::Kept,
             };
             Share {
@@ -118,10 +124,6 @@ fn shares(
             }
         })
         .collect()
-}
-
-fn is_elsewhere(pose: &Pose, alone: &Pose) -> bool {
-    PoseError::between(pose, alone).translation_m > ELSEWHERE_M
 }
 
 /// The reference with the most matches, of equals the first: where one would start from with one alone.

@@ -22,12 +22,14 @@ use crate::judge::{Freedoms, Refined, Shrinking, Start};
 use crate::params::Params;
 use crate::problem::Problem;
 use crate::render::{Comparison, Score};
+use crate::scale::Scale;
 use crate::trace::{Cancelled, Trace};
 
-/// The step below which the refinement of all starts ends, before the best go on in six freedoms \[m\].
+/// The step below which the refinement of all starts ends, before the best go on in six freedoms \[m\], at the
+/// paper's scale.
 const PLANE_LAST_M: f64 = 0.05;
 
-/// Starts nearer to each other than this are one, unless their headings differ.
+/// Starts nearer to each other than this are one, unless their headings differ \[m\], at the paper's scale.
 const SAME_M: f64 = 0.3;
 /// Starts whose headings differ by less are one where they are at one place.
 const SAME_DEG: f64 = 1.0;
@@ -38,6 +40,7 @@ pub(super) struct ManyStarts {
     grid: GridParams,
     /// How far outside the disc a pose may be, as a share of its radius.
     radius_slack: f64,
+    scale: Scale,
 }
 
 /// What the search found, in the frame of the reference camera.
@@ -93,6 +96,7 @@ impl ManyStarts {
             params: params.mi6.clone(),
             grid: params.grid.clone(),
             radius_slack: params.fb.radius_slack,
+            scale: params.scale,
         }
     }
 
@@ -110,7 +114,7 @@ impl ManyStarts {
         Shrinking {
             freedoms: Freedoms::Plane,
             first_m: self.params.first_step_m.min(self.most_m()),
-            last_m: PLANE_LAST_M.min(self.most_m()),
+            last_m: self.scale.length(PLANE_LAST_M).min(self.most_m()),
             rad_per_m: self.params.deg_per_m.to_radians(),
         }
     }
@@ -175,7 +179,7 @@ impl ManyStarts {
         let refined = trace.stage(Stage::RefinePlane, |trace| {
             search.refine(&starts, &self.in_the_plane(), price, trace)
         })?;
-        let mut finalists = apart(refined, self.params.finalists, price);
+        let mut finalists = self.apart(refined, self.params.finalists, price);
         if let Some(smaller) = smaller.filter(|_| self.params.coarse_shrink > 1) {
             let more = trace
                 .stage(Stage::SearchCoarse, |trace| self.coarse_poses(problem, smaller, trace))?;
@@ -204,7 +208,7 @@ impl ManyStarts {
                 runner_up: refined
                     .iter()
                     .skip(1)
-                    .find(|other| is_apart(&best.pose, &other.pose))
+                    .find(|other| self.is_apart(&best.pose, &other.pose))
                     .map(|other| other.cost),
                 coverage_best: f64::from(score.covered) / area,
                 coverage_reference: f64::from(initial.covered) / area,
@@ -263,7 +267,7 @@ impl ManyStarts {
             last_m: most_m.min(0.05),
             ..plan
         };
-        let best = apart(plane, self.params.starts, price);
+        let best = self.apart(plane, self.params.starts, price);
         let six = level.refined(&best, &plan, || trace.checkpoint())?;
 
         let level = smaller(shrink_by.div_ceil(2));
@@ -271,7 +275,7 @@ impl ManyStarts {
         let poses: Vec<Pose> = six.iter().map(|refined| refined.pose).collect();
         let plan = Shrinking { last_m: most_m.min(0.025), ..plan };
         let refined = level.refined(&level.starts(&poses), &plan, || trace.checkpoint())?;
-        let best = apart(refined, self.params.finalists, price);
+        let best = self.apart(refined, self.params.finalists, price);
         Ok(best.into_iter().map(|start| start.pose).collect())
     }
 }
@@ -348,19 +352,26 @@ fn starts(
     minima
 }
 
-/// The best of those that are refined, each at a place of its own.
-fn apart(mut refined: Vec<Refined>, most: usize, price: impl Fn(&Pose, f64) -> f64) -> Vec<Start> {
-    refined.sort_by(|a, b| price(&a.pose, a.cost).total_cmp(&price(&b.pose, b.cost)));
-    let mut kept: Vec<Start> = Vec::new();
-    for one in refined {
-        if kept.len() < most && kept.iter().all(|known| is_apart(&known.pose, &one.pose)) {
-            kept.push(Start { pose: one.pose, cost: one.cost });
+impl ManyStarts {
+    /// The best of those that are refined, each at a place of its own.
+    fn apart(
+        &self,
+        mut refined: Vec<Refined>,
+        most: usize,
+        price: impl Fn(&Pose, f64) -> f64,
+    ) -> Vec<Start> {
+        refined.sort_by(|a, b| price(&a.pose, a.cost).total_cmp(&price(&b.pose, b.cost)));
+        let mut kept: Vec<Start> = Vec::new();
+        for one in refined {
+            if kept.len() < most && kept.iter().all(|known| self.is_apart(&known.pose, &one.pose)) {
+                kept.push(Start { pose: one.pose, cost: one.cost });
+            }
         }
+        kept
     }
-    kept
-}
 
-fn is_apart(a: &Pose, b: &Pose) -> bool {
-    let between = PoseError::between(a, b);
-    between.translation_m > SAME_M || between.rotation_deg > SAME_DEG
+    fn is_apart(&self, a: &Pose, b: &Pose) -> bool {
+        let between = PoseError::between(a, b);
+        between.translation_m > self.scale.length(SAME_M) || between.rotation_deg > SAME_DEG
+    }
 }

@@ -13,8 +13,8 @@ use self::work::{Answer, Estimated, MethodOutcome, Place, QueryWork};
 use super::observer::checkpoint;
 use super::single::estimate_traced;
 use super::{
-    LocalizeObserver, QueryResult, References, Setting, StageTimes, StageTimings, localize_by,
-    report_ranking,
+    LengthUnit, LocalizeObserver, QueryResult, References, Setting, StageTimes, StageTimings,
+    localize_by, report_ranking,
 };
 use crate::diagnosis::{Evidence, Subject, Tolerance, confidence};
 use crate::estimator::{self, Estimator, Failure, Given, Hybrid, Outcome, hybrid_outcome};
@@ -314,6 +314,8 @@ impl<'a> Localizer<'a> {
     fn marked(&self, result: QueryResult, setting: Option<Setting>) -> QueryResult {
         QueryResult {
             query_scene: (!self.is_one_drive).then(|| self.queries.name().to_owned()),
+            unit: if self.params.scale.is_metric() { LengthUnit::Metre } else { LengthUnit::Model },
+            scale: self.params.scale.metre(),
             degraded: self.queries.as_degraded().map(DegradedScene::degradation),
             setting,
             ..result

@@ -39,6 +39,12 @@ pub struct QueryResult {
     pub fusion: Option<Fusion>,
     /// The seed of every random choice.
     pub seed: u64,
+    /// The unit of all lengths, if it is not the metre.
+    #[serde(default, skip_serializing_if = "LengthUnit::is_metre")]
+    pub unit: LengthUnit,
+    /// The length that stands for one metre of the paper's streets, if it is another.
+    #[serde(default = "one", skip_serializing_if = "is_one")]
+    pub scale: f64,
     /// What was done to the query's photo before, if anything.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub degraded: Option<Degradation>,
@@ -78,6 +84,43 @@ pub struct QueryResult {
     /// What each reference alone gave, where several were fused; they have no such list.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub per_reference: Option<Vec<QueryResult>>,
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+fn is_one(scale: &f64) -> bool {
+    *scale == 1.0
+}
+
+/// The unit of the lengths of a result.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(from = "Option<String>", into = "Option<String>")]
+pub enum LengthUnit {
+    /// The metre.
+    #[default]
+    Metre,
+    /// That of a model which has no metric scale; written as null.
+    Model,
+}
+
+impl LengthUnit {
+    fn is_metre(&self) -> bool {
+        *self == Self::Metre
+    }
+}
+
+impl From<LengthUnit> for Option<String> {
+    fn from(unit: LengthUnit) -> Self {
+        unit.is_metre().then(|| "m".to_owned())
+    }
+}
+
+impl From<Option<String>> for LengthUnit {
+    fn from(unit: Option<String>) -> Self {
+        if unit.is_some() { Self::Metre } else { Self::Model }
+    }
 }
 
 /// What was tried to make a wrong result right.
@@ -340,6 +383,8 @@ impl QueryResult {
             method,
             fusion: None,
             seed,
+            unit: LengthUnit::Metre,
+            scale: 1.0,
             degraded: None,
             setting: None,
             status: if pose.is_ok() { Status::Ok } else { Status::Failed },

@@ -60,6 +60,9 @@ macro_rules! inner_scene {
     (@ $scene:tt reference) => {
         $crate::inner_scene!(@ $scene reference(frame: usize) -> Result<std::sync::Arc<$crate::problem::ReferenceTuple>, $crate::scene::SceneError>);
     };
+    (@ $scene:tt lengths) => {
+        $crate::inner_scene!(@ $scene lengths() -> $crate::scene::Lengths);
+    };
     (@ $scene:tt as_degraded) => {
         $crate::inner_scene!(@ $scene as_degraded() -> Option<&$crate::scene::DegradedScene>);
     };

@@ -3,7 +3,7 @@
 use super::*;
 use crate::diagnosis::search::Place;
 
-/// How far the truth must be off the plane of the search for that to be a cause.
+/// How far the truth must be off the plane of the search for that to be a cause, at the paper's scale.
 const OFF_PLANE_M: f64 = 0.1;
 const OFF_PLANE_DEG: f64 = 0.5;
 
@@ -26,7 +26,8 @@ fn test(case: &Case<'_>) -> Option<Diagnosis> {
     }
     // Where photos share nothing, a pose off the plane could win by chance alone. What is on the plane has
     // nothing to win by leaving it.
-    let is_on_plane = frozen.translation_m < OFF_PLANE_M && frozen.rotation_deg < OFF_PLANE_DEG;
+    let is_on_plane =
+        frozen.translation_m < case.length(OFF_PLANE_M) && frozen.rotation_deg < OFF_PLANE_DEG;
     if rivals.is_changed || is_on_plane {
         return None;
     }

@@ -2,7 +2,7 @@
 
 use super::*;
 
-/// A pose is fixed if it is off by less than this, by the covariance of its inliers \[m\].
+/// A pose is fixed if it is off by less than this, by the covariance of its inliers \[m\], at the paper's scale.
 pub(super) const FIXED_M: f64 = 0.3;
 
 pub(super) const RULE: Rule = Rule {
@@ -24,17 +24,18 @@ fn test(case: &Case<'_>) -> Option<Diagnosis> {
         return None;
     }
     let deviation_m = case.deviation_m(matches);
-    if deviation_m.is_some_and(|deviation| deviation < FIXED_M) {
+    let limit_m = case.length(FIXED_M);
+    if deviation_m.is_some_and(|deviation| deviation < limit_m) {
         return None;
     }
-    Some(RULE.found(&Loose { deviation_m, inliers, true_matches: matches.funnel }))
+    Some(RULE.found(&Loose { deviation_m, limit_m, inliers, true_matches: matches.funnel }))
 }
 
-evidence!(Loose { deviation_m: Option<f64>, inliers: usize, true_matches: Funnel } => {
+evidence!(Loose { deviation_m: Option<f64>, limit_m: f64, inliers: usize, true_matches: Funnel } => {
     match deviation_m {
         Some(deviation) => format!(
             "The {inliers} inliers leave the pose loose: its standard deviation is {deviation:.2} m, \
-             {FIXED_M} m is the limit. They are too few or too close together."
+             {limit_m} m is the limit. They are too few or too close together."
         ),
         None => format!("The {inliers} inliers leave the pose undetermined."),
     }

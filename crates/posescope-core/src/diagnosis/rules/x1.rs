@@ -62,6 +62,9 @@ fn units(case: &Case<'_>) -> Option<Diagnosis> {
     const MIN_DEPTH_M: f64 = 0.1;
     const MAX_DEPTH_M: f64 = 400.0;
     const STRIDE: usize = 16;
+    if !case.subject.params.scale.is_metric() {
+        return None;
+    }
     let points = case.subject.problem.reference.cloud.points.iter();
     let depths = points.step_by(STRIDE).map(|point| f64::from(point.z));
     let median_depth_m = median(&mut depths.filter(|&depth| depth > 0.0).collect::<Vec<_>>())?;
@@ -85,7 +88,7 @@ evidence!(Units { median_depth_m: f64, unit: &'static str, depth_in_unit_m: f64 
 /// Only for a pose that is more likely right than wrong: one of many poses agrees with something by chance.
 fn poses(case: &Case<'_>) -> Option<Diagnosis> {
     const LIKELY: f64 = 0.5;
-    /// How well another reading must agree with the estimate.
+    /// How well another reading must agree with the estimate, at the paper's scale.
     const AGREEING_M: f64 = 0.5;
     const AGREEING_DEG: f64 = 2.0;
     let subject = case.subject;
@@ -107,7 +110,9 @@ fn poses(case: &Case<'_>) -> Option<Diagnosis> {
         [("camera_from_world (inverted)", inverted, true), ("millimetres", in_metres, is_far)];
     let agreeing = readings.into_iter().find(|(_, reading, is_possible)| {
         let error = PoseError::between(reading, &found);
-        *is_possible && error.translation_m < AGREEING_M && error.rotation_deg < AGREEING_DEG
+        *is_possible
+            && error.translation_m < case.length(AGREEING_M)
+            && error.rotation_deg < AGREEING_DEG
     });
     let (reading, pose, _) = agreeing?;
     Some(RULE.found(&Poses {
@@ -434,7 +439,8 @@ fn truth_by_matches(case: &Case<'_>, matches: &TrueMatches) -> Option<Diagnosis>
     let error = case.subject.error().or_else(|| case.consensus_error())?;
     let judged = case.subject.evidence.judged.as_ref()?;
     let (inliers, total) = (matches.inliers(), matches.correspondences.len());
-    let is_fixed = || case.deviation_m(matches).is_some_and(|m| m < super::r5::FIXED_M);
+    let is_fixed =
+        || case.deviation_m(matches).is_some_and(|m| m < case.length(super::r5::FIXED_M));
     let is_certain =
         judged.acceptance.log10_nfa <= NEARLY_CERTAIN && 3 * inliers >= total && is_fixed();
     let supports_truth = matches.funnel.lifted;

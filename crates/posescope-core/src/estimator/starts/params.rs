@@ -16,14 +16,13 @@ parameters! {
         /// The best of those, which are refined in all six freedoms.
         pub finalists: usize = 8 => count("finalists", "", 1..=100),
         /// First step of the refinement in right, forward and yaw; at most half a step between coarse positions.
-        pub first_step_m: f64 = 0.5 => number("first_step", "m", 0.01..=5.0),
+        pub first_step_m: f64 = 0.5 => number("first_step", "m", 1e-6..=1e4),
         /// First step of the refinement in six freedoms; at most half a step between coarse positions.
-        pub six_step_m: f64 = 0.1 => number("six_step", "m", 0.001..=2.0),
+        pub six_step_m: f64 = 0.1 => number("six_step", "m", 1e-6..=1e4),
         /// Steps below this are the last.
-        pub last_step_m: f64 = 0.004 => number("last_step", "m", 0.0005..=0.5),
-        /// Turn that goes with a step of one metre: what moves a view by as much. A room, where things are ten
-        /// times nearer than on a street, needs ten times as much.
-        pub deg_per_m: f64 = 3.0 => number("deg_per_m", "°", 0.1..=90.0),
+        pub last_step_m: f64 = 0.004 => number("last_step", "m", 1e-6..=1e4),
+        /// Turn that goes with a step of one metre: what moves a view by as much.
+        pub deg_per_m: f64 = 3.0 => number("deg_per_m", "°/m", 1e-4..=1e5),
         /// How many times smaller photos are for the coarse level, whose minima are finalists beside those
         /// of the fine one; 1 leaves it out.
         pub coarse_shrink: usize = 3 => count("coarse_shrink", "", 1..=16),
@@ -33,7 +32,7 @@ parameters! {
         /// costs; twice the turn has four times the penalty.
         pub usual_yaw_deg: f64 = 8.0 => number("usual_yaw", "°", 0.1..=1000.0),
         /// Height above or below the reference with the same penalty.
-        pub usual_height_m: f64 = 0.5 => number("usual_height", "m", 0.01..=1000.0),
+        pub usual_height_m: f64 = 0.5 => number("usual_height", "m", 1e-6..=1e6),
         /// Tilt against the reference, of pitch and roll together, with the same penalty.
         pub usual_tilt_deg: f64 = 1.5 => number("usual_tilt", "°", 0.1..=1000.0),
         /// The greatest penalty of an unlikely pose, in standard deviations; at 0 all poses are equally likely.

@@ -37,7 +37,6 @@ fn unlikeliness(params: &SixParams, pose: &Pose) -> f64 {
 mod tests {
     use nalgebra::UnitQuaternion;
 
-    use super::super::apart;
     use super::*;
     use crate::judge::{Refined, Start};
     use crate::params::Params;
@@ -78,7 +77,7 @@ mod tests {
         };
         let first = |cost_of_lifted: f64| {
             let both = vec![refined(lifted, cost_of_lifted), refined(Pose::identity(), 0.9)];
-            apart(both, 2, |pose, cost| six.price(&spread, pose, cost))[0].pose
+            six.apart(both, 2, |pose, cost| six.price(&spread, pose, cost))[0].pose
         };
         assert_eq!(first(0.895), Pose::identity());
         assert_eq!(first(0.885), lifted);
