@@ -53,6 +53,16 @@ impl Scale {
         if self.metre == 1.0 { paper_m } else { short(self.metre * paper_m) }
     }
 
+    /// How far from a reference to search by default.
+    ///
+    /// The radii of the paper are 10 to 25 m. Streets have 15 m. Elsewhere cameras turn more from place to place, and
+    /// the nearest radius finds most.
+    pub fn radius(self) -> f64 {
+        const STREET_M: f64 = 15.0;
+        const ELSEWHERE_M: f64 = 10.0;
+        if self.metre == 1.0 { STREET_M } else { self.length(ELSEWHERE_M) }
+    }
+
     /// What is given per metre in the paper, per unit of length at this scale.
     pub fn per_length(self, paper_per_m: f64) -> f64 {
         if self.metre == 1.0 { paper_per_m } else { short(paper_per_m / self.metre) }
@@ -94,7 +104,7 @@ mod tests {
     fn lengths_follow_the_scale_and_have_few_digits() {
         let room = Scale::of_depth(1.8, true);
         assert_eq!(room.length(0.2), 0.02);
-        assert_eq!(room.length(15.0), 1.5);
+        assert_eq!((room.radius(), Scale::PAPER.radius()), (1.0, 15.0));
         assert_eq!(room.per_length(3.0), 30.0);
         assert_eq!(Scale::PAPER.length(0.004), 0.004);
     }

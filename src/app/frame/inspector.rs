@@ -16,7 +16,6 @@ use crate::app::theme;
 use crate::app::view_options::Tab;
 use crate::diagnosis::{Code, Confidence, Diagnosis, Grade, confidence};
 use crate::localize::{Explanation, Helped, QueryResult};
-use crate::run::Protocol;
 use crate::session::Run;
 
 pub(crate) fn ui(ui: &mut Ui, state: &AppState, commands: &Queue, panes: &mut Panes) {
@@ -116,7 +115,7 @@ fn why(ui: &mut Ui, state: &AppState, commands: &Queue) {
 /// The settings that are not at their defaults: they may be the cause.
 fn changed(ui: &mut Ui, run: &Run) {
     const MAX: usize = 5;
-    let default_m = run.params.scale.length(Protocol::RADIUS_M);
+    let default_m = run.params.scale.radius();
     let radius = (run.radius_m != default_m)
         .then(|| format!("--radius {} (default {default_m})", run.radius_m));
     let rows = run.params.list().into_iter().zip(run.params.defaults().list());

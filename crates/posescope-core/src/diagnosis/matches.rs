@@ -306,6 +306,11 @@ impl Pairs {
         })
     }
 
+    /// How many there are.
+    pub(super) fn count(&self) -> usize {
+        self.pixels.len()
+    }
+
     /// How many matches the truth explains with the depths of the cloud, if both photos are of this camera.
     pub(super) fn explained_by(&self, camera: &Intrinsics) -> usize {
         let radius_px = self.radius_px * self.wide.fx / camera.fx;

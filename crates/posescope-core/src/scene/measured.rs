@@ -8,8 +8,6 @@ use crate::stats::median;
 
 /// Clouds that are read to learn a scene's depth, evenly spaced.
 const MAX_CLOUDS: usize = 20;
-/// The radius of the search, at the paper's scale \[m\].
-const RADIUS_M: f64 = 15.0;
 
 /// The size of a scene, as far as it decides how to search it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -74,9 +72,9 @@ impl SceneSize {
     /// How far from a reference to search \[m\]: as far as in the paper's scenes, and where frames are far apart
     /// as far as the next but one, up to twice as far.
     pub fn radius_m(&self) -> f64 {
-        let usual = self.scale.length(RADIUS_M);
+        let usual = self.scale.radius();
         match self.spacing_m {
-            Some(spacing) if 2.0 * spacing > usual => self.scale.length(2.0 * RADIUS_M),
+            Some(spacing) if 2.0 * spacing > usual => 2.0 * usual,
             _ => usual,
         }
     }

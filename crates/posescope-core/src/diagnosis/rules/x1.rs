@@ -289,7 +289,9 @@ fn camera_of_both(case: &Case<'_>, matches: &TrueMatches) -> Option<Diagnosis> {
     let fine = &mut grid(exponent, FINE, FINE_STEPS).map(|at| (at, with_centre));
     let (after, exponent, _) = most(fine)?;
     let camera = scaled(exponent, with_centre);
-    let is_more = after >= before + 2 * FEW_MATCHES && 5 * after >= 8 * before && 2 * after >= lost;
+    // Things that look alike agree on some camera too; of a real one, most matches do.
+    let is_most = 2 * after >= pairs.count();
+    let is_more = after >= before + 2 * FEW_MATCHES && 5 * after >= 8 * before && is_most;
     let is_other = (camera.fx / reference.fx - 1.0).abs() > 2.0 * SAME_FOCAL_LENGTH;
     (is_more && is_other).then(|| {
         RULE.found(&CameraOfBoth {
@@ -442,7 +444,7 @@ fn truth_by_matches(case: &Case<'_>, matches: &TrueMatches) -> Option<Diagnosis>
     let is_fixed =
         || case.deviation_m(matches).is_some_and(|m| m < case.length(super::r5::FIXED_M));
     let is_certain =
-        judged.acceptance.log10_nfa <= NEARLY_CERTAIN && 3 * inliers >= total && is_fixed();
+        judged.acceptance.log10_nfa <= NEARLY_CERTAIN && 3 * inliers >= 2 * total && is_fixed();
     let supports_truth = matches.funnel.lifted;
     // What the truth explains beyond chance is there: then both are, and the truth is not suspect.
     let is_supported = || case.would_accept(matches, &matches.true_ones());
