@@ -41,36 +41,27 @@ impl ScoredLattice {
         }
         let elsewhere = minima.iter().find(|(cell, _)| *cell != target);
         Some(Basin {
-            radius_m: self.radius_around(&away, target),
+            radius_m: self.radius_around(place, target),
             margin: elsewhere.map(|(_, other)| other - cost),
         })
     }
 
     /// The outer radius of the last ring from which at least half of the cells lead to `target`, all
     /// rings within it included.
-    fn radius_around(&self, away: &dyn Fn(usize) -> Option<f64>, target: usize) -> f64 {
-        let step = self.lattice.step;
-        let mut rings: Vec<(usize, usize)> = Vec::new();
-        for cell in 0..self.scores.len() {
-            // A cell outside the disc was never scored, and is no part of the lattice.
-            let Some(distance) = away(cell).filter(|_| self.scores[cell].is_some()) else {
-                continue;
-            };
-            let ring = (distance / step) as usize;
-            if rings.len() <= ring {
-                rings.resize(ring + 1, (0, 0));
-            }
-            let (leading, all) = &mut rings[ring];
-            *leading += usize::from(self.foot(cell) == Some(target));
-            *all += 1;
-        }
-        let leads = |(leading, all): &(usize, usize)| *all == 0 || 2 * leading >= *all;
-        let within = rings.iter().take_while(|ring| leads(ring)).count();
-        let farthest = (0..self.scores.len())
-            .filter(|&cell| self.scores[cell].is_some())
-            .filter_map(away)
-            .fold(0.0, f64::max);
-        (within as f64 * step).min(farthest)
+    fn radius_around(&self, place: &Offset, target: usize) -> f64 {
+        // A cell outside the disc was never scored, and is no part of the lattice.
+        let scored = self.lattice.hypotheses().filter(|&(cell, _)| self.scores[cell].is_some());
+        let cells: Vec<(f64, bool)> = scored
+            .map(|(cell, offset)| (offset.distance_from(place), self.foot(cell) == Some(target)))
+            .collect();
+        let (farthest, step) =
+            (cells.iter().map(|cell| cell.0).fold(0.0, f64::max), self.lattice.step);
+        let leads = |&ring: &usize| {
+            let ring = cells.iter().filter(|(distance, _)| (distance / step) as usize == ring);
+            2 * ring.clone().filter(|(_, leads)| *leads).count() >= ring.count()
+        };
+        let rings = (0..=(farthest / step) as usize).take_while(leads).count();
+        (rings as f64 * step).min(farthest)
     }
 
     /// Where one ends who goes from a cell to its cheapest neighbour as long as that is cheaper.

@@ -23,25 +23,22 @@ impl ScoredLattice {
         self.scores[cell]?.eligible_cost(self.least_covered)
     }
 
+    /// The cells that may win, with their costs, in scan order.
+    pub(crate) fn eligible(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
+        (0..self.scores.len()).filter_map(|cell| Some((cell, self.eligible_cost(cell)?)))
+    }
+
     /// The cell of least cost; of equal ones the first in scan order.
     pub fn minimum(&self) -> Option<usize> {
-        let mut best: Option<(usize, f64)> = None;
-        for cell in 0..self.scores.len() {
-            if let Some(cost) = self.eligible_cost(cell)
-                && best.is_none_or(|(_, least)| cost < least)
-            {
-                best = Some((cell, cost));
-            }
-        }
-        best.map(|(cell, _)| cell)
+        self.eligible().min_by(|a, b| a.1.total_cmp(&b.1)).map(|(cell, _)| cell)
     }
 
     /// The cost of all eligible cells and their number, where there are several and nothing tells them
     /// apart: they differ by less than 1e-9.
     pub fn flat_cost(&self) -> Option<(f64, usize)> {
-        let costs = (0..self.scores.len()).filter_map(|cell| self.eligible_cost(cell));
-        let (least, most, count) = costs
-            .fold((f64::INFINITY, f64::NEG_INFINITY, 0), |(least, most, count), cost| {
+        let (least, most, count) = self
+            .eligible()
+            .fold((f64::INFINITY, f64::NEG_INFINITY, 0), |(least, most, count), (_, cost)| {
                 (cost.min(least), cost.max(most), count + 1)
             });
         (count > 1 && most - least < MIN_DIFFERENCE).then_some((least, count))
@@ -51,15 +48,13 @@ impl ScoredLattice {
     ///
     /// A cell at the rim of the lattice counts: it may be the foot of a basin outside.
     pub fn local_minima(&self) -> Vec<(usize, f64)> {
-        let mut minima: Vec<(usize, f64)> = (0..self.scores.len())
-            .filter_map(|cell| Some((cell, self.eligible_cost(cell)?)))
-            .filter(|&(cell, cost)| {
-                self.neighbours(cell).all(|neighbour| {
-                    self.eligible_cost(neighbour)
-                        .is_none_or(|other| cost < other || (cost == other && cell < neighbour))
-                })
+        let is_least = |&(cell, cost): &(usize, f64)| {
+            self.neighbours(cell).all(|neighbour| {
+                self.eligible_cost(neighbour)
+                    .is_none_or(|other| cost < other || (cost == other && cell < neighbour))
             })
-            .collect();
+        };
+        let mut minima: Vec<(usize, f64)> = self.eligible().filter(is_least).collect();
         minima.sort_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0)));
         minima
     }

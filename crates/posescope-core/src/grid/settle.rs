@@ -17,12 +17,9 @@ impl ScoredLattice {
             return;
         }
         let mut cells: Vec<usize> = self.local_minima().iter().map(|minimum| minimum.0).collect();
-        let least = self.minimum().and_then(|cell| self.eligible_cost(cell));
-        let is_near = |&cell: &usize| {
-            let costs = self.eligible_cost(cell).zip(least);
-            costs.is_some_and(|(cost, least)| cost - least < NEAR)
-        };
-        cells.extend((0..self.scores.len()).filter(is_near).take(MAX_NEAR));
+        let least = self.eligible().map(|(_, cost)| cost).fold(f64::INFINITY, f64::min);
+        let near = self.eligible().filter(|(_, cost)| cost - least < NEAR);
+        cells.extend(near.map(|(cell, _)| cell).take(MAX_NEAR));
         cells.sort_unstable();
         cells.dedup();
         if !self.score_again(&cells, scorer) {
