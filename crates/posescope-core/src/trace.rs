@@ -20,12 +20,9 @@
 //! in a run without a sink. A sink may block, which pauses the run, or return [`Cancelled`], which `?`
 //! carries out of the estimator. Listening never changes the answer.
 
-mod fanout;
-
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use arrayvec::ArrayVec;
-pub use fanout::Fanout;
 
 use crate::event::{DebugEvent, Event, KindSet, Stage, StageEnded, StageStarted};
 use crate::method::Method;
@@ -211,45 +208,55 @@ impl<'a> Trace<'a> {
         let Some(observer) = &mut self.observer else {
             return body(&mut Trace::to(second));
         };
-        let attention = observer.attention;
-        let first = observer.next;
-        let mut onward = Onward { observer, first };
-        let mut both = Fanout::new(vec![second, &mut onward]);
-        let mut inner = Trace::watched(&mut both, attention);
+        let mut both = Fanout::new(vec![second, &mut *observer.sink]);
+        let mut inner = Trace {
+            observer: Some(Observer {
+                wanted: both.wanted(),
+                sink: &mut both,
+                attention: observer.attention,
+                next: observer.next,
+                depth: observer.depth,
+                methods: observer.methods.clone(),
+                reused: false,
+            }),
+        };
         let outcome = body(&mut inner);
-        let emitted = inner.observer.map_or(0, |inner| inner.next);
-        observer.next = first + emitted;
+        if let Some(inner) = inner.observer {
+            observer.next = inner.next;
+        }
+        // The sink may have been attended to meanwhile.
+        observer.wanted = observer.sink.wanted();
         outcome
     }
 }
 
-/// Passes the events of an inner trace on to the observer of the outer one.
-struct Onward<'t, 'a> {
-    observer: &'t mut Observer<'a>,
-    /// The index that the first event of the inner trace has in the outer one.
-    first: u64,
+/// Passes each event to the sinks that want it, in their order.
+pub struct Fanout<'a>(Vec<&'a mut dyn Sink>);
+
+impl<'a> Fanout<'a> {
+    /// A fanout to all of these sinks.
+    pub fn new(sinks: Vec<&'a mut dyn Sink>) -> Self {
+        Self(sinks)
+    }
 }
 
-impl Sink for Onward<'_, '_> {
+impl Sink for Fanout<'_> {
     fn wanted(&self) -> KindSet {
-        self.observer.wanted
+        self.0.iter().fold(KindSet::NONE, |all, sink| all.union(sink.wanted()))
     }
 
     fn accept(&mut self, record: &Record) -> Result<(), Cancelled> {
-        let Observer { sink, depth, methods, .. } = self.observer;
-        let methods = methods.iter().chain(&record.methods).copied();
-        sink.accept(&Record {
-            index: self.first + record.index,
-            depth: *depth + record.depth,
-            methods: methods.take(MAX_METHODS).collect(),
-            event: record.event.clone(),
-        })
+        let is_stage = matches!(record.event, Event::StageStarted(_) | Event::StageEnded(_));
+        for sink in &mut self.0 {
+            if is_stage || sink.wanted().contains(record.event.kind()) {
+                sink.accept(record)?;
+            }
+        }
+        Ok(())
     }
 
     fn attend(&mut self) -> Result<(), Cancelled> {
-        self.observer.sink.attend()?;
-        self.observer.wanted = self.observer.sink.wanted();
-        Ok(())
+        self.0.iter_mut().try_for_each(|sink| sink.attend())
     }
 }
 
