@@ -23,12 +23,11 @@ pub use feature::{
     DepthRule, FeatureBased, FeatureParams, GuidedParams, count_matches, projected_cloud,
 };
 pub use given::Given;
-use hybrid::JointHybrid;
 pub use hybrid::{Hybrid, HybridParts, hybrid_outcome};
-use joint::{JointDirect, JointEstimator, JointFeatures};
 pub(crate) use joint::{JointReference, estimate_jointly};
 pub use mi6::SixFreedoms;
 pub use robust::{Robust, RobustParams};
+use starts::Level;
 pub use starts::SixParams;
 
 use std::str::FromStr;
@@ -41,7 +40,7 @@ use crate::grid::Offset;
 use crate::method::Method;
 use crate::params::Params;
 use crate::problem::Problem;
-use crate::render::{Comparison, Scorer};
+use crate::render::{Comparison, Objective, Score, Scorer};
 use crate::text::UnknownWord;
 use crate::trace::{Cancelled, Trace};
 
@@ -85,6 +84,26 @@ pub struct CostSummary {
 }
 
 impl CostSummary {
+    /// What a search found that ended at a pose with a score.
+    fn new(
+        problem: &Problem,
+        level: &Level<impl Objective>,
+        reference_from_camera: &Pose,
+        end: Score,
+        evaluations: u64,
+    ) -> Self {
+        let area = problem.query.intrinsics.area();
+        Self {
+            initial: level.initial.cost,
+            best: end.cost.unwrap_or(f64::NAN),
+            shuffled: level.objective.shuffled(reference_from_camera, problem.shuffle_seed()),
+            runner_up: None,
+            coverage_best: f64::from(end.covered) / area,
+            coverage_reference: f64::from(level.initial.covered) / area,
+            evaluations,
+        }
+    }
+
     /// The event of the minimum at this offset.
     fn assessed(&self, offset: Offset) -> MinimumAssessed {
         let &Self { initial, best, shuffled, runner_up, .. } = self;
@@ -151,8 +170,8 @@ pub trait Estimator: Send + Sync {
     }
 }
 
-/// Makes something with parameters.
-type Make<T> = Box<dyn Fn(&Params) -> T + Send + Sync>;
+/// Makes an estimator with parameters.
+type Make = Box<dyn Fn(&Params) -> Box<dyn Estimator> + Send + Sync>;
 
 /// An estimator's place in the registry. It states all that others need to know of the estimator.
 pub struct Entry {
@@ -165,13 +184,12 @@ pub struct Entry {
     pub family: Option<Family>,
     cost: Option<&'static cost::Entry>,
     hybrid: Option<HybridParts>,
-    make: Make<Box<dyn Estimator>>,
-    joint: Make<Option<Box<dyn JointEstimator>>>,
+    make: Make,
     least_probability: fn(&Params) -> f64,
 }
 
 impl Entry {
-    /// An estimator that takes one reference at a time, minimises no cost and lets every pose pass.
+    /// An estimator that minimises no cost and lets every pose pass.
     fn new(
         method: Method,
         about: &'static str,
@@ -184,7 +202,6 @@ impl Entry {
             cost: None,
             hybrid: None,
             make: Box::new(make),
-            joint: Box::new(|_| None),
             least_probability: |_| 0.0,
         }
     }
@@ -192,12 +209,6 @@ impl Entry {
     /// The estimator with these parameters.
     pub fn make(&self, params: &Params) -> Box<dyn Estimator> {
         (self.make)(params)
-    }
-
-    /// The estimator that takes several references at once with these parameters; `None` for a method that takes
-    /// one at a time.
-    pub(crate) fn make_joint(&self, params: &Params) -> Option<Box<dyn JointEstimator>> {
-        (self.joint)(params)
     }
 
     /// The cost that it searches by itself, or by which its views are explained.
@@ -222,7 +233,6 @@ fn feature_based() -> Entry {
     let about = "indirect: SURF, ratio match, depth from the cloud, P3P and MLESAC";
     Entry {
         family: Some(Family::Features),
-        joint: Box::new(|params| Some(Box::new(JointFeatures::new(params)))),
         ..Entry::new(Method::FB, about, |params| Box::new(FeatureBased::new(params)))
     }
 }
@@ -233,7 +243,6 @@ fn hybrid() -> Entry {
     let about = "the feature-based pose, and mutual information where that has none";
     Entry {
         hybrid: Some(parts),
-        joint: Box::new(move |params| Some(Box::new(JointHybrid::new(parts, params)?))),
         ..Entry::new(Method::HY, about, move |params| {
             Box::new(Hybrid::new(Method::HY, parts, params))
         })
@@ -245,7 +254,6 @@ fn direct(cost: &'static cost::Entry) -> Entry {
     Entry {
         family: Some(Family::Grid),
         cost: Some(cost),
-        joint: Box::new(|params| Some(Box::new(JointDirect::new(cost, params)))),
         ..Entry::new(Method::named(cost.name), cost.about, |params| {
             Box::new(Direct::new(cost, params))
         })

@@ -6,13 +6,13 @@ mod descend;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use super::starts::ManyStarts;
+use super::starts::{Level, ManyStarts};
 use super::{CostSummary, Estimator, Failure, Halt, Outcome, separate_failure};
 use crate::cost::{self, Cost, CostSetting, SearchRule};
 use crate::descent::DescentParams;
 use crate::event::{CloudColored, Moment, PhaseSearched, PoseScored, Stage, ViewRendered};
 use crate::geometry::Pose;
-use crate::grid::{GridParams, Lattice, Offset, Phase, Scored, ScoredLattice, least_covered, scan};
+use crate::grid::{GridParams, Lattice, Offset, Phase, Scored, ScoredLattice, scan};
 use crate::image::FloatImage;
 use crate::memo::{Key, Recalled, key};
 use crate::method::Method;
@@ -27,9 +27,8 @@ pub struct Direct {
     cost: Box<dyn Cost>,
     search: SearchRule,
     render: RenderParams,
-    pub(super) grid: GridParams,
     descent: DescentParams,
-    starts: ManyStarts,
+    pub(super) starts: ManyStarts,
     /// Which cost, with all its parameters.
     cost_key: Key,
 }
@@ -56,7 +55,6 @@ impl Direct {
             cost,
             search: SearchRule::Grid,
             render: params.render.clone(),
-            grid: params.grid.clone(),
             descent: params.descent.clone(),
             starts: ManyStarts::new(params),
             cost_key: key(("unregistered", MADE.fetch_add(1, Ordering::Relaxed))),
@@ -86,7 +84,7 @@ impl Direct {
         trace: &mut Trace<'_>,
     ) -> Result<(Pose, CostSummary), Halt> {
         let radius = problem.uncertainty_radius_m;
-        check_size(&self.grid, radius)?;
+        check_size(&self.starts.grid, radius)?;
         if !self.cost.statistic().is_counted() {
             leave_out(self.method, "has a cost that whole numbers do not decide");
         }
@@ -97,44 +95,31 @@ impl Direct {
 
         // The reference pose is the starting value, and its coverage the measure of all others.
         let start = Offset::default();
-        let initial = scorer.score(&[start.reference_from_camera()])[0];
-        let mut search = Search {
-            direct: self,
-            problem,
-            scorer: &scorer,
-            covered_at_reference: initial.covered,
-            least_covered: least_covered(self.grid.coverage_floor, initial.covered),
-            evaluations: 1,
-        };
+        let level = self.starts.level(scorer);
+        let mut search = Search { direct: self, problem, level: &level, evaluations: 1 };
         trace.emit(|| search.render(Moment::Start, start))?;
-        let best = Best { offset: start, score: Some(initial) };
-        let (best, coarse) = coarse_to_fine(&self.grid, radius, best, trace, |lattice, trace| {
-            search.phase(lattice, trace)
-        })?;
+        let best = Best { offset: start, score: Some(level.initial) };
+        let (best, coarse) =
+            coarse_to_fine(&self.starts.grid, radius, best, trace, |lattice, trace| {
+                search.phase(lattice, trace)
+            })?;
 
         trace.stage(Stage::Assess, |trace| {
             let evaluations = search.evaluations;
-            let Some((score, best_cost)) = best.score.and_then(|score| Some((score, score.cost?)))
-            else {
+            let Some(score) = best.score.filter(|score| score.cost.is_some()) else {
                 let hypotheses = evaluations as usize;
                 return Err(Halt::from(Failure::NothingComparable { hypotheses }));
             };
             trace.emit(|| search.render(Moment::End, best.offset))?;
             trace.checkpoint()?;
-            let area = problem.query.intrinsics.area();
+            let pose = best.offset.reference_from_camera();
             let summary = CostSummary {
-                initial: initial.cost,
-                best: best_cost,
-                shuffled: scorer
-                    .shuffled(&best.offset.reference_from_camera(), problem.shuffle_seed()),
                 runner_up: coarse
                     .and_then(|surface| surface.local_minima().get(1).map(|minimum| minimum.1)),
-                coverage_best: f64::from(score.covered) / area,
-                coverage_reference: f64::from(initial.covered) / area,
-                evaluations,
+                ..CostSummary::new(problem, &level, &pose, score, evaluations)
             };
             trace.emit(|| summary.assessed(best.offset))?;
-            Ok((problem.world_from_query(&best.offset.reference_from_camera()), summary))
+            Ok((problem.world_from_query(&pose), summary))
         })
     }
 
@@ -146,9 +131,8 @@ impl Direct {
     ) -> Result<(Pose, CostSummary), Halt> {
         self.starts.check_size(problem)?;
         self.color(problem, trace)?;
-        let scorer = self.scorer_of(problem);
         let level = self.starts.level(self.scorer_of(problem));
-        let compare = |pose: &Pose, _| scorer.compare(pose);
+        let compare = |pose: &Pose, _| level.objective.compare(pose);
         let found = self.starts.search(problem, &level, None, &compare, trace)?;
         Ok((problem.world_from_query(&found.refined[0].pose), found.summary))
     }
@@ -202,13 +186,12 @@ impl Direct {
     fn scored(
         &self,
         problem: &Problem,
-        scorer: &Scorer<'_>,
+        &Level { objective: ref scorer, least_covered, .. }: &Level<Scorer<'_>>,
         lattice: Lattice,
-        least_covered: u32,
         trace: &mut Trace<'_>,
         mut tell: impl FnMut(&[Scored], &mut Trace<'_>) -> Result<(), Cancelled>,
     ) -> Result<ScoredLattice, Cancelled> {
-        let batch = scorer.at_a_time_of(lattice.cells());
+        let batch = scorer.batch(lattice.cells());
         let mut surface = None;
         let bytes = |scores: &Vec<Score>| size_of_val(scores.as_slice());
         let inputs = (self.cost_key, &self.render, &lattice);
@@ -298,9 +281,7 @@ pub(super) fn check_size(grid: &GridParams, radius_m: f64) -> Result<(), Failure
 struct Search<'a, 'cost> {
     direct: &'a Direct,
     problem: &'a Problem,
-    scorer: &'a Scorer<'cost>,
-    covered_at_reference: u32,
-    least_covered: u32,
+    level: &'a Level<Scorer<'cost>>,
     evaluations: u64,
 }
 
@@ -311,8 +292,8 @@ impl Search<'_, '_> {
         lattice: Lattice,
         trace: &mut Trace<'_>,
     ) -> Result<Arc<ScoredLattice>, Cancelled> {
-        let &mut Self { direct, problem, scorer, covered_at_reference, least_covered, .. } = self;
-        let phase = lattice.phase;
+        let &mut Self { direct, problem, level, .. } = self;
+        let (phase, covered_at_reference) = (lattice.phase, level.initial.covered);
         let tell = |some: &[Scored], trace: &mut Trace<'_>| {
             trace.checkpoint()?;
             for &one in some {
@@ -325,7 +306,7 @@ impl Search<'_, '_> {
             }
             Ok(())
         };
-        let surface = direct.scored(problem, scorer, lattice, least_covered, trace, tell)?;
+        let surface = direct.scored(problem, level, lattice, trace, tell)?;
         let surface = Arc::new(surface);
         trace.emit(|| PhaseSearched {
             surface: Arc::clone(&surface),
@@ -339,7 +320,7 @@ impl Search<'_, '_> {
             moment,
             evaluation: self.evaluations.saturating_sub(1),
             offset,
-            comparison: Arc::new(self.scorer.compare(&offset.reference_from_camera())),
+            comparison: Arc::new(self.level.objective.compare(&offset.reference_from_camera())),
         }
     }
 }

@@ -3,8 +3,7 @@
 //! HY, that of the paper (section 2.4), is FB and MI: FB is the more accurate where it finds enough
 //! matches, MI still gives a moderate pose where FB finds none.
 
-use super::joint::{JointEstimator, JointPose, JointReference};
-use super::{Estimator, Halt, Outcome, entry, separate_failure};
+use super::{Estimator, Outcome, entry};
 use crate::event::{BranchTaken, Stage};
 use crate::geometry::Pose;
 use crate::method::Method;
@@ -95,40 +94,5 @@ impl Estimator for Hybrid {
 
     fn compare_at(&self, problem: &Problem, world_from_query: &Pose) -> Option<Comparison> {
         self.second.compare_at(problem, world_from_query)
-    }
-}
-
-/// The joint pose of the first method, and of the second where that has none.
-pub(super) struct JointHybrid {
-    parts: HybridParts,
-    first: Box<dyn JointEstimator>,
-    second: Box<dyn JointEstimator>,
-}
-
-impl JointHybrid {
-    /// The hybrid of both with these parameters; `None` if one takes one reference at a time.
-    pub(super) fn new(parts: HybridParts, params: &Params) -> Option<Self> {
-        let part = |method| entry(method).make_joint(params);
-        Some(Self { parts, first: part(parts.first)?, second: part(parts.second)? })
-    }
-}
-
-impl JointEstimator for JointHybrid {
-    fn agree(
-        &self,
-        references: &[JointReference<'_>],
-        trace: &mut Trace<'_>,
-    ) -> Result<JointPose, Halt> {
-        let HybridParts { first, second } = self.parts;
-        let agreed = separate_failure(self.first.agree(references, trace))?;
-        let Err(failure) = &agreed else {
-            trace.emit(|| BranchTaken {
-                method: first,
-                why: "the joint feature-based pose was accepted".to_owned(),
-            })?;
-            return Ok(agreed?);
-        };
-        trace.emit(|| BranchTaken { method: second, why: failure.to_string() })?;
-        self.second.agree(references, trace)
     }
 }

@@ -10,13 +10,10 @@ mod feature;
 #[cfg(test)]
 mod tests;
 
-pub(super) use direct::JointDirect;
-pub(super) use feature::JointFeatures;
-
 use std::sync::Arc;
 
-use super::{Failure, Halt, find, separate_failure};
-use crate::event::{ReferencesFused, Stage};
+use super::{Direct, Failure, Family, FeatureBased, Halt, HybridParts, find, separate_failure};
+use crate::event::{BranchTaken, ReferencesFused, Stage};
 use crate::fusion::JOINT;
 use crate::fusion::share::{Share, ShareOutcome, Support};
 use crate::geometry::{Pose, PoseError};
@@ -41,17 +38,7 @@ pub(crate) struct JointReference<'a> {
 }
 
 /// A pose of the query, `world_from_camera`, and what each reference has to do with it, in their order.
-pub(super) type JointPose = (Pose, Vec<Option<Support>>);
-
-/// A way to find the query's pose from several references at once.
-pub(crate) trait JointEstimator: Send + Sync {
-    /// Localises the query against all of the references, of which there is at least one.
-    fn agree(
-        &self,
-        references: &[JointReference<'_>],
-        trace: &mut Trace<'_>,
-    ) -> Result<JointPose, Halt>;
-}
+type JointPose = (Pose, Vec<Option<Support>>);
 
 /// The pose that several references give together, and what each has to do with it, in their order.
 ///
@@ -66,10 +53,9 @@ pub(crate) fn estimate_jointly(
     trace: &mut Trace<'_>,
 ) -> Result<(Result<Pose, Failure>, Vec<Share>), Cancelled> {
     trace.stage(Stage::Fuse, |trace| {
-        let agreed = match find(method).and_then(|entry| entry.make_joint(params)) {
-            _ if references.is_empty() => Err(Failure::NoReference { radius_m: None }),
-            None => Err(Failure::NotJoint { method }),
-            Some(estimator) => separate_failure(estimator.agree(references, trace))?,
+        let agreed = match references {
+            [] => Err(Failure::NoReference { radius_m: None }),
+            _ => separate_failure(agree(method, params, references, trace))?,
         };
         let (pose, supports) = match agreed {
             Ok((pose, supports)) => (Ok(pose), supports),
@@ -85,6 +71,33 @@ pub(crate) fn estimate_jointly(
         })?;
         Ok((pose, shares))
     })
+}
+
+/// Localises the query against all of the references, of which there is at least one.
+fn agree(
+    method: Method,
+    params: &Params,
+    references: &[JointReference<'_>],
+    trace: &mut Trace<'_>,
+) -> Result<JointPose, Halt> {
+    let entry = find(method).ok_or(Failure::NotJoint { method })?;
+    if let Some(HybridParts { first, second }) = entry.hybrid {
+        let agreed = separate_failure(agree(first, params, references, trace))?;
+        let Err(failure) = &agreed else {
+            trace.emit(|| BranchTaken {
+                method: first,
+                why: "the joint feature-based pose was accepted".to_owned(),
+            })?;
+            return Ok(agreed?);
+        };
+        trace.emit(|| BranchTaken { method: second, why: failure.to_string() })?;
+        return agree(second, params, references, trace);
+    }
+    match (entry.family, entry.cost) {
+        (Some(Family::Features), _) => FeatureBased::new(params).agree(references, trace),
+        (Some(Family::Grid), Some(cost)) => Direct::new(cost, params).agree(references, trace),
+        _ => Err(Halt::from(Failure::NotJoint { method })),
+    }
 }
 
 /// The share of each reference in the pose: as much of it as it supports.

@@ -66,7 +66,7 @@ impl SixFreedoms {
     }
 
     /// The cost with photos that are `shrink` times smaller.
-    pub(super) fn level(&self, problem: &Problem, shrink: u32) -> Level<'static> {
+    pub(super) fn level(&self, problem: &Problem, shrink: u32) -> Level<Judge> {
         self.starts.level(Judge::new(problem, &self.render, &self.judge, shrink))
     }
 
@@ -79,7 +79,7 @@ impl SixFreedoms {
     pub(super) fn search(
         &self,
         problem: &Problem,
-        level: &Level<'_>,
+        level: &Level<Judge>,
         trace: &mut Trace<'_>,
     ) -> Result<Found, Halt> {
         self.starts.check_size(problem)?;

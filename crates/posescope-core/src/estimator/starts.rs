@@ -21,7 +21,7 @@ use crate::grid::{GridParams, Lattice, Offset, Phase, Scored, ScoredLattice, sca
 use crate::judge::{Freedoms, Refined, Shrinking, Start};
 use crate::params::Params;
 use crate::problem::Problem;
-use crate::render::{Comparison, Score};
+use crate::render::{Comparison, Objective, Score};
 use crate::scale::Scale;
 use crate::trace::{Cancelled, Trace};
 
@@ -37,7 +37,7 @@ const SAME_DEG: f64 = 1.0;
 /// The search from many starts.
 pub(super) struct ManyStarts {
     params: SixParams,
-    grid: GridParams,
+    pub(super) grid: GridParams,
     /// How far outside the disc a pose may be, as a share of its radius.
     radius_slack: f64,
     scale: Scale,
@@ -63,11 +63,8 @@ pub(super) struct Spread {
 
 impl Spread {
     pub(super) fn of(surfaces: &[Arc<ScoredLattice>]) -> Self {
-        let cells = surfaces
-            .iter()
-            .flat_map(|surface| (0..surface.scores.len()).map(move |cell| (surface, cell)));
-        let mut costs: Vec<f64> =
-            cells.filter_map(|(surface, cell)| surface.eligible_cost(cell)).collect();
+        let cells = surfaces.iter().flat_map(|surface| surface.eligible());
+        let mut costs: Vec<f64> = cells.map(|(_, cost)| cost).collect();
         let median = middle(&mut costs);
         let mut away: Vec<f64> = costs.iter().map(|cost| (cost - median).abs()).collect();
         Self { median, deviation: 1.4826 * middle(&mut away) }
@@ -106,7 +103,7 @@ impl ManyStarts {
             freedoms: Freedoms::Six,
             first_m: self.params.six_step_m.min(self.most_m()),
             last_m: self.params.last_step_m,
-            rad_per_m: self.params.deg_per_m.to_radians(),
+            ..self.in_the_plane()
         }
     }
 
@@ -137,11 +134,11 @@ impl ManyStarts {
 
     /// Searches all of the disc. `level` has the photos as they are, and `smaller` makes levels of smaller ones,
     /// where there are any; `compare` shows a pose.
-    pub(super) fn search(
+    pub(super) fn search<O: Objective>(
         &self,
         problem: &Problem,
-        level: &Level<'_>,
-        smaller: Option<&dyn Fn(u32) -> Level<'static>>,
+        level: &Level<O>,
+        smaller: Option<&dyn Fn(u32) -> Level<O>>,
         compare: &dyn Fn(&Pose, Score) -> Comparison,
         trace: &mut Trace<'_>,
     ) -> Result<Found, Halt> {
@@ -199,22 +196,16 @@ impl ManyStarts {
         trace.stage(Stage::Assess, |trace| {
             let best = refined[0];
             let score = level.objective.score(&[best.pose])[0];
-            let area = problem.query.intrinsics.area();
-            let shuffled = level.objective.shuffled(&best.pose, problem.shuffle_seed());
+            let evaluations = search.evaluations;
+            let mut others = refined.iter().skip(1);
             let summary = CostSummary {
-                initial: initial.cost,
                 best: best.cost,
-                shuffled,
-                runner_up: refined
-                    .iter()
-                    .skip(1)
+                runner_up: others
                     .find(|other| self.is_apart(&best.pose, &other.pose))
                     .map(|other| other.cost),
-                coverage_best: f64::from(score.covered) / area,
-                coverage_reference: f64::from(initial.covered) / area,
-                evaluations: search.evaluations,
+                ..CostSummary::new(problem, level, &best.pose, score, evaluations)
             };
-            trace.emit(|| rendered(Moment::End, search.evaluations - 1, &best.pose, score))?;
+            trace.emit(|| rendered(Moment::End, evaluations - 1, &best.pose, score))?;
             trace.emit(|| summary.assessed(Offset::of(&best.pose)))?;
             Ok(Found { refined, summary, spread })
         })
@@ -239,10 +230,10 @@ impl ManyStarts {
     /// Poses that two smaller copies of the photos lead to: the minima of the smallest, over a wider range
     /// of headings, refined there in six freedoms and again at half the size. Their basins are wider, so
     /// that they find what lies between the fine level's cells.
-    fn coarse_poses(
+    fn coarse_poses<O: Objective>(
         &self,
         problem: &Problem,
-        smaller: &dyn Fn(u32) -> Level<'static>,
+        smaller: &dyn Fn(u32) -> Level<O>,
         trace: &mut Trace<'_>,
     ) -> Result<Vec<Pose>, Halt> {
         let shrink_by = self.params.coarse_shrink as u32;
@@ -281,12 +272,12 @@ impl ManyStarts {
 }
 
 /// The state of a search.
-struct Search<'a> {
-    level: &'a Level<'a>,
+struct Search<'a, O> {
+    level: &'a Level<O>,
     evaluations: u64,
 }
 
-impl Search<'_> {
+impl<O: Objective> Search<'_, O> {
     fn score(
         &mut self,
         lattice: Lattice,

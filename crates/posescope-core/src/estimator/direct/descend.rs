@@ -7,13 +7,14 @@ use nalgebra::Point3;
 use super::Direct;
 use crate::cost::Statistic;
 use crate::descent::{Step, View, information, photometric};
+use crate::estimator::starts::Level;
 use crate::estimator::{CostSummary, Failure, Halt};
 use crate::event::{DescentStepped, Moment, PhaseSearched, Stage, ViewRendered};
 use crate::geometry::Pose;
-use crate::grid::{Lattice, Offset, Phase, Scored, least_covered};
+use crate::grid::{Lattice, Offset, Phase, Scored};
 use crate::image::gaussian_smoothed;
 use crate::problem::Problem;
-use crate::render::{Objective as _, Score, Scorer};
+use crate::render::{Score, Scorer};
 use crate::trace::Trace;
 
 /// Where a descent stands.
@@ -35,9 +36,13 @@ impl Direct {
         let cloud = self.color(problem, trace)?;
         let scorer = self.scorer_of(problem);
         trace.checkpoint()?;
-        let initial = scorer.score(&[Pose::identity()])[0];
-        let mut standing =
-            Standing { reference_from_camera: Pose::identity(), score: initial, evaluations: 1 };
+        let level = self.starts.level(scorer);
+        let scorer = &level.objective;
+        let mut standing = Standing {
+            reference_from_camera: Pose::identity(),
+            score: level.initial,
+            evaluations: 1,
+        };
         let rendered = |standing: &Standing, moment| ViewRendered {
             moment,
             evaluation: standing.evaluations.saturating_sub(1),
@@ -47,18 +52,18 @@ impl Direct {
         trace.emit(|| rendered(&standing, Moment::Start))?;
         // The way is shown over the surface of the method's own cost, which it knows nothing of.
         if trace.wants::<PhaseSearched>() {
-            self.show_surface(problem, &scorer, initial, trace)?;
+            self.show_surface(problem, &level, trace)?;
         }
         // Every nth point.
         let stride = cloud.points.len().div_ceil(self.descent.max_points).max(1);
         let points = cloud.points.iter().step_by(stride).map(|point| point.position);
         let points: Vec<Point3<f32>> = points.collect();
         trace.stage(Stage::Descend, |trace| {
-            for level in (0..self.descent.levels).rev() {
+            for pyramid in (0..self.descent.levels).rev() {
                 trace.checkpoint()?;
                 let start = standing.reference_from_camera.inverse();
                 // Both photos as the level has them.
-                let sigma_px = self.descent.sigma_px * f64::from(1 << level);
+                let sigma_px = self.descent.sigma_px * f64::from(1 << pyramid);
                 let [query, reference] = [&problem.query.photo, &problem.reference.photo]
                     .map(|photo| gaussian_smoothed(&photo.gray, sigma_px));
                 let query = (&query, &problem.query.intrinsics);
@@ -75,7 +80,7 @@ impl Direct {
                     step += 1;
                     trace.checkpoint()?;
                     trace.emit(|| DescentStepped {
-                        level,
+                        level: pyramid,
                         step,
                         reference_from_camera: pose,
                         smooth_cost,
@@ -96,11 +101,10 @@ impl Direct {
         })?;
         trace.stage(Stage::Assess, |trace| {
             let Standing { reference_from_camera: pose, score, evaluations } = standing;
-            let least = least_covered(self.grid.coverage_floor, initial.covered);
-            let Some(best) = score.eligible_cost(least) else {
+            if score.eligible_cost(level.least_covered).is_none() {
                 let hypotheses = evaluations as usize;
                 return Err(Halt::from(Failure::NothingComparable { hypotheses }));
-            };
+            }
             trace.emit(|| rendered(&standing, Moment::End))?;
             trace.checkpoint()?;
             let (distance_m, radius_m) =
@@ -108,16 +112,7 @@ impl Direct {
             if distance_m > radius_m {
                 return Err(Halt::from(Failure::OutsideRadius { distance_m, radius_m }));
             }
-            let area = problem.query.intrinsics.area();
-            let summary = CostSummary {
-                initial: initial.cost,
-                best,
-                shuffled: scorer.shuffled(&pose, problem.shuffle_seed()),
-                runner_up: None,
-                coverage_best: f64::from(score.covered) / area,
-                coverage_reference: f64::from(initial.covered) / area,
-                evaluations,
-            };
+            let summary = CostSummary::new(problem, &level, &pose, score, evaluations);
             trace.emit(|| summary.assessed(Offset::of(&pose)))?;
             Ok((problem.world_from_query(&pose), summary))
         })
@@ -127,17 +122,15 @@ impl Direct {
     fn show_surface(
         &self,
         problem: &Problem,
-        scorer: &Scorer<'_>,
-        initial: Score,
+        level: &Level<Scorer<'_>>,
         trace: &mut Trace<'_>,
     ) -> Result<(), Halt> {
         let (start, phase) = (Offset::default(), Phase::PositionCoarse);
-        let lattice = Lattice::new(phase, start, problem.uncertainty_radius_m, &self.grid);
+        let lattice = Lattice::new(phase, start, problem.uncertainty_radius_m, &self.starts.grid);
         let lattice = lattice.map_err(Failure::from)?;
         trace.stage(Stage::Search(phase), |trace| {
-            let least = least_covered(self.grid.coverage_floor, initial.covered);
             let silently = |_: &[Scored], trace: &mut Trace<'_>| trace.checkpoint();
-            let surface = self.scored(problem, scorer, lattice, least, trace, silently)?;
+            let surface = self.scored(problem, level, lattice, trace, silently)?;
             // It leads nowhere: the descent begins at the reference.
             trace.emit(|| PhaseSearched { surface: Arc::new(surface), best: None })?;
             Ok(())

@@ -8,7 +8,7 @@ use crate::event::ConsensusJudged;
 use crate::geometry::Pose;
 use crate::problem::Problem;
 use crate::robust::{
-    Acceptance, AcceptanceRule, Counted, MlesacError, MlesacParams, Places, effective_area_px,
+    Acceptance, AcceptanceRule, Counted, MlesacError, Places, effective_area_px,
     inliers_beyond_chance, places_beyond_chance,
 };
 use crate::solver::Correspondence;
@@ -62,29 +62,17 @@ impl FeatureBased {
         })
     }
 
-    /// MLESAC's parameters.
-    pub(in crate::estimator) fn mlesac(&self) -> &MlesacParams {
-        &self.params.mlesac
-    }
-
     /// Why MLESAC has no consensus of this many correspondences.
     pub(in crate::estimator) fn halt(
         error: MlesacError<Cancelled>,
         correspondences: usize,
     ) -> Halt {
-        match error {
-            MlesacError::TooFewCorrespondences { found, .. } => {
-                Halt::Failed(Failure::NoConsensus {
-                    correspondences: found,
-                    best_inliers: 0,
-                    trials: 0,
-                })
-            }
-            MlesacError::NoModel { trials, best_inliers } => {
-                Halt::Failed(Failure::NoConsensus { correspondences, best_inliers, trials })
-            }
-            MlesacError::Cancelled(Cancelled) => Halt::Cancelled,
-        }
+        let (trials, best_inliers) = match error {
+            MlesacError::TooFewCorrespondences { .. } => (0, 0),
+            MlesacError::NoModel { trials, best_inliers } => (trials, best_inliers),
+            MlesacError::Cancelled(Cancelled) => return Halt::Cancelled,
+        };
+        Halt::Failed(Failure::NoConsensus { correspondences, best_inliers, trials })
     }
 
     /// Whether the inliers of a consensus are more than chance gives: pixels of the query

@@ -2,35 +2,16 @@
 
 use std::sync::Arc;
 
-use super::{JointEstimator, JointPose, JointReference, between, lead};
-use crate::cost;
+use super::{JointPose, JointReference, between, lead};
 use crate::estimator::direct::{Best, Direct, check_size, coarse_to_fine};
+use crate::estimator::starts::Level;
 use crate::estimator::{Failure, Halt};
 use crate::fusion::share::Support;
 use crate::geometry::Pose;
-use crate::grid::{Lattice, Offset, ScoredLattice, least_covered, scan};
+use crate::grid::{Offset, scan};
 use crate::judge::{Freedoms, Shrinking, Start, shrink};
-use crate::params::Params;
-use crate::problem::Problem;
-use crate::render::{Score, Scorer};
+use crate::render::{Score, Scorer, at_a_time};
 use crate::trace::{Cancelled, Trace};
-
-/// The estimator that searches the least cost over several references.
-///
-/// The grid is that of the reference with the most matches: its disc, its axes, its height, pitch and
-/// roll. (On the street the grids of others that look another way found a cheaper wrong place more often
-/// than the right one, and a grid at the average of the references was less exact.) At each hypothesis every reference draws its own view of the query and has its own cost; the
-/// joint cost is their mean, each weighed by the pixels that it covers. One that covers too little there,
-/// as [`coverage_floor`](crate::grid::GridParams::coverage_floor) says, abstains, and where fewer than
-/// half are eligible there is no cost: a place that few can see would have a low cost for that reason alone.
-///
-/// The grid ends at a step and at the greatest yaw, and its height, pitch and roll are those of one
-/// reference; an average of several poses is bound to none of that. So the minimum of the grid, and the pose
-/// that each reference found alone, are refined under the joint cost by shrinking steps, and the cheapest is
-/// the answer. With one reference that shows something nothing is refined: the answer is the method's own.
-pub(in crate::estimator) struct JointDirect {
-    direct: Direct,
-}
 
 /// The first step is that of the grid's fine lattice, the last what neither a photo nor a scan tells apart.
 const REFINEMENT: Shrinking = Shrinking {
@@ -44,45 +25,42 @@ const REFINEMENT: Shrinking = Shrinking {
 /// A reference that shows something.
 struct Member<'a> {
     index: usize,
-    scorer: Scorer<'a>,
+    level: Level<Scorer<'a>>,
     /// Its camera's frame seen from that of the lead.
     member_from_lead: Pose,
-    least_covered: u32,
 }
 
-impl JointDirect {
-    /// The estimator of a registered cost.
-    pub(in crate::estimator) fn new(entry: &cost::Entry, params: &Params) -> Self {
-        Self { direct: Direct::new(entry, params) }
-    }
-
-    fn member(&self, index: usize, problem: &Problem, lead: &Problem) -> Member<'_> {
-        let scorer = self.direct.scorer_of(problem);
-        let at_reference = scorer.score(&[Pose::identity()])[0];
-        Member {
-            index,
-            scorer,
-            member_from_lead: between(problem, lead),
-            least_covered: least_covered(self.direct.grid.coverage_floor, at_reference.covered),
-        }
-    }
-}
-
-impl JointEstimator for JointDirect {
-    fn agree(
+impl Direct {
+    /// The pose that the references agree on.
+    ///
+    /// The grid is that of the reference with the most matches: its disc, its axes, its height, pitch and
+    /// roll. (On the street the grids of others that look another way found a cheaper wrong place more often
+    /// than the right one, and a grid at the average of the references was less exact.) At each hypothesis every
+    /// reference draws its own view of the query and has its own cost; the joint cost is their mean, each weighed
+    /// by the pixels that it covers. One that covers too little there, as
+    /// [`coverage_floor`](crate::grid::GridParams::coverage_floor) says, abstains, and where fewer than half are
+    /// eligible there is no cost: a place that few can see would have a low cost for that reason alone.
+    ///
+    /// The grid ends at a step and at the greatest yaw, and its height, pitch and roll are those of one
+    /// reference; an average of several poses is bound to none of that. So the minimum of the grid, and the pose
+    /// that each reference found alone, are refined under the joint cost by shrinking steps, and the cheapest is
+    /// the answer. With one reference that shows something nothing is refined: the answer is the method's own.
+    pub(super) fn agree(
         &self,
         references: &[JointReference<'_>],
         trace: &mut Trace<'_>,
     ) -> Result<JointPose, Halt> {
         let lead = references[lead(references)].problem;
-        let (grid, radius_m) = (&self.direct.grid, lead.uncertainty_radius_m);
+        let (grid, radius_m) = (&self.starts.grid, lead.uncertainty_radius_m);
         check_size(grid, radius_m)?;
         let mut members = Vec::new();
         for (index, reference) in references.iter().enumerate() {
             trace.checkpoint()?;
-            if !self.direct.colored(reference.problem).value.points.is_empty() {
+            if !self.colored(reference.problem).value.points.is_empty() {
                 trace.checkpoint()?;
-                members.push(self.member(index, reference.problem, lead));
+                let level = self.starts.level(self.scorer_of(reference.problem));
+                let member_from_lead = between(reference.problem, lead);
+                members.push(Member { index, level, member_from_lead });
             }
         }
         if members.is_empty() {
@@ -96,7 +74,10 @@ impl JointEstimator for JointDirect {
         let mut hypotheses = 0;
         let (best, _) = coarse_to_fine(grid, radius_m, start, trace, |lattice, trace| {
             hypotheses += lattice.hypotheses().count();
-            joint.scored(lattice, trace).map(Arc::new)
+            // Those that abstain have been left out, so any coverage will do.
+            let batch = at_a_time() / joint.members.len();
+            let score = |poses: &[Pose]| joint.score(poses);
+            scan(lattice, 0, batch, score, |_| trace.checkpoint()).map(Arc::new)
         })?;
         if best.score.is_none() {
             return Err(Halt::from(Failure::NothingComparable { hypotheses }));
@@ -114,7 +95,7 @@ impl JointEstimator for JointDirect {
         for member in &joint.members {
             let score = member.scores(&[lead_from_query])[0];
             supports[member.index] = Some(Support::Cost {
-                cost: score.eligible_cost(member.least_covered),
+                cost: score.eligible_cost(member.level.least_covered),
                 coverage: f64::from(score.covered) / area,
             });
         }
@@ -127,7 +108,7 @@ impl Member<'_> {
     fn scores(&self, lead_from_camera: &[Pose]) -> Vec<Score> {
         let own = lead_from_camera.iter();
         let own: Vec<Pose> = own.map(|pose| self.member_from_lead * pose).collect();
-        self.scorer.score(&own)
+        self.level.objective.score(&own)
     }
 }
 
@@ -143,12 +124,6 @@ impl Joint<'_> {
             self.members.iter().map(|member| member.scores(lead_from_camera)).collect();
         let at = |place: usize| self.together(own.iter().map(|scores| scores[place]));
         (0..lead_from_camera.len()).map(at).collect()
-    }
-
-    /// Those that abstain have been left out, so any coverage will do.
-    fn scored(&self, lattice: Lattice, trace: &mut Trace<'_>) -> Result<ScoredLattice, Cancelled> {
-        let batch = self.members[0].scorer.at_a_time() / self.members.len();
-        scan(lattice, 0, batch, |poses| self.score(poses), |_| trace.checkpoint())
     }
 
     /// The cheapest pose within the disc that steps which shrink lead to from any of these,
@@ -184,7 +159,7 @@ impl Joint<'_> {
         let counted: Vec<(f64, u32)> = own
             .zip(&self.members)
             .filter_map(|(score, member)| {
-                Some((score.eligible_cost(member.least_covered)?, score.covered))
+                Some((score.eligible_cost(member.level.least_covered)?, score.covered))
             })
             .collect();
         let covered: u32 = counted.iter().map(|(_, covered)| covered).sum();

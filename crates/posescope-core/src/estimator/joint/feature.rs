@@ -1,43 +1,31 @@
 //! FB of several references: the correspondences of all in one MLESAC.
 
-use super::{JointEstimator, JointPose, JointReference, between, lead};
+use super::{JointPose, JointReference, between, lead};
 use crate::estimator::feature::{FeatureBased, MINIMUM};
 use crate::estimator::{Failure, Halt};
 use crate::event::Stage;
 use crate::fusion::share::Support;
-use crate::params::Params;
 use crate::robust::{Consensus, mlesac};
 use crate::solver::Correspondence;
 use crate::trace::Trace;
 
-/// The feature-based estimator of several references.
-///
-/// Each lifts its own matches to points of its own cloud, as it does alone. In one frame they are one set:
-/// MLESAC draws its samples from all, so that three references with two true matches each fix a pose that
-/// none of them would. Whether it is more than chance is asked of keypoints of the query: one that several
-/// references explain is a single observation, and one that has several matches has as many occasions to
-/// agree by accident.
-pub(in crate::estimator) struct JointFeatures {
-    features: FeatureBased,
-}
-
-impl JointEstimator for JointFeatures {
-    fn agree(
+impl FeatureBased {
+    /// The pose that the references agree on.
+    ///
+    /// Each lifts its own matches to points of its own cloud, as it does alone. In one frame they are one set:
+    /// MLESAC draws its samples from all, so that three references with two true matches each fix a pose that
+    /// none of them would. Whether it is more than chance is asked of keypoints of the query: one that several
+    /// references explain is a single observation, and one that has several matches has as many occasions to
+    /// agree by accident.
+    pub(super) fn agree(
         &self,
         references: &[JointReference<'_>],
         trace: &mut Trace<'_>,
     ) -> Result<JointPose, Halt> {
-        trace.stage(Stage::Consensus, |trace| self.consensus(references, trace))
-    }
-}
-
-impl JointFeatures {
-    /// The estimator with these parameters.
-    pub(in crate::estimator) fn new(params: &Params) -> Self {
-        Self { features: FeatureBased::new(params) }
+        trace.stage(Stage::Consensus, |trace| self.joint_consensus(references, trace))
     }
 
-    fn consensus(
+    fn joint_consensus(
         &self,
         references: &[JointReference<'_>],
         trace: &mut Trace<'_>,
@@ -49,7 +37,7 @@ impl JointFeatures {
         for (index, reference) in references.iter().enumerate() {
             trace.checkpoint()?;
             // What one alone is too little of may be enough with the others.
-            let Ok(gathered) = self.features.gather(reference.problem) else {
+            let Ok(gathered) = self.gather(reference.problem) else {
                 continue;
             };
             unique += gathered.unique;
@@ -74,7 +62,7 @@ impl JointFeatures {
         let consensus = mlesac(
             &correspondences,
             &lead.query.intrinsics,
-            self.features.mlesac(),
+            &self.params.mlesac,
             lead.random_seed("mlesac"),
             |_| trace.checkpoint(),
         );
@@ -83,8 +71,7 @@ impl JointFeatures {
         let supports = supports(&origins, &consensus, references.len());
 
         let intrinsics = &lead.query.intrinsics;
-        let beyond =
-            (self.features).beyond_chance(&correspondences, &consensus.inliers, intrinsics, 0.0);
+        let beyond = self.beyond_chance(&correspondences, &consensus.inliers, intrinsics, 0.0);
         // Where the query can be, the reference says that explains most of it.
         let inliers = |index: usize| supports[index].map_or(0.0, |support| support.amount());
         let most = (0..references.len())
@@ -93,8 +80,7 @@ impl JointFeatures {
             .unwrap_or_default();
         let nearest = references[most].problem;
         let reference_from_query = between(nearest, lead) * consensus.pose.inverse();
-        let features = &self.features;
-        let pose = features.judged(&reference_from_query, &beyond, nearest, &mut Trace::off())?;
+        let pose = self.judged(&reference_from_query, &beyond, nearest, &mut Trace::off())?;
         Ok((pose, supports))
     }
 }

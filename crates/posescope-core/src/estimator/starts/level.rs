@@ -8,20 +8,20 @@ use crate::problem::Problem;
 use crate::render::{Objective, Score};
 
 /// A cost at one size of the photos.
-pub(in crate::estimator) struct Level<'a> {
-    pub(super) objective: Box<dyn Objective + 'a>,
+pub(in crate::estimator) struct Level<O> {
+    pub(in crate::estimator) objective: O,
     /// Of the reference pose.
-    pub(super) initial: Score,
+    pub(in crate::estimator) initial: Score,
     /// Pixels that a pose must cover to be eligible.
-    pub(super) least_covered: u32,
+    pub(in crate::estimator) least_covered: u32,
 }
 
 impl ManyStarts {
     /// The level of a cost.
-    pub(in crate::estimator) fn level<'a>(&self, objective: impl Objective + 'a) -> Level<'a> {
+    pub(in crate::estimator) fn level<O: Objective>(&self, objective: O) -> Level<O> {
         let initial = objective.score(&[Pose::identity()])[0];
         let least_covered = least_covered(self.grid.coverage_floor, initial.covered);
-        Level { objective: Box::new(objective), initial, least_covered }
+        Level { objective, initial, least_covered }
     }
 
     /// Refines a pose (`reference_from_camera`) in all six freedoms, as the search does with its best
@@ -32,7 +32,7 @@ impl ManyStarts {
     pub(in crate::estimator) fn refined<E>(
         &self,
         problem: &Problem,
-        level: &Level<'_>,
+        level: &Level<impl Objective>,
         pose: Pose,
         checkpoint: impl FnMut() -> Result<(), E>,
     ) -> Result<Option<Refined>, E> {
@@ -46,7 +46,7 @@ impl ManyStarts {
     }
 }
 
-impl Level<'_> {
+impl<O: Objective> Level<O> {
     fn costs(&self, poses: &[Pose]) -> Vec<Option<f64>> {
         let scores = self.objective.score(poses).into_iter();
         scores.map(|score| score.eligible_cost(self.least_covered)).collect()
