@@ -6,18 +6,16 @@
 //! the answer. That features agree beyond chance earns their pose a small credit; that they do not costs
 //! it nothing. An unlikely pose gets the penalty of `mi6`.
 
-mod params;
-
 use std::sync::Arc;
 
-pub use params::RobustParams;
-
+use super::feature::Proposal;
 use super::mi6::{self, JUDGED, shown};
 use super::starts::Found;
 use super::{
     CostSummary, Entry, Estimator, Failure, Family, FeatureBased, Halt, Outcome, SixFreedoms, fb2,
     separate_failure,
 };
+use crate::describe::parameters;
 use crate::event::{BranchTaken, CandidatesJudged, JudgedPose, Stage};
 use crate::geometry::Pose;
 use crate::judge::Refined;
@@ -26,6 +24,21 @@ use crate::params::Params;
 use crate::problem::Problem;
 use crate::render::{Comparison, leave_out};
 use crate::trace::{Cancelled, Trace};
+
+parameters! {
+    /// Parameters of the decision between the poses of several methods.
+    #[derive(Clone, Debug, PartialEq)]
+    pub struct RobustParams {
+        /// How far below the costs of the coarse positions the answer's cost must be, in robust standard
+        /// deviations of those costs; 0 answers always, as the direct methods do.
+        pub deviations: f64 = 0.0 => number("deviations", "", 0.0..=100.0),
+        /// What the pose of features that agree beyond chance is worth, in the same standard deviations:
+        /// it is taken where it costs at most so much more than the search's.
+        pub credit: f64 = 3.0 => number("credit", "", 0.0..=100.0),
+        /// The least probability of being within 1 m with which the answer is accepted; 0 answers always.
+        pub least_probability: f64 = 0.0 => number("least_probability", "", 0.0..=1.0),
+    }
+}
 
 /// The method.
 const METHOD: Method = Method::named("robust");
@@ -49,14 +62,6 @@ pub struct Robust {
     params: RobustParams,
 }
 
-/// A consensus of features, accepted by its method or not.
-struct Proposed {
-    method: Method,
-    /// `reference_from_query`.
-    agreed: Pose,
-    accepted: bool,
-}
-
 impl Robust {
     /// The estimator with these parameters.
     pub fn new(params: &Params) -> Self {
@@ -71,7 +76,7 @@ impl Robust {
     fn decide(
         &self,
         problem: &Problem,
-        proposed: &[Proposed],
+        proposals: &[(Method, Proposal)],
         trace: &mut Trace<'_>,
     ) -> Result<(Pose, Option<CostSummary>), Halt> {
         let level = self.six.level(problem, 1);
@@ -81,7 +86,7 @@ impl Robust {
         trace.stage(Stage::Judge, |trace| {
             let Found { refined, summary, spread } = match found {
                 Ok(found) => found,
-                Err(failure) => return unjudged(problem, proposed, failure, trace),
+                Err(failure) => return unjudged(problem, proposals, failure, trace),
             };
             let mut candidates: Vec<JudgedPose> = refined
                 .iter()
@@ -92,16 +97,12 @@ impl Robust {
                     accepted: true,
                 })
                 .collect();
-            for proposed in proposed {
-                let pose = proposed.agreed;
+            for &(method, Proposal { ref outcome, consensus }) in proposals {
+                let Some(pose) = consensus else { continue };
                 let checkpoint = || trace.checkpoint();
                 if let Some(refined) = self.six.starts.refined(problem, &level, pose, checkpoint)? {
-                    candidates.push(JudgedPose {
-                        method: proposed.method,
-                        refined,
-                        from_features: true,
-                        accepted: proposed.accepted,
-                    });
+                    let accepted = outcome.pose.is_ok();
+                    candidates.push(JudgedPose { method, refined, from_features: true, accepted });
                 }
             }
             // The features' poses come last and the sort is stable: of equally cheap ones the search's
@@ -141,20 +142,19 @@ impl Robust {
 /// Where nothing can be searched, the features' accepted pose stands as it is.
 fn unjudged(
     problem: &Problem,
-    proposed: &[Proposed],
+    proposals: &[(Method, Proposal)],
     failure: Failure,
     trace: &mut Trace<'_>,
 ) -> Result<(Pose, Option<CostSummary>), Halt> {
     // The last is that of the better features.
-    let Some(accepted) = proposed.iter().rev().find(|proposed| proposed.accepted) else {
+    let mut accepted = proposals.iter().rev().filter(|(_, proposal)| proposal.outcome.pose.is_ok());
+    let found = accepted.find_map(|(method, proposal)| Some((*method, proposal.consensus?)));
+    let Some((method, agreed)) = found else {
         return Err(Halt::from(failure));
     };
-    trace.emit(|| BranchTaken {
-        method: accepted.method,
-        why: format!("there is no search to compare with: {failure}"),
-    })?;
-    let pose = problem.world_from_query(&accepted.agreed);
-    Ok((pose, None))
+    let why = format!("there is no search to compare with: {failure}");
+    trace.emit(|| BranchTaken { method, why })?;
+    Ok((problem.world_from_query(&agreed), None))
 }
 
 /// Why the first candidate is the answer.
@@ -183,27 +183,16 @@ impl Estimator for Robust {
     fn estimate(&self, problem: &Problem, trace: &mut Trace<'_>) -> Result<Outcome, Cancelled> {
         leave_out(METHOD, JUDGED);
         trace.stage(Stage::Estimator(METHOD), |trace| {
-            let proposal = self.feature.propose(problem, trace)?;
-            let guided = self.guided.propose(problem, trace)?;
-            let proposed: Vec<Proposed> = [
-                (Method::FB, proposal.consensus, &proposal.outcome),
-                (fb2::METHOD, guided.consensus, &guided.outcome),
-            ]
-            .into_iter()
-            .filter_map(|(method, agreed, outcome)| {
-                Some(Proposed { method, agreed: agreed?, accepted: outcome.pose.is_ok() })
+            let proposals = [
+                (Method::FB, self.feature.propose(problem, trace)?),
+                (fb2::METHOD, self.guided.propose(problem, trace)?),
+            ];
+            let decided = separate_failure(self.decide(problem, &proposals, trace))?;
+            let [(_, Proposal { outcome, .. }), _] = proposals;
+            Ok(match decided {
+                Ok((pose, cost)) => Outcome { pose: Ok(pose), cost, ..outcome },
+                Err(failure) => Outcome { counts: outcome.counts, ..Outcome::failed(failure) },
             })
-            .collect();
-            let decided = self.decide(problem, &proposed, trace);
-            let outcome = match separate_failure(decided)? {
-                Ok((pose, summary)) => {
-                    Outcome { pose: Ok(pose), cost: summary, ..proposal.outcome }
-                }
-                Err(failure) => {
-                    Outcome { counts: proposal.outcome.counts, ..Outcome::failed(failure) }
-                }
-            };
-            Ok(outcome)
         })
     }
 
