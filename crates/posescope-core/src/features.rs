@@ -80,17 +80,22 @@ impl Keypoint {
 /// 4 × 4 sub-regions times Σdx, Σ|dx|, Σdy, Σ|dy|, with unit Euclidean norm (section 4.2).
 pub type Descriptor = [f32; 64];
 
-/// The features of one image, the strongest first.
+/// The features of one image, the strongest first, with descriptors of `N` numbers.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Features {
+pub struct Features<const N: usize = 64> {
     /// Where the features are.
     pub keypoints: Vec<Keypoint>,
     /// What they look like: `descriptors[i]` belongs to `keypoints[i]`. Empty for features whose
     /// descriptors are of another kind.
-    pub descriptors: Vec<Descriptor>,
+    pub descriptors: Vec<[f32; N]>,
 }
 
-impl Features {
+impl<const N: usize> Features<N> {
+    /// Memory that they take \[bytes\].
+    pub(crate) fn heap_bytes(&self) -> usize {
+        size_of_val(self.keypoints.as_slice()) + size_of_val(self.descriptors.as_slice())
+    }
+
     /// The `count` strongest, as [`SurfParams::max_keypoints`] keeps them.
     #[must_use]
     pub fn strongest(&self, count: usize) -> Self {

@@ -11,7 +11,7 @@ use std::convert::Infallible;
 use image::{GrayImage, Luma};
 use rayon::prelude::*;
 
-use super::Keypoint;
+use super::{Features, Keypoint};
 use crate::describe::parameters;
 use crate::image::FloatImage;
 use octave::{BASE_SIGMA, Extremum, Octave, blurred, halved};
@@ -40,21 +40,8 @@ parameters! {
 /// another is the Hellinger kernel of the two.
 pub type SiftDescriptor = [f32; 128];
 
-/// The SIFT features of one image, the strongest first.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct SiftFeatures {
-    /// Where the features are; their response is the magnitude of the difference of Gaussians.
-    pub keypoints: Vec<Keypoint>,
-    /// What they look like: `descriptors[i]` belongs to `keypoints[i]`.
-    pub descriptors: Vec<SiftDescriptor>,
-}
-
-impl SiftFeatures {
-    /// Memory that they take \[bytes\].
-    pub(crate) fn heap_bytes(&self) -> usize {
-        size_of_val(self.keypoints.as_slice()) + size_of_val(self.descriptors.as_slice())
-    }
-}
+/// The SIFT features of one image; their response is the magnitude of the difference of Gaussians.
+pub type SiftFeatures = Features<128>;
 
 /// Smoothing that photos have by themselves \[px\].
 const CAMERA_SIGMA: f64 = 0.5;
@@ -104,14 +91,13 @@ pub fn sift_interruptible<E>(
     let mut features = SiftFeatures::default();
     for some in found.chunks(KEYPOINTS_AT_A_TIME) {
         checkpoint()?;
-        let described: Vec<Vec<(Keypoint, SiftDescriptor)>> = some
+        let described: Vec<(Keypoint, SiftDescriptor)> = some
             .par_iter()
-            .map(|(number, extremum)| octaves[*number].described(extremum, params))
+            .flat_map_iter(|(number, extremum)| octaves[*number].described(extremum, params))
             .collect();
-        for (keypoint, descriptor) in described.into_iter().flatten() {
-            features.keypoints.push(keypoint);
-            features.descriptors.push(descriptor);
-        }
+        let (keypoints, descriptors): (Vec<_>, Vec<_>) = described.into_iter().unzip();
+        features.keypoints.extend(keypoints);
+        features.descriptors.extend(descriptors);
     }
     Ok(features)
 }

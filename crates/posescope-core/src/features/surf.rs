@@ -86,10 +86,7 @@ pub(crate) fn kept_surf<E>(
     params: &SurfParams,
     checkpoint: impl FnMut() -> Result<(), E>,
 ) -> Result<Recalled<Features>, E> {
-    let bytes = |features: &Features| {
-        size_of_val(features.keypoints.as_slice()) + size_of_val(features.descriptors.as_slice())
-    };
-    memo.try_recall(params, bytes, || surf_interruptible(image, params, checkpoint))
+    memo.try_recall(params, Features::heap_bytes, || surf_interruptible(image, params, checkpoint))
 }
 
 fn strongest_first(a: &Keypoint, b: &Keypoint) -> std::cmp::Ordering {
