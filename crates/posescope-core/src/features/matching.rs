@@ -47,50 +47,28 @@ pub fn best_matches<const N: usize, E>(
     mut checkpoint: impl FnMut() -> Result<(), E>,
 ) -> Result<Vec<Option<Match>>, E> {
     let forward = nearest_neighbours_interruptible(query, reference, &mut checkpoint)?;
-    let distinct = forward.iter().flatten().filter(|found| is_distinct(found, max_ratio));
+    let is_distinct = |found: &Neighbours| found.ratio() < max_ratio;
+    let distinct = forward.iter().flatten().filter(|found| is_distinct(found));
     let mut chosen: Vec<usize> = distinct.map(|found| found.nearest).collect();
     chosen.sort_unstable();
     chosen.dedup();
     let of_chosen: Vec<[f32; N]> = chosen.iter().map(|&chosen| reference[chosen]).collect();
     let backward = nearest_neighbours_interruptible(&of_chosen, query, checkpoint)?;
-    Ok(judge(&forward, max_ratio, |reference| {
-        let place = chosen.binary_search(&reference);
-        let neighbours = backward[place.expect("a distinct match chose it")];
-        neighbours.expect("there is a query").nearest
-    }))
-}
-
-fn is_distinct(neighbours: &Neighbours, max_ratio: f32) -> bool {
-    neighbours.ratio() < max_ratio
-}
-
-/// Judges matches; `nearest_query` says which query descriptor is nearest to a reference descriptor, and
-/// is asked of those that distinct matches chose.
-fn judge(
-    forward: &[Option<Neighbours>],
-    max_ratio: f32,
-    nearest_query: impl Fn(usize) -> usize,
-) -> Vec<Option<Match>> {
-    let judge = |(query, neighbours): (usize, &Option<Neighbours>)| {
-        let neighbours = (*neighbours)?;
-        let reference = neighbours.nearest;
-        let verdict = if !is_distinct(&neighbours, max_ratio) {
-            MatchVerdict::Ambiguous
-        } else {
-            match nearest_query(reference) {
+    let judge = |(query, found): (usize, &Option<Neighbours>)| {
+        let found = (*found)?;
+        let Neighbours { nearest: reference, distance, .. } = found;
+        let verdict = if is_distinct(&found) {
+            let place = chosen.binary_search(&reference).expect("a distinct match chose it");
+            match backward[place].expect("there is a query").nearest {
                 rival if rival != query => MatchVerdict::NotUnique { rival },
                 _ => MatchVerdict::Candidate,
             }
+        } else {
+            MatchVerdict::Ambiguous
         };
-        Some(Match {
-            query,
-            reference,
-            distance: neighbours.distance,
-            ratio: neighbours.ratio(),
-            verdict,
-        })
+        Some(Match { query, reference, distance, ratio: found.ratio(), verdict })
     };
-    forward.iter().enumerate().map(judge).collect()
+    Ok(forward.iter().enumerate().map(judge).collect())
 }
 
 #[cfg(test)]
@@ -110,11 +88,19 @@ mod tests {
     fn both_ways(query: &[Descriptor], reference: &[Descriptor]) -> Vec<Option<Match>> {
         let forward = nearest_neighbours(query, reference);
         let backward = nearest_neighbours(reference, query);
-        let nearest_query = |reference: usize| backward[reference].expect("queries").nearest;
-        let matches = judge(&forward, 0.8, nearest_query);
         let Ok(found) = best_matches(query, reference, 0.8, || Ok::<_, Infallible>(()));
-        assert_eq!(found, matches);
-        matches
+        for (query, (found, forward)) in found.iter().zip(&forward).enumerate() {
+            assert_eq!(found.map(|found| found.reference), forward.map(|one| one.nearest));
+            let Some(found) = found else { continue };
+            let nearest = backward[found.reference].expect("queries").nearest;
+            let verdict = match found.ratio < 0.8 {
+                true if nearest == query => MatchVerdict::Candidate,
+                true => MatchVerdict::NotUnique { rival: nearest },
+                false => MatchVerdict::Ambiguous,
+            };
+            assert_eq!((found.query, found.verdict), (query, verdict));
+        }
+        found
     }
 
     #[test]

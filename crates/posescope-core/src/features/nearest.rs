@@ -23,9 +23,6 @@ const QUERY_BLOCK: usize = QUERIES * GROUPS;
 /// with 2,000, which takes about as long as describing them.
 const PAIRS_AT_A_TIME: usize = 1 << 22;
 
-/// Candidates after which those are let go that have become too far away.
-const MANY_CANDIDATES: usize = 32;
-
 /// The two descriptors of a reference set that are nearest to a query descriptor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Neighbours {
@@ -209,8 +206,6 @@ struct Near {
     floor: f32,
     /// Scores and indices, in the order of the indices; some were left behind by the floor.
     candidates: Vec<(f32, usize)>,
-    /// So many candidates are looked through for such.
-    many: usize,
 }
 
 impl Near {
@@ -220,7 +215,6 @@ impl Near {
             margin,
             floor: f32::NEG_INFINITY,
             candidates: Vec::new(),
-            many: MANY_CANDIDATES,
         }
     }
 
@@ -233,10 +227,6 @@ impl Near {
                 self.floor = self.largest[1] - self.margin;
                 self.candidates.push((score, index));
             }
-        }
-        if self.candidates.len() > self.many {
-            self.candidates.retain(|(score, _)| *score >= self.floor);
-            self.many = MANY_CANDIDATES.max(2 * self.candidates.len());
         }
     }
 
