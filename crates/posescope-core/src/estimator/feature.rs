@@ -157,7 +157,7 @@ impl FeatureBased {
             trace.emit(|| MatchesDecided { decisions: Arc::clone(&decisions) })?;
             Ok::<_, Halt>(states.after_matching(&decisions))
         })?;
-        counts.ratio_passed = states.passed_ratio_test();
+        counts.ratio_passed = states.counts(0).ratio_passed;
         counts.unique = matches.len();
         if matches.len() < MINIMUM {
             return Err(Halt::from(Failure::TooFewMatches {

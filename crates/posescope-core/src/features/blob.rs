@@ -7,47 +7,36 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::Keypoint;
 use super::hessian::BoxFilter;
-use super::integral::IntegralImage;
+use super::octave::Octave;
 use super::responses::Responses;
 
 /// Three layers with filters of successive sizes, the middle one searched for maxima.
 pub(super) struct Neighbourhood<'a> {
+    pub(super) octave: &'a Octave<'a>,
     pub(super) filters: &'a [BoxFilter; 3],
     pub(super) responses: &'a Responses,
     /// The place of the first filter among the responses.
     pub(super) below: usize,
-    /// Distance between samples \[px\].
-    pub(super) step: usize,
-    /// Distance to which a maximum exceeds all other responses of its filter, and between those through which
-    /// its peak is interpolated \[samples\].
-    pub(super) reach: usize,
-    /// What a maximum exceeds.
-    pub(super) threshold: f32,
 }
 
 impl Neighbourhood<'_> {
     /// The samples along `extent` pixels that have all neighbours: where the largest filter still fits.
     pub(super) fn inside(&self, extent: usize) -> Range<usize> {
+        let &Octave { step, reach, .. } = self.octave;
         let margin = self.filters[2].margin();
-        let last = extent.saturating_sub(margin + 1) / self.step;
-        margin.div_ceil(self.step) + self.reach..(last + 1).saturating_sub(self.reach)
+        let last = extent.saturating_sub(margin + 1) / step;
+        margin.div_ceil(step) + reach..(last + 1).saturating_sub(reach)
     }
 
     /// Finds the maxima along a row of samples that is [`Self::inside`].
-    pub(super) fn find(
-        &self,
-        integral: &IntegralImage,
-        row: usize,
-        peaks: &mut Vec<bool>,
-        found: &mut Vec<Keypoint>,
-    ) {
+    pub(super) fn find(&self, row: usize, peaks: &mut Vec<bool>, found: &mut Vec<Keypoint>) {
         let rows = [row - 1, row, row + 1].map(|row| self.layer(1, row));
-        dispatch!(Level::new(), _simd => mark_peaks(rows, self.threshold, peaks));
+        dispatch!(Level::new(), _simd => mark_peaks(rows, self.octave.threshold, peaks));
         let maxima = self
-            .inside(integral.width())
+            .inside(self.octave.integral.width)
             .filter(|&column| peaks[column])
             .filter(|&column| self.is_maximum(column, row))
-            .filter_map(|column| self.localise(integral, column, row));
+            .filter_map(|column| self.localise(column, row));
         found.extend(maxima);
     }
 
@@ -60,7 +49,7 @@ impl Neighbourhood<'_> {
     /// counts.
     fn is_maximum(&self, column: usize, row: usize) -> bool {
         let value = self.layer(1, row)[column];
-        for (index, radius) in [1, self.reach, 1].into_iter().enumerate() {
+        for (index, radius) in [1, self.octave.reach, 1].into_iter().enumerate() {
             for y in row - radius..=row + radius {
                 let around = column - radius..=column + radius;
                 let samples = &self.layer(index, y)[around.clone()];
@@ -78,8 +67,10 @@ impl Neighbourhood<'_> {
     /// Moves a maximum to the peak of the quadratic through the samples around it in position and
     /// scale (Brown and Lowe, BMVC 2002, equations 2 and 3). None where the peak is further
     /// away than those samples are, and so not supported by any.
-    fn localise(&self, integral: &IntegralImage, column: usize, row: usize) -> Option<Keypoint> {
-        let reach = self.reach as isize;
+    fn localise(&self, column: usize, row: usize) -> Option<Keypoint> {
+        let &Octave { integral, step, reach, .. } = self.octave;
+        let spacing = (reach * step) as f32;
+        let reach = reach as isize;
         let value = |dx: isize, dy: isize, ds: isize| {
             let x = column.wrapping_add_signed(dx * reach);
             let y = row.wrapping_add_signed(dy * reach);
@@ -109,8 +100,7 @@ impl Neighbourhood<'_> {
             return None;
         }
         let [below, filter, _] = self.filters;
-        let (x, y) = (column * self.step, row * self.step);
-        let spacing = (self.reach * self.step) as f32;
+        let (x, y) = (column * step, row * step);
         let scale = filter.scale();
         Some(Keypoint {
             x: x as f32 + spacing * offset.x,

@@ -147,7 +147,7 @@ fn boxes(
     keypoint: &Keypoint,
     strips: &mut Strips,
 ) -> [[f32; BOXES]; BOXES] {
-    let (width, height) = (integral.width(), integral.height());
+    let (width, height) = (integral.width, integral.height);
     let side = BOX_SIDE * keypoint.scale;
     let middle = 0.5 * SIDE as f32;
     // Plain loops: the closures of `map` would not be compiled for wide vectors.

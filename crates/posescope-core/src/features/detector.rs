@@ -26,7 +26,7 @@ pub(super) fn detect<E>(
     params: &SurfParams,
     checkpoint: &mut impl FnMut() -> Result<(), E>,
 ) -> Result<Vec<Keypoint>, E> {
-    let extent = integral.width().min(integral.height());
+    let extent = integral.width.min(integral.height);
     let initial_step = params.initial_step.max(1);
     let mut keypoints = Vec::new();
     let mut known = Known::default();

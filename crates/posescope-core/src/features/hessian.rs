@@ -22,8 +22,8 @@ const MIXED_WEIGHT: f32 = 0.96;
 /// to 0.65.
 #[derive(Clone, Copy)]
 pub(super) struct BoxFilter {
-    /// Width of a lobe, odd.
-    lobe: usize,
+    /// Width of a lobe, odd, a third of the filter's size \[px\].
+    pub(super) lobe: usize,
     /// Length of the lobes of Dxx and Dyy on either side of the central pixel.
     half_length: usize,
     /// Width of the gap between the lobes of Dxy on either side of the central pixel.
@@ -38,11 +38,6 @@ impl BoxFilter {
             half_length: 5 * lobe / 6,
             half_gap: lobe / 6,
         }
-    }
-
-    /// Width of a lobe \[px\], a third of the filter's size.
-    pub(super) fn lobe(&self) -> usize {
-        self.lobe
     }
 
     /// Distance from the central pixel to the filter's edge pixels \[px\].
@@ -78,21 +73,21 @@ impl BoxFilter {
         samples: &mut [f32],
     ) {
         let margin = self.margin();
-        let count = integral.width().saturating_sub(2 * margin);
-        let rows = margin..integral.height().saturating_sub(margin);
+        let count = integral.width.saturating_sub(2 * margin);
+        let rows = margin..integral.height.saturating_sub(margin);
         samples.fill(0.0);
         if count == 0 || !rows.contains(&y) {
             return;
         }
-        let Room { level, sums, dense } = room;
+        let (level, Room { sums, dense }) = (Level::new(), room);
         if step == 1 {
             let inside = &mut samples[margin..][..count];
-            dispatch!(*level, _simd => self.determinants(integral, y, sums, inside));
+            dispatch!(level, _simd => self.determinants(integral, y, sums, inside));
             return;
         }
         // Every pixel of the row, even if few are kept: vectors make up for it.
         dense.resize(count, 0.0);
-        dispatch!(*level, _simd => self.determinants(integral, y, sums, dense));
+        dispatch!(level, _simd => self.determinants(integral, y, sums, dense));
         let first = margin.next_multiple_of(step);
         let kept = dense.iter().skip(first - margin).step_by(step);
         for (sample, &determinant) in samples[first / step..].iter_mut().zip(kept) {
@@ -156,18 +151,12 @@ impl BoxFilter {
 }
 
 /// What a row of responses takes, kept from row to row for its memory.
+#[derive(Default)]
 pub(super) struct Room {
-    level: Level,
     /// Box sums of each pixel.
     sums: [Vec<i32>; 3],
     /// The responses at every pixel where fewer are kept.
     dense: Vec<f32>,
-}
-
-impl Default for Room {
-    fn default() -> Self {
-        Self { level: Level::new(), sums: Default::default(), dense: Vec::new() }
-    }
 }
 
 /// Sums over three boxes side by side, weighted 1, −2, 1: the four edges of the boxes in two rows
@@ -229,7 +218,7 @@ mod tests {
     }
 
     fn row(integral: &IntegralImage, filter: BoxFilter, y: usize, step: usize) -> Vec<f32> {
-        let mut samples = vec![f32::NAN; integral.width().div_ceil(step)];
+        let mut samples = vec![f32::NAN; integral.width.div_ceil(step)];
         filter.respond(integral, y, step, &mut Room::default(), &mut samples);
         samples
     }

@@ -13,8 +13,10 @@ const MIN_BAND: usize = 64;
 /// more than 16.8 million white pixels, and box sums still come out right, because no box is
 /// that large.
 pub(super) struct IntegralImage {
-    width: usize,
-    height: usize,
+    /// Width of the image \[px\].
+    pub(super) width: usize,
+    /// Height of the image \[px\].
+    pub(super) height: usize,
     sums: Vec<u32>,
 }
 
@@ -45,16 +47,6 @@ impl IntegralImage {
         Self { width, height, sums }
     }
 
-    /// Width of the image \[px\].
-    pub(super) fn width(&self) -> usize {
-        self.width
-    }
-
-    /// Height of the image \[px\].
-    pub(super) fn height(&self) -> usize {
-        self.height
-    }
-
     /// Row `y` of the table, `width + 1` sums, for `y` from 0 to `height`.
     #[inline(always)]
     pub(super) fn row(&self, y: usize) -> &[u32] {
@@ -80,10 +72,13 @@ impl IntegralImage {
         let upper_inner = self.corners(columns, rows.first + 1);
         let lower_inner = self.corners(columns, rows.last);
         let lower = self.corners(columns, rows.last + 1);
-        let head = cells(upper, upper_inner);
-        let body = cells(upper_inner, lower_inner);
-        let tail = cells(lower_inner, lower);
-        let column = |i: usize| rows.head * head[i] + body[i] + rows.tail * tail[i];
+        let column = |i: usize| {
+            let strip = |row: [u32; 4]| row[i + 1].wrapping_sub(row[i]);
+            // As signed numbers: within a single pixel, the box between the cut pixels is −1 pixel wide.
+            let cell = |above, below| strip(below).wrapping_sub(strip(above)) as i32 as f32;
+            let (head, body) = (cell(upper, upper_inner), cell(upper_inner, lower_inner));
+            rows.head * head + body + rows.tail * cell(lower_inner, lower)
+        };
         columns.head * column(0) + column(1) + columns.tail * column(2)
     }
 
@@ -117,23 +112,6 @@ fn add(row: &mut [u32], other: &[u32]) {
     for (sum, other) in row.iter_mut().zip(other) {
         *sum = sum.wrapping_add(*other);
     }
-}
-
-/// Sums over the three boxes between two rows of four corners each.
-#[inline(always)]
-fn cells(above: [u32; 4], below: [u32; 4]) -> [f32; 3] {
-    let strip = [
-        below[0].wrapping_sub(above[0]),
-        below[1].wrapping_sub(above[1]),
-        below[2].wrapping_sub(above[2]),
-        below[3].wrapping_sub(above[3]),
-    ];
-    // As signed numbers: within a single pixel, the box between the cut pixels is −1 pixel wide.
-    [
-        strip[1].wrapping_sub(strip[0]) as i32 as f32,
-        strip[2].wrapping_sub(strip[1]) as i32 as f32,
-        strip[3].wrapping_sub(strip[2]) as i32 as f32,
-    ]
 }
 
 /// The extent of a box along one axis: a cut pixel, whole pixels, another cut pixel.

@@ -24,7 +24,8 @@ pub(super) struct Octave<'a> {
     pub(super) filters: Vec<BoxFilter>,
     /// Distance between samples \[px\].
     pub(super) step: usize,
-    /// That of a [`Neighbourhood`].
+    /// Distance to which a maximum exceeds all other responses of its filter, and between those through which
+    /// its peak is interpolated \[samples\].
     pub(super) reach: usize,
     /// What a blob's response exceeds.
     pub(super) threshold: f32,
@@ -49,10 +50,10 @@ struct BandRoom {
 impl Octave<'_> {
     /// Finds the blobs, and keeps the responses of those filters that the next octave has too, by their lobes.
     pub(super) fn search(&self, next: &[usize]) -> (Vec<Keypoint>, Known) {
-        let columns = self.integral.width().div_ceil(self.step);
-        let rows = self.integral.height().div_ceil(self.step);
+        let columns = self.integral.width.div_ceil(self.step);
+        let rows = self.integral.height.div_ceil(self.step);
         let layers = 0..self.filters.len();
-        let shared = layers.filter(|&layer| next.contains(&self.filters[layer].lobe()));
+        let shared = layers.filter(|&layer| next.contains(&self.filters[layer].lobe));
         let shared: Vec<usize> = shared.collect();
         let half = columns.div_ceil(2);
         let mut kept = Responses::new(shared.len(), half, rows.div_ceil(2));
@@ -80,7 +81,7 @@ impl Octave<'_> {
             })
         });
         let found = found.flatten_iter().collect();
-        let lobes = shared.iter().map(|&layer| self.filters[layer].lobe());
+        let lobes = shared.iter().map(|&layer| self.filters[layer].lobe);
         let known = Known { lobes: lobes.collect(), responses: kept };
         (found, known)
     }
@@ -92,7 +93,7 @@ impl Octave<'_> {
         room: &mut BandRoom,
         mut keep: impl FnMut(usize, &Responses),
     ) -> Vec<Keypoint> {
-        let rows = self.integral.height().div_ceil(self.step);
+        let rows = self.integral.height.div_ceil(self.step);
         let mut found = Vec::new();
         for row in band.start.saturating_sub(self.reach)..(band.end + self.reach).min(rows) {
             self.respond(row, room);
@@ -112,7 +113,7 @@ impl Octave<'_> {
     fn respond(&self, row: usize, room: &mut BandRoom) {
         for (layer, filter) in self.filters.iter().enumerate() {
             let samples = room.responses.row_mut(layer, row);
-            let known = self.known.lobes.iter().position(|&lobe| lobe == filter.lobe());
+            let known = self.known.lobes.iter().position(|&lobe| lobe == filter.lobe);
             match known {
                 Some(known) => samples.copy_from_slice(self.known.responses.row(known, row)),
                 None => {
@@ -126,16 +127,10 @@ impl Octave<'_> {
     /// Finds the blobs in one row of samples, filter by filter.
     fn find(&self, row: usize, room: &mut BandRoom, found: &mut Vec<Keypoint>) {
         for (below, filters) in self.filters.array_windows().enumerate() {
-            let neighbourhood = Neighbourhood {
-                filters,
-                responses: &room.responses,
-                below,
-                step: self.step,
-                reach: self.reach,
-                threshold: self.threshold,
-            };
-            if neighbourhood.inside(self.integral.height()).contains(&row) {
-                neighbourhood.find(self.integral, row, &mut room.peaks, found);
+            let responses = &room.responses;
+            let neighbourhood = Neighbourhood { octave: self, filters, responses, below };
+            if neighbourhood.inside(self.integral.height).contains(&row) {
+                neighbourhood.find(row, &mut room.peaks, found);
             }
         }
     }

@@ -189,8 +189,8 @@ fn corner_sums(integral: &IntegralImage, keypoint: &Keypoint, strips: &mut Strip
         }
         Spans::new(&centres, scale, extent)
     };
-    let columns = spans(keypoint.x, integral.width());
-    let rows = spans(keypoint.y, integral.height());
+    let columns = spans(keypoint.x, integral.width);
+    let rows = spans(keypoint.y, integral.height);
     let cells = aligned(integral, &columns, &rows, strips);
     let mut sums = [[0.0; CELLS + 1]; CELLS + 1];
     for (y, cells) in cells.iter().enumerate() {

@@ -2,13 +2,11 @@
 
 use std::sync::Arc;
 
-use nalgebra::Point2;
-
 use super::{DepthRule, FeatureBased, FeatureParams};
 use crate::cloud::Cloud;
 use crate::depth::{DepthReading, LiftedMatch, ProjectedCloudIndex};
 use crate::event::ProjectedCloud;
-use crate::features::{Features, Keypoint};
+use crate::features::Features;
 use crate::problem::ReferenceTuple;
 use crate::render::RenderParams;
 use crate::trace::{Cancelled, Trace};
@@ -33,10 +31,7 @@ impl FeatureBased {
             trace.checkpoint()?;
             lifted.extend(matches.iter().map(|&(query, number)| match &all {
                 Some(all) => LiftedMatch { query, ..all[number] },
-                None => {
-                    let pixel = reference.keypoints[number].pixel();
-                    LiftedMatch { query, ..self.lifted_at(number, &pixel, &cloud, tuple) }
-                }
+                None => LiftedMatch { query, ..self.lifted_at(number, reference, &cloud, tuple) },
             }));
         }
         Ok(lifted.into())
@@ -53,29 +48,27 @@ impl FeatureBased {
         let depth = (visible, &self.render, depth_radius_px, depth, depth_spread);
         let lifted = tuple.memo.recall((&self.detector, depth), bytes, || {
             let cloud = projected_cloud(tuple, visible.then_some(&self.render));
-            let keypoints = reference.keypoints.iter().enumerate();
-            let lift = |(number, keypoint): (usize, &Keypoint)| {
-                self.lifted_at(number, &keypoint.pixel(), &cloud, tuple)
-            };
-            keypoints.map(lift).collect()
+            let lift = |number| self.lifted_at(number, reference, &cloud, tuple);
+            (0..reference.keypoints.len()).map(lift).collect()
         });
         lifted.value
     }
 
     fn lifted_at(
         &self,
-        reference: usize,
-        pixel: &Point2<f64>,
+        number: usize,
+        reference: &Features,
         cloud: &ProjectedCloudIndex,
         tuple: &ReferenceTuple,
     ) -> LiftedMatch {
-        let reading = cloud.read(pixel, self.params.depth_radius_px);
+        let pixel = reference.keypoints[number].pixel();
+        let reading = cloud.read(&pixel, self.params.depth_radius_px);
         LiftedMatch {
             query: 0,
-            reference,
+            reference: number,
             lidar_distance_px: reading.distance_px,
             depth_range_m: reading.within.map(|depths| (depths.least, depths.greatest)),
-            point: self.depth(&reading).map(|z| tuple.intrinsics.unproject(pixel, z)),
+            point: self.depth(&reading).map(|z| tuple.intrinsics.unproject(&pixel, z)),
         }
     }
 

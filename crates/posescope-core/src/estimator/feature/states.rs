@@ -39,10 +39,6 @@ impl FeatureStates {
         matches
     }
 
-    pub(in crate::estimator) fn passed_ratio_test(&self) -> usize {
-        self.states.iter().filter(|state| state.index() > 0).count()
-    }
-
     pub(in crate::estimator) fn after_depth_lift(&mut self, lifted: &[LiftedMatch]) {
         for lifted in lifted.iter().filter(|lifted| lifted.point.is_none()) {
             self.states[lifted.query] =

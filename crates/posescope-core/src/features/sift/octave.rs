@@ -146,31 +146,23 @@ impl Octave {
     ) -> Option<Extremum> {
         let (width, height) = self.differences[0].dimensions();
         for _ in 0..MAX_STEPS {
-            let here = self.at(level, x, y);
+            let value = |dx: i32, dy: i32, ds: isize| {
+                let (x, y) = (x.wrapping_add_signed(dx), y.wrapping_add_signed(dy));
+                self.at(level.wrapping_add_signed(ds), x, y)
+            };
+            let here = value(0, 0, 0);
             let gradient = 0.5
                 * Vector3::new(
-                    self.at(level, x + 1, y) - self.at(level, x - 1, y),
-                    self.at(level, x, y + 1) - self.at(level, x, y - 1),
-                    self.at(level + 1, x, y) - self.at(level - 1, x, y),
+                    value(1, 0, 0) - value(-1, 0, 0),
+                    value(0, 1, 0) - value(0, -1, 0),
+                    value(0, 0, 1) - value(0, 0, -1),
                 );
-            let xx = self.at(level, x + 1, y) + self.at(level, x - 1, y) - 2.0 * here;
-            let yy = self.at(level, x, y + 1) + self.at(level, x, y - 1) - 2.0 * here;
-            let ss = self.at(level + 1, x, y) + self.at(level - 1, x, y) - 2.0 * here;
-            let xy = 0.25
-                * (self.at(level, x + 1, y + 1)
-                    - self.at(level, x - 1, y + 1)
-                    - self.at(level, x + 1, y - 1)
-                    + self.at(level, x - 1, y - 1));
-            let xs = 0.25
-                * (self.at(level + 1, x + 1, y)
-                    - self.at(level + 1, x - 1, y)
-                    - self.at(level - 1, x + 1, y)
-                    + self.at(level - 1, x - 1, y));
-            let ys = 0.25
-                * (self.at(level + 1, x, y + 1)
-                    - self.at(level + 1, x, y - 1)
-                    - self.at(level - 1, x, y + 1)
-                    + self.at(level - 1, x, y - 1));
+            let xx = value(1, 0, 0) + value(-1, 0, 0) - 2.0 * here;
+            let yy = value(0, 1, 0) + value(0, -1, 0) - 2.0 * here;
+            let ss = value(0, 0, 1) + value(0, 0, -1) - 2.0 * here;
+            let xy = 0.25 * (value(1, 1, 0) - value(-1, 1, 0) - value(1, -1, 0) + value(-1, -1, 0));
+            let xs = 0.25 * (value(1, 0, 1) - value(-1, 0, 1) - value(1, 0, -1) + value(-1, 0, -1));
+            let ys = 0.25 * (value(0, 1, 1) - value(0, -1, 1) - value(0, 1, -1) + value(0, -1, -1));
             let hessian = Matrix3::new(xx, xy, xs, xy, yy, ys, xs, ys, ss);
             let by = -(hessian.try_inverse()? * gradient);
             if by.amax() < 0.5 {
