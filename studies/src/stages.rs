@@ -133,7 +133,7 @@ fn both_costs<R>(splat_px: usize, measure: impl FnOnce(usize, &mut Work<'_>) -> 
             differences.extend(pairs.iter().map(|pair| pair.0));
             bin_pairs.clear();
             bin_pairs.extend(pairs.iter().map(|pair| pair.1));
-            cost::count_pairs(&bin_pairs, bins, &mut counts);
+            cost::count_pairs(&bin_pairs, |pair| *pair, bins, &mut counts);
             covered += pairs.len();
             let information = cost(&Entropies::of(&counts, bins));
             sum += halves.mean(&differences).unwrap_or_default() + information.unwrap_or_default();

@@ -64,11 +64,11 @@ pub type BinPair = Pair<u8>;
 
 /// The pairs with the synthetic values dealt out anew: what two images give that have nothing to do with
 /// each other, and the same values.
-pub(crate) fn shuffled(pairs: &[IntensityPair], seed: u64) -> Vec<IntensityPair> {
-    let mut values: Vec<f32> = pairs.iter().map(|pair| pair.synthetic).collect();
+pub(crate) fn shuffled<T: Copy>(pairs: &[Pair<T>], seed: u64) -> Vec<Pair<T>> {
+    let mut values: Vec<T> = pairs.iter().map(|pair| pair.synthetic).collect();
     values.shuffle(&mut Pcg64::seed_from_u64(seed));
     let dealt = pairs.iter().zip(values);
-    dealt.map(|(pair, synthetic)| IntensityPair { synthetic, ..*pair }).collect()
+    dealt.map(|(pair, synthetic)| Pair { synthetic, ..*pair }).collect()
 }
 
 /// A robust dissimilarity of two images over the pixels they share.

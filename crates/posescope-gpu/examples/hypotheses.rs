@@ -17,7 +17,7 @@ use posescope_core::cost;
 use posescope_core::geometry::Pose;
 use posescope_core::grid::{GridParams, Lattice, Offset, Phase};
 use posescope_core::params::Params;
-use posescope_core::render::{ColoredCloud, ColoredPoint, Device, Scorer};
+use posescope_core::render::{ColoredCloud, ColoredPoint, Device, Objective as _, Scorer};
 use posescope_core::scene::Scene as _;
 use posescope_gpu::Gpu;
 use posescope_street::Street;
@@ -126,7 +126,7 @@ fn affordable(hypotheses: f64) -> Result<Vec<Pose>, Box<dyn Error>> {
 
 fn per_second(scorer: &Scorer<'_>, poses: &[Pose]) -> f64 {
     let start = Instant::now();
-    for some in poses.chunks(scorer.at_a_time_of(poses.len())) {
+    for some in poses.chunks(scorer.batch(poses.len())) {
         std::hint::black_box(scorer.score(some));
     }
     poses.len() as f64 / start.elapsed().as_secs_f64()

@@ -83,11 +83,8 @@ impl Entropies {
 
     /// NMI in 0 … 1, normalised by the larger entropy; `None` where an image is constant.
     pub fn normalized_mutual_information(&self) -> Option<f64> {
-        let (smaller, larger) = if self.query < self.synthetic {
-            (self.query, self.synthetic)
-        } else {
-            (self.synthetic, self.query)
-        };
+        let smaller = self.query.min(self.synthetic);
+        let larger = self.query.max(self.synthetic);
         (smaller > MIN_ENTROPY).then(|| (self.mutual_information() / larger).clamp(0.0, 1.0))
     }
 
@@ -114,43 +111,46 @@ pub fn byte_bin(value: f32, bins: usize) -> u8 {
     ((value * scale) as u8).min((bins - 1) as u8)
 }
 
-/// Counts the pairs of bins, in the place of what `counts` held: `bins` × `bins`, rows are the query's.
-pub fn count_pairs(pairs: &[BinPair], bins: usize, counts: &mut Vec<u32>) {
+/// Counts pairs by the bins `of` both values, in the place of what `counts` held: `bins` × `bins`, rows are the
+/// query's.
+pub fn count_pairs<P>(pairs: &[P], of: impl Fn(&P) -> BinPair, bins: usize, counts: &mut Vec<u32>) {
     let cells = bins * bins;
     counts.clear();
     counts.resize(cells, 0);
     let level = Level::new();
     match cells {
-        ..=256 => dispatch!(level, _simd => count_apart::<u8, 256>(pairs, bins, counts)),
-        257..=1024 => dispatch!(level, _simd => count_apart::<u16, 1024>(pairs, bins, counts)),
+        ..=256 => dispatch!(level, _simd => count_apart::<_, 256>(pairs, of, bins, counts)),
+        257..=1024 => dispatch!(level, _simd => count_apart::<_, 1024>(pairs, of, bins, counts)),
         // Of large tables, adding up several would take longer than that saves.
         _ => {
-            for pair in pairs {
+            for pair in pairs.iter().map(of) {
                 counts[usize::from(pair.query) * bins + usize::from(pair.synthetic)] += 1;
             }
         }
     }
 }
 
-/// Counts pairs in several tables of `CELLS` cells: neighbours often fall into the same cell, and counted apart, no
-/// count waits for the last one. Cells are numbers of a `Cell`, many of which are made at once.
+/// Counts pairs in several tables of `CELLS` cells, a power of two: neighbours often fall into the same cell, and
+/// counted apart, no count waits for the last one. The numbers of many cells are made at once.
 #[inline(always)]
-fn count_apart<Cell: CellNumber, const CELLS: usize>(
-    pairs: &[BinPair],
+fn count_apart<P, const CELLS: usize>(
+    pairs: &[P],
+    of: impl Fn(&P) -> BinPair,
     bins: usize,
     counts: &mut [u32],
 ) {
     const AT_A_TIME: usize = 512;
     let mut tables = [[0_u32; CELLS]; 4];
-    let mut cells = [Cell::default(); AT_A_TIME];
+    let mut cells = [0_u16; AT_A_TIME];
     for pairs in pairs.chunks(AT_A_TIME) {
         for (cell, pair) in cells.iter_mut().zip(pairs) {
-            *cell = Cell::of(pair, bins);
+            let BinPair { query, synthetic } = of(pair);
+            *cell = u16::from(query).wrapping_mul(bins as u16).wrapping_add(synthetic.into());
         }
         let [a, b, c, d] = &mut tables;
         // A view has no 2³² pixels, and checks would cost a tenth of the time.
-        let put = |table: &mut [u32; CELLS], cell: Cell| {
-            let count = &mut table[cell.into()];
+        let put = |table: &mut [u32; CELLS], cell: u16| {
+            let count = &mut table[usize::from(cell) % CELLS];
             *count = count.wrapping_add(1);
         };
         let (fours, rest) = cells[..pairs.len()].as_chunks::<4>();
@@ -167,27 +167,6 @@ fn count_apart<Cell: CellNumber, const CELLS: usize>(
     let [a, b, c, d] = &tables;
     for (cell, count) in counts.iter_mut().enumerate() {
         *count = a[cell] + b[cell] + c[cell] + d[cell];
-    }
-}
-
-/// The number of a cell of a joint histogram that has no more cells than there are numbers.
-trait CellNumber: Copy + Default + Into<usize> {
-    fn of(pair: &BinPair, bins: usize) -> Self;
-}
-
-impl CellNumber for u8 {
-    #[inline(always)]
-    fn of(pair: &BinPair, bins: usize) -> Self {
-        let row = pair.query.wrapping_mul(bins as Self);
-        row.wrapping_add(pair.synthetic)
-    }
-}
-
-impl CellNumber for u16 {
-    #[inline(always)]
-    fn of(pair: &BinPair, bins: usize) -> Self {
-        let row = Self::from(pair.query).wrapping_mul(bins as Self);
-        row.wrapping_add(pair.synthetic.into())
     }
 }
 
@@ -242,7 +221,7 @@ mod tests {
                 })
                 .collect();
             let mut counts = vec![7; 3];
-            count_pairs(&binned, bins, &mut counts);
+            count_pairs(&binned, |pair| *pair, bins, &mut counts);
             prop_assert_eq!(counts, JointHistogram::of(&pairs, bins).counts);
         }
     }

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::{GridParams, Lattice, LatticeTooLarge, Offset, Phase, ScoredLattice};
-use crate::render::{Score, Scorer};
+use crate::render::{Objective as _, Score, Scorer};
 
 /// The cost over a dense grid of positions and headings, while it is being filled: of each position the
 /// cheapest of the headings that were tried.
@@ -81,7 +81,7 @@ impl DenseSurface {
     /// Scores a batch of the hypotheses that come next, as many as the scorer takes at once; what they are
     /// worth, nothing where all are tried.
     pub fn score_next(&mut self, scorer: &Scorer<'_>) -> Vec<Score> {
-        let offsets = self.next(scorer.at_a_time_of(self.positions.len()));
+        let offsets = self.next(scorer.batch(self.positions.len()));
         let poses: Vec<_> = offsets.iter().map(Offset::reference_from_camera).collect();
         let scores = scorer.score(&poses);
         self.take(&scores);

@@ -1,7 +1,7 @@
 //! What a photo shows, three ways.
 
-use image::Luma;
 use image::imageops::blur;
+use image::{GenericImageView as _, Luma};
 
 use super::params::JudgeParams;
 use crate::image::{FloatImage, GrayImage, gaussian_smoothed};
@@ -61,14 +61,10 @@ fn surroundings(photo: &GrayImage, sigma: f64) -> (FloatImage, FloatImage) {
     let squares = |of: &dyn Fn(f32) -> f32| {
         let (width, height) = photo.dimensions();
         let image = FloatImage::from_fn(width.div_ceil(SQUARE), height.div_ceil(SQUARE), |x, y| {
-            let columns = x * SQUARE..((x + 1) * SQUARE).min(width);
-            let rows = y * SQUARE..((y + 1) * SQUARE).min(height);
-            let count = (columns.len() * rows.len()) as f32;
-            let sum: f32 = rows
-                .flat_map(|row| columns.clone().map(move |column| (column, row)))
-                .map(|(column, row)| of(f32::from(photo.get_pixel(column, row).0[0])))
-                .sum();
-            Luma([sum / count])
+            let (left, top) = (x * SQUARE, y * SQUARE);
+            let square = photo.view(left, top, SQUARE.min(width - left), SQUARE.min(height - top));
+            let sum: f32 = square.pixels().map(|(_, _, pixel)| of(f32::from(pixel.0[0]))).sum();
+            Luma([sum / (square.width() * square.height()) as f32])
         });
         blur(&image, sigma as f32 / SQUARE as f32)
     };

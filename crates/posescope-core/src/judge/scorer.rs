@@ -2,16 +2,14 @@
 
 use std::sync::Arc;
 
+use image::GenericImageView as _;
 use nalgebra::Point3;
-use rand::SeedableRng as _;
-use rand::seq::SliceRandom as _;
-use rand_pcg::Pcg64;
 
 use super::chance::corrected_distance;
 use super::channels::{channel_images, linear};
-use super::params::{Channels, JudgeParams};
+use super::params::JudgeParams;
 use crate::camera::Intrinsics;
-use crate::cost::{Pair, byte_bin};
+use crate::cost::{Pair, byte_bin, count_pairs, shuffled};
 use crate::geometry::Pose;
 use crate::image::{GrayImage, cubic_interpolated};
 use crate::problem::Problem;
@@ -93,15 +91,12 @@ impl Objective for Judge {
             .collect();
         let mut rasterizer = Rasterizer::new(&self.intrinsics, self.splat_px);
         let pixels = rasterizer.splat(&points, &reference_from_camera.inverse());
-        let mut dealt: Vec<Bins> =
-            pixels.iter().map(|pixel| self.reference.values[pixel.intensity as usize]).collect();
-        dealt.shuffle(&mut Pcg64::seed_from_u64(seed));
-        let pair = |(pixel, synthetic): (&SplattedPixel, Bins)| Pair {
+        let pair = |pixel: &SplattedPixel| Pair {
             query: self.query[pixel.index as usize],
-            synthetic,
+            synthetic: self.reference.values[pixel.intensity as usize],
         };
-        let pairs: Vec<Pair<Bins>> = pixels.iter().zip(dealt).map(pair).collect();
-        cost_of(&pairs, &self.params, &mut Vec::new())
+        let pairs: Vec<Pair<Bins>> = pixels.iter().map(pair).collect();
+        cost_of(&shuffled(&pairs, seed), &self.params, &mut Vec::new())
     }
 }
 
@@ -109,37 +104,18 @@ impl Objective for Judge {
 /// where all are, there is no cost.
 fn cost_of(pairs: &[Pair<Bins>], params: &JudgeParams, counts: &mut Vec<u32>) -> Option<f64> {
     let &JudgeParams { bins, channels, corrected, .. } = params;
-    count(pairs, bins, channels, counts);
     let (places, mut sum, mut is_any) = (channels.places(), 0.0, false);
-    for counts in counts.chunks(bins * bins).skip(places.start).take(places.len()) {
+    for place in places.clone() {
+        let bins_of = |&Pair { query, synthetic }: &Pair<Bins>| Pair {
+            query: query[place],
+            synthetic: synthetic[place],
+        };
+        count_pairs(pairs, bins_of, bins, counts);
         let cost = corrected_distance(counts, bins, corrected);
         is_any |= cost.is_some();
         sum += cost.unwrap_or(1.0);
     }
     is_any.then(|| sum / places.len() as f64)
-}
-
-/// Counts the pairs of each channel in a joint histogram of its own.
-fn count(pairs: &[Pair<Bins>], bins: usize, channels: Channels, counts: &mut Vec<u32>) {
-    let cells = bins * bins;
-    counts.clear();
-    counts.resize(3 * cells, 0);
-    if channels != Channels::Three {
-        let place = channels.places().start;
-        let counts = &mut counts[place * cells..][..cells];
-        for pair in pairs {
-            counts[usize::from(pair.query[place]) * bins + usize::from(pair.synthetic[place])] += 1;
-        }
-        return;
-    }
-    let (first, others) = counts.split_at_mut(cells);
-    let (second, third) = others.split_at_mut(cells);
-    let cell = |query: u8, synthetic: u8| usize::from(query) * bins + usize::from(synthetic);
-    for Pair { query, synthetic } in pairs {
-        first[cell(query[0], synthetic[0])] += 1;
-        second[cell(query[1], synthetic[1])] += 1;
-        third[cell(query[2], synthetic[2])] += 1;
-    }
 }
 
 fn binned(values: [f32; 3], bins: usize) -> Bins {
@@ -184,21 +160,13 @@ fn shrunk(photo: &GrayImage, params: &JudgeParams, shrink: u32) -> (GrayImage, J
     if shrink <= 1 {
         return (photo.clone(), params.clone());
     }
-    let (width, height) = (photo.width() / shrink, photo.height() / shrink);
-    let row_of = |row: u32| {
-        let start = (row * photo.width()) as usize;
-        &photo.as_raw()[start..start + photo.width() as usize]
-    };
-    let smaller = GrayImage::from_fn(width.max(1), height.max(1), |x, y| {
-        let columns = (x * shrink) as usize..((x + 1) * shrink).min(photo.width()) as usize;
-        let rows = y * shrink..((y + 1) * shrink).min(photo.height());
-        let count = (columns.len() * rows.len()).max(1) as u32;
-        let sum: u32 = rows
-            .map(|row| {
-                let values = &row_of(row)[columns.clone()];
-                values.iter().map(|&value| u32::from(value)).sum::<u32>()
-            })
-            .sum();
+    let (width, height) = photo.dimensions();
+    let [columns, rows] = [width, height].map(|side| (side / shrink).max(1));
+    let smaller = GrayImage::from_fn(columns, rows, |x, y| {
+        let (left, top) = (x * shrink, y * shrink);
+        let square = photo.view(left, top, shrink.min(width - left), shrink.min(height - top));
+        let count = (square.width() * square.height()).max(1);
+        let sum: u32 = square.pixels().map(|(_, _, pixel)| u32::from(pixel.0[0])).sum();
         image::Luma([((sum + count / 2) / count) as u8])
     });
     let params = JudgeParams {

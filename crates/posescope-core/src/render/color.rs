@@ -129,12 +129,8 @@ struct HorizonMap {
 
 impl HorizonMap {
     fn new(points: &[Projected], intrinsics: &Intrinsics, params: &RenderParams) -> Self {
-        let mut map = Self {
-            width: intrinsics.width as usize,
-            height: intrinsics.height as usize,
-            hidden_beyond: Vec::new(),
-        };
-        let (width, height) = (map.width, map.height);
+        let [width, height] = [intrinsics.width, intrinsics.height].map(|side| side as usize);
+        let mut map = Self { width, height, hidden_beyond: Vec::new() };
         let mut hidden_beyond = vec![f32::INFINITY; width * height];
         let reach = params.visibility_window_px / 2;
         // Each thread has rows of its own, and goes through all points.

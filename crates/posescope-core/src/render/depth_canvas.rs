@@ -5,7 +5,7 @@ use std::hint::select_unpredictable;
 use fearless_simd::{Level, Simd, SimdBase as _, dispatch, f32x4};
 
 use super::points::{MAX_ROWS, PointArrays, Projected, ROW_BITS, Values};
-use super::projection::{Eight, Projection};
+use super::projection::{OUT_OF_VIEW, Projection};
 use crate::camera::Intrinsics;
 use crate::geometry::Pose;
 
@@ -142,7 +142,7 @@ impl<K: Copy + Default> DepthCanvas<K> {
                 let Some(&corner) = pixels.get(first + place) else {
                     break;
                 };
-                if corner != Eight::OUT_OF_VIEW {
+                if corner != OUT_OF_VIEW {
                     let (row, column) = row_and_column(corner);
                     let square = &mut nearest[row * stride + column..];
                     put_square::<_, SIDE>(simd, square, [side, stride], depths[first + place]);
@@ -153,7 +153,7 @@ impl<K: Copy + Default> DepthCanvas<K> {
         let query = values.query;
         let mut taken = Taken::new(&mut self.kept);
         for ((&corner, &depth), &synthetic) in pixels.iter().zip(depths).zip(values.points) {
-            if corner == Eight::OUT_OF_VIEW {
+            if corner == OUT_OF_VIEW {
                 continue;
             }
             let (row, column) = row_and_column(corner);

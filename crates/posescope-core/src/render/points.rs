@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use fearless_simd::Simd;
 use nalgebra::Point3;
 
-use super::projection::{Eight, Projection, Turn, loaded};
+use super::projection::{OUT_OF_VIEW, Projection, Turn, loaded};
 
 /// Points that are projected at once.
 const LANES: usize = 8;
@@ -87,7 +87,7 @@ impl Projected {
         points: &PointArrays,
         projection: &Projection,
     ) {
-        self.pixels.resize(points.len(), Eight::OUT_OF_VIEW);
+        self.pixels.resize(points.len(), OUT_OF_VIEW);
         self.depths.resize(points.len(), 0.0);
         let (pixels, _) = self.pixels.as_chunks_mut::<LANES>();
         let (depths, _) = self.depths.as_chunks_mut::<LANES>();
@@ -99,8 +99,7 @@ impl Projected {
         if is_known {
             let [a, b, c] = self.turned.each_ref().map(Vec::as_slice);
             for ((((pixels, depths), a), b), c) in places.zip(a).zip(b).zip(c) {
-                let projected = of_eight.project(loaded(simd, [a, b, c]));
-                (*pixels, *depths) = (projected.pixels, projected.depths);
+                (*pixels, *depths) = of_eight.project(loaded(simd, [a, b, c]));
             }
             return;
         }
@@ -116,8 +115,7 @@ impl Projected {
             *a = simd.as_array_f32x8(turned[0]);
             *b = simd.as_array_f32x8(turned[1]);
             *c = simd.as_array_f32x8(turned[2]);
-            let projected = of_eight.project(turned);
-            (*pixels, *depths) = (projected.pixels, projected.depths);
+            (*pixels, *depths) = of_eight.project(turned);
         }
     }
 }

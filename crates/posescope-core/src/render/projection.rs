@@ -16,7 +16,8 @@ pub type ProjectionRows = [[f32; 4]; 3];
 /// Pose and intrinsics in single precision: half the memory traffic of the inner loop, and exact to
 /// 1/1000 px at the ranges of a scanner.
 pub(super) struct Projection {
-    rows: ProjectionRows,
+    /// What a device projects by.
+    pub rows: ProjectionRows,
     width: u32,
     height: u32,
     reach: i32,
@@ -24,19 +25,8 @@ pub(super) struct Projection {
     stride: i32,
 }
 
-/// Eight points in a camera.
-pub(super) struct Eight {
-    /// Position of the nearest pixel in the image that is larger by the reach on each side, or
-    /// [`Self::OUT_OF_VIEW`]: the row times the stride, and the column.
-    pub pixels: [u32; 8],
-    /// Depth \[m\].
-    pub depths: [f32; 8],
-}
-
-impl Eight {
-    /// The pixel of a point that is behind the camera, too near or too far outside the image.
-    pub const OUT_OF_VIEW: u32 = u32::MAX;
-}
+/// The pixel of a point that is behind the camera, too near or too far outside the image.
+pub(super) const OUT_OF_VIEW: u32 = u32::MAX;
 
 impl Projection {
     /// The projection of points into a camera. Each covers all pixels that are at most `reach` columns
@@ -57,11 +47,6 @@ impl Projection {
             reach,
             stride: intrinsics.width as i32 + 2 * reach,
         }
-    }
-
-    /// What a device projects by.
-    pub fn rows(&self) -> ProjectionRows {
-        self.rows
     }
 
     /// The same projection with other positions of pixels.
@@ -88,7 +73,7 @@ impl Projection {
 
     /// What of it all cameras that look one way have in common: what coordinates are multiplied by.
     pub fn turn(&self) -> Turn {
-        Turn(self.rows.map(|[x, y, z, _]| [x, y, z].map(f32::to_bits)))
+        self.rows.map(|[x, y, z, _]| [x, y, z].map(f32::to_bits))
     }
 
     /// The same for several points at once.
@@ -108,9 +93,8 @@ impl Projection {
     }
 }
 
-/// The part of a projection that is the same for all cameras that look one way; it compares by bits.
-#[derive(Clone, Copy, PartialEq, Eq)]
-pub(super) struct Turn([[u32; 3]; 3]);
+/// The part of a projection that is the same for all cameras that look one way, as bits.
+pub(super) type Turn = [[u32; 3]; 3];
 
 /// A projection of eight points at once. Its numbers stay in registers, wherever results are written.
 #[derive(Clone, Copy)]
@@ -138,9 +122,10 @@ impl<S: Simd> ProjectionOfEight<S> {
     }
 
     /// As [`Projection::pixel_and_depth`] for eight points that were turned before, by the same operations in
-    /// the same order and so with the same result.
+    /// the same order and so with the same result: positions of the nearest pixels in the image that is larger
+    /// by the reach on each side, the row times the stride and the column, or [`OUT_OF_VIEW`]; and depths \[m\].
     #[inline(always)]
-    pub fn project(&self, turned: [f32x8<S>; 3]) -> Eight {
+    pub fn project(&self, turned: [f32x8<S>; 3]) -> ([u32; 8], [f32; 8]) {
         let simd = self.simd;
         let depth = turned[2] + self.added[2];
         let inverse = f32x8::splat(simd, 1.0) / depth;
@@ -155,11 +140,8 @@ impl<S: Simd> ProjectionOfEight<S> {
         let [column, row] = [simd.cvt_i32_f32x8(column), simd.cvt_i32_f32x8(row)];
         let pixels = (row + self.reach) * self.stride + (column + self.reach);
         let pixels = simd.reinterpret_u32_i32x8(pixels);
-        let out_of_view = u32x8::splat(simd, Eight::OUT_OF_VIEW);
-        Eight {
-            pixels: simd.as_array_u32x8(simd.select_u32x8(in_view, pixels, out_of_view)),
-            depths: simd.as_array_f32x8(depth),
-        }
+        let pixels = simd.select_u32x8(in_view, pixels, u32x8::splat(simd, OUT_OF_VIEW));
+        (simd.as_array_u32x8(pixels), simd.as_array_f32x8(depth))
     }
 }
 

@@ -50,14 +50,14 @@ enum Threads {
     /// The statistic may depend on the order of the pairs, or the image or the joint histogram is too large.
     Plain(Pool<Rasterizer>),
     LesserHalf {
-        points: Arc<ShownPoints<f32>>,
+        points: ShownPoints<f32>,
         pool: Pool<(DepthCanvas<f32>, LesserHalfFinder)>,
     },
     Histogram {
         bins: usize,
         cost: fn(&Entropies) -> Option<f64>,
-        query: Arc<[u8]>,
-        points: Arc<ShownPoints<u8>>,
+        query: Vec<u8>,
+        points: ShownPoints<u8>,
         pool: Pool<(DepthCanvas<BinPair>, Vec<u32>)>,
     },
 }
@@ -86,12 +86,6 @@ impl<'a> Scorer<'a> {
     /// What decides the cost.
     pub fn statistic(&self) -> &Statistic<'a> {
         &self.statistic
-    }
-
-    /// How many cameras to score at a time: few enough that a run can be stopped soon, enough for all
-    /// threads of the current pool. At most [`MAX_AT_A_TIME`](super::MAX_AT_A_TIME).
-    pub fn at_a_time(&self) -> usize {
-        at_a_time()
     }
 
     /// The scores of many cameras `reference_from_camera`, in their order, on the device where there is
@@ -130,7 +124,7 @@ impl<'a> Scorer<'a> {
                 let worker = || (self.canvas(), Vec::new());
                 pool.score(poses, worker, |(canvas, counts), pose| {
                     let pairs = canvas.draw(&points.positions, values, &pose.inverse(), pair);
-                    count_pairs(pairs, *bins, counts);
+                    count_pairs(pairs, |pair| *pair, *bins, counts);
                     score(cost(&Entropies::of(counts, *bins)), pairs.len())
                 })
             }
@@ -145,10 +139,7 @@ impl<'a> Scorer<'a> {
             match self.statistic {
                 _ if is_large => Threads::Plain(Pool::default()),
                 Statistic::LesserHalf { power: 1 } => Threads::LesserHalf {
-                    points: Arc::new(ShownPoints {
-                        positions: positions(),
-                        values: values.collect(),
-                    }),
+                    points: ShownPoints { positions: positions(), values: values.collect() },
                     pool: Pool::default(),
                 },
                 Statistic::Histogram { bins, cost } if bins <= MAX_BYTE_BINS => {
@@ -158,7 +149,7 @@ impl<'a> Scorer<'a> {
                         bins,
                         cost,
                         query: self.query.iter().copied().map(bin).collect(),
-                        points: Arc::new(ShownPoints { positions: positions(), values }),
+                        points: ShownPoints { positions: positions(), values },
                         pool: Pool::default(),
                     }
                 }
@@ -212,8 +203,10 @@ impl Objective for Scorer<'_> {
         Scorer::score(self, reference_from_camera)
     }
 
+    /// A device takes more than the threads.
     fn batch(&self, hypotheses: usize) -> usize {
-        self.at_a_time_of(hypotheses)
+        let device = self.on_device.device.as_ref();
+        device.and_then(|device| device.batch(hypotheses)).unwrap_or_else(at_a_time)
     }
 
     fn shuffled(&self, reference_from_camera: &Pose, seed: u64) -> Option<f64> {

@@ -23,7 +23,7 @@ use posescope_core::image::{FloatImage, gaussian_smoothed};
 use posescope_core::method::Method;
 use posescope_core::params::Params;
 use posescope_core::problem::Problem;
-use posescope_core::render::{Scorer, color_cloud};
+use posescope_core::render::{Objective as _, Scorer, color_cloud};
 use posescope_core::trace::{Cancelled, Record, Sink, Trace};
 use proptest::prelude::*;
 
@@ -114,7 +114,7 @@ fn what_is_scored_at_a_time_is_bounded_and_scored_once() {
         Some(pairs.len() as f64)
     });
     let scorer = Scorer::new(cloud, query, &CAMERA, 1, &cost);
-    assert!(on_many_threads(|| scorer.at_a_time()) <= 300);
+    assert!(on_many_threads(|| scorer.batch(1)) <= 300);
     let poses: Vec<_> = (0..70).map(|i| Pose::translation(0.0, 0.0, 0.02 * f64::from(i))).collect();
     let at_once = scorer.score(&poses);
     assert_eq!(judged.load(Ordering::Relaxed), poses.len());

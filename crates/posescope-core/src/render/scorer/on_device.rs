@@ -17,7 +17,7 @@ const MIN_CHECKED: usize = 4;
 
 /// What a scorer has of a device.
 pub(super) struct OnDevice {
-    device: Option<Arc<dyn Device>>,
+    pub device: Option<Arc<dyn Device>>,
     loaded: OnceLock<Option<Box<dyn Loaded>>>,
     /// Whether it gave any score.
     is_used: AtomicBool,
@@ -36,14 +36,6 @@ impl Scorer<'_> {
     pub fn on(mut self, device: Option<Arc<dyn Device>>) -> Self {
         self.on_device = OnDevice::new(device);
         self
-    }
-
-    /// The batch size for a number of hypotheses, small enough that a run can be stopped soon: a device takes
-    /// more than the threads.
-    pub fn at_a_time_of(&self, hypotheses: usize) -> usize {
-        let device = self.on_device.device.as_ref();
-        let batch = device.and_then(|device| device.batch(hypotheses));
-        batch.unwrap_or_else(|| self.at_a_time())
     }
 
     /// Whether any score was a device's.
@@ -80,7 +72,7 @@ impl Scorer<'_> {
         };
         let loaded = loaded.get_or_init(load).as_ref()?;
         let rows =
-            |pose: &Pose| Projection::new(&self.intrinsics, reach as i32, &pose.inverse()).rows();
+            |pose: &Pose| Projection::new(&self.intrinsics, reach as i32, &pose.inverse()).rows;
         let projections: Vec<_> = reference_from_camera.iter().map(rows).collect();
         let tallies = loaded.tally(&projections)?;
         let scored = tallies.par_iter().map(|tally| Some(tally.as_ref()?.score(statistic)));
