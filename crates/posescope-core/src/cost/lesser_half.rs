@@ -37,22 +37,15 @@ impl LesserHalf {
     }
 }
 
-/// Bits of a number that do not decide its bin: each octave has 32 bins.
-const IGNORED_BITS: u32 = 18;
-/// All numbers below have one bin. Of squared differences of grey values such are few.
-const MIN_BINNED: f32 = 1.0 / 256.0;
-const FIRST: u32 = MIN_BINNED.to_bits() >> IGNORED_BITS;
-const BINS: usize = 32 * 24 + 2;
-
 /// Numbers that are looked at to guess the median, about.
-const SAMPLE: usize = 1024;
-/// Bins of the sample that tell how close the numbers lie, on each side of the median's.
-const BINS_BESIDE: usize = 2;
+const SAMPLE: usize = 256;
+/// The share of the sample on each side of its median that tells how close the numbers lie: one in this many.
+const BESIDE: usize = 16;
 /// How often the guess is corrected by counting what lies below it.
 const CORRECTIONS: usize = 2;
 /// Numbers around the last guess that are compared with each other: a share of all, and some more.
-const SHARE_AROUND: f32 = 0.0015;
-const MORE_AROUND: f32 = 16.0;
+const SHARE_AROUND: f32 = 0.0025;
+const MORE_AROUND: f32 = 32.0;
 
 /// Finds number and sum of the numbers up to their lower median, one set after another.
 ///
@@ -61,14 +54,14 @@ const MORE_AROUND: f32 = 16.0;
 /// times, some eight at a time, and is exact however good the guess.
 pub struct LesserHalfFinder {
     level: Level,
-    sampled: [u16; BINS],
+    sample: Vec<f32>,
     /// Numbers around the guess, and room for as many as there are.
     around: Vec<f32>,
 }
 
 impl Default for LesserHalfFinder {
     fn default() -> Self {
-        Self { level: Level::new(), sampled: [0; BINS], around: Vec::new() }
+        Self { level: Level::new(), sample: Vec::new(), around: Vec::new() }
     }
 }
 
@@ -84,7 +77,7 @@ impl LesserHalfFinder {
     /// bad, the sum is too large to be exact, or there are no numbers.
     fn find(&mut self, values: &[f32]) -> Option<(u32, f64)> {
         let middle = values.len().checked_sub(1)? / 2;
-        let Guess { mut median, mut density } = self.guess(values, middle);
+        let (mut median, mut density) = self.guess(values, middle);
         let level = self.level;
         let mut last: Option<(f32, f32)> = None;
         for _ in 0..CORRECTIONS {
@@ -122,43 +115,21 @@ impl LesserHalfFinder {
         LesserHalf::is_exact(sum).then_some((counted, sum))
     }
 
-    /// The median and the density of a sample.
-    fn guess(&mut self, values: &[f32], middle: usize) -> Guess {
-        let sampled = &mut self.sampled;
-        sampled.fill(0);
+    /// The median of a sample, and how many of all numbers lie in an interval around it, over its length.
+    fn guess(&mut self, values: &[f32], middle: usize) -> (f32, f32) {
         let step = values.len().div_ceil(SAMPLE);
-        for &value in values.iter().step_by(step) {
-            sampled[usize::from(bin(value))] += 1;
-        }
-        let size = values.len().div_ceil(step) as f32;
-        let all = values.len() as f32;
-        let place = middle as f32 / all * size;
-        // Counted in whole numbers, whose sums follow each other faster.
-        let mut before = 0_u16;
-        let of_median = sampled.iter().position(|&count| {
-            let is_within = place < f32::from(before + count);
-            before += if is_within { 0 } else { count };
-            is_within
-        });
-        let of_median = of_median.unwrap_or(BINS - 1);
-        let edge = |bin: usize| least_of_bin(bin as u16);
-        let within = (place - f32::from(before)) / f32::from(sampled[of_median].max(1));
-        let [low, high] = [edge(of_median), edge(of_median + 1)];
-        let beside = of_median.saturating_sub(BINS_BESIDE)..(of_median + 1 + BINS_BESIDE).min(BINS);
-        let [begin, end] = [beside.start, beside.end].map(edge);
-        let there: u16 = sampled[beside].iter().sum();
-        Guess {
-            median: low + (high - low) * within.clamp(0.0, 1.0),
-            density: f32::from(there) / size * all / (end - begin),
-        }
+        let sample = &mut self.sample;
+        sample.clear();
+        sample.extend(values.iter().step_by(step));
+        let (at, reach) = (middle / step, (sample.len() / BESIDE).max(1));
+        let (from, to) = (at.saturating_sub(reach), (at + reach).min(sample.len() - 1));
+        let high = *sample.select_nth_unstable_by(to, f32::total_cmp).1;
+        let median = *sample[..=to].select_nth_unstable_by(at, f32::total_cmp).1;
+        let low = *sample[..=at].select_nth_unstable_by(from, f32::total_cmp).1;
+        // Many may be equal.
+        let length = (high - low).max(1e-4 * high).max(1.0 / 256.0);
+        (median, ((to - from).max(1) * step) as f32 / length)
     }
-}
-
-/// Where the median may be.
-struct Guess {
-    median: f32,
-    /// Numbers in an interval around it, over its length.
-    density: f32,
 }
 
 #[inline(always)]
@@ -226,21 +197,6 @@ fn add_below(values: &[f32], around: &mut Around<'_>) -> (u32, f64) {
     let below = || rest.iter().filter(|&&value| value < low);
     let sum = below().map(|&value| LesserHalf::rounded(f64::from(value))).sum::<f64>();
     (counted.iter().sum::<u32>() + below().count() as u32, sums.iter().sum::<f64>() + sum)
-}
-
-/// The bin of a number ≥ 0. The bits of such numbers are in the order of the numbers.
-#[inline(always)]
-fn bin(value: f32) -> u16 {
-    let octaves = (value.to_bits() >> IGNORED_BITS).saturating_sub(FIRST);
-    octaves.min(BINS as u32 - 1) as u16
-}
-
-/// The least number of a bin; of the first, 0.
-fn least_of_bin(bin: u16) -> f32 {
-    match bin {
-        0 => 0.0,
-        _ => f32::from_bits((u32::from(bin) + FIRST) << IGNORED_BITS),
-    }
 }
 
 /// The lower median; `None` of nothing.
