@@ -18,7 +18,8 @@
 use std::fmt;
 use std::str::FromStr;
 
-use image::{ImageBuffer, Luma, Pixel, Rgb};
+use image::imageops::blur;
+use image::{ImageBuffer, Luma, Pixel};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_pcg::Pcg64;
 use xxhash_rust::xxh3::xxh3_64;
@@ -93,21 +94,18 @@ impl Degradation {
     /// An unknown name, or a value that is no strength.
     pub fn set(&mut self, name: &str, value: &str) -> Result<(), DegradationError> {
         let steps = self.steps();
+        let Some(step) = steps.iter().find(|step| step.key == name) else {
+            let known: Vec<&str> = steps.iter().map(|step| step.key.as_str()).collect();
+            let (name, known) = (name.to_owned(), known.join(", "));
+            return Err(DegradationError::Unknown { name, known });
+        };
         match set(self, name, value) {
             Some(Ok(())) => Ok(()),
-            Some(Err(domain)) => {
-                let step = steps.iter().find(|step| step.key == name);
-                let unit = step.map_or("", |step| step.about.unit);
-                Err(DegradationError::BadValue {
-                    name: name.to_owned(),
-                    expected: format!("{domain} {unit}").trim_end().to_owned(),
-                    given: value.to_owned(),
-                })
-            }
-            None => {
-                let names: Vec<String> = steps.into_iter().map(|step| step.key).collect();
-                Err(DegradationError::Unknown { name: name.to_owned(), known: names.join(", ") })
-            }
+            _ => Err(DegradationError::BadValue {
+                name: name.to_owned(),
+                expected: format!("{} {}", step.domain, step.about.unit).trim_end().to_owned(),
+                given: value.to_owned(),
+            }),
         }
     }
 
@@ -147,22 +145,26 @@ impl Degradation {
         noise
     }
 
-    fn degraded<P: Smoothed>(
+    fn degraded<P: Pixel<Subpixel = u8>>(
         &self,
         photo: &ImageBuffer<P, Vec<u8>>,
         noise: &[f32],
     ) -> ImageBuffer<P, Vec<u8>> {
         let fog = self.fog as f32;
         let foggy = |&value: &u8| (1.0 - fog) * f32::from(value) + fog * VEIL;
-        let values: Vec<f32> = photo.as_raw().iter().map(foggy).collect();
-        let values = if self.blur_px > 0.0 && !values.is_empty() {
-            P::smoothed(photo.dimensions(), values, self.blur_px as f32)
-        } else {
-            values
-        };
+        let mut values: Vec<f32> = photo.as_raw().iter().map(foggy).collect();
+        let channels = usize::from(P::CHANNEL_COUNT);
+        if self.blur_px > 0.0 && !values.is_empty() {
+            for channel in 0..channels {
+                let own = values.iter().skip(channel).step_by(channels).copied();
+                let own = of_as_many::<Luma<f32>>(photo.dimensions(), own.collect());
+                let smoothed = blur(&own, self.blur_px as f32);
+                let own = values.iter_mut().skip(channel).step_by(channels);
+                own.zip(smoothed.into_raw()).for_each(|(value, smoothed)| *value = smoothed);
+            }
+        }
         let gain = (self.exposure_stops / STORED_GAMMA).exp2() as f32;
         let gamma = self.gamma as f32;
-        let channels = usize::from(P::CHANNEL_COUNT);
         let finished = values.iter().enumerate().map(|(at, &value)| {
             let mut value = (value * gain).clamp(0.0, 255.0);
             if gamma != 1.0 {
@@ -183,23 +185,6 @@ fn of_as_many<P: Pixel>(
 ) -> ImageBuffer<P, Vec<P::Subpixel>> {
     ImageBuffer::from_raw(width, height, values)
         .unwrap_or_else(|| unreachable!("as many values as the photo has"))
-}
-
-/// Pixels whose real values can be smoothed.
-trait Smoothed: Pixel<Subpixel = u8> {
-    fn smoothed(size: (u32, u32), values: Vec<f32>, sigma_px: f32) -> Vec<f32>;
-}
-
-impl Smoothed for Luma<u8> {
-    fn smoothed(size: (u32, u32), values: Vec<f32>, sigma_px: f32) -> Vec<f32> {
-        image::imageops::blur(&of_as_many::<Luma<f32>>(size, values), sigma_px).into_raw()
-    }
-}
-
-impl Smoothed for Rgb<u8> {
-    fn smoothed(size: (u32, u32), values: Vec<f32>, sigma_px: f32) -> Vec<f32> {
-        image::imageops::blur(&of_as_many::<Rgb<f32>>(size, values), sigma_px).into_raw()
-    }
 }
 
 /// As it is read: the steps that differ from none.
@@ -255,7 +240,7 @@ crate::serde_as_text!(Degradation);
 #[cfg(test)]
 mod tests {
     use super::*;
-    use image::{GrayImage, RgbImage};
+    use image::{GrayImage, Rgb, RgbImage};
     use proptest::prelude::*;
 
     fn read(text: &str) -> Degradation {
