@@ -131,7 +131,7 @@ pub fn build<E: std::error::Error + Send + 'static>(
     Ok(BuildSummary {
         frames: total,
         features: found,
-        words: vocabulary.words().len(),
+        words: vocabulary.words.len(),
         bytes: fs::metadata(path).map_err(io)?.len(),
     })
 }
@@ -183,7 +183,7 @@ fn write(
     let mut writer = IndexWriter::new(BufWriter::new(file))?;
     let mut counts = RecordCounts {
         documents: request.frames.len(),
-        words: vocabulary.words().len(),
+        words: vocabulary.words.len(),
         ..RecordCounts::default()
     };
     let mut occurrences = InvertedIndexBuilder::new(counts.words);
@@ -210,7 +210,7 @@ fn write(
     for (frame, start) in frames.zip(starts) {
         writer.record([number(frame)?, start])?;
     }
-    for word in vocabulary.words() {
+    for word in &vocabulary.words {
         writer.record(word.map(f32::to_bits))?;
     }
     let inverted = occurrences.weighted();
@@ -239,12 +239,8 @@ pub(super) fn fingerprint_text(fingerprint: u64) -> String {
 
 /// The number as a record writes it.
 fn number(count: usize) -> io::Result<u32> {
-    u32::try_from(count).map_err(|_| {
-        io::Error::new(
-            io::ErrorKind::FileTooLarge,
-            format!("{count} is more than an index can store"),
-        )
-    })
+    u32::try_from(count)
+        .map_err(|_| io::Error::other(format!("{count} is more than an index can store")))
 }
 
 /// Features that wait on disk, in a file without a name, to be read in their order.

@@ -76,7 +76,7 @@ impl Index {
     /// [`IndexError`] when there is none, or it is damaged or of another layout.
     pub fn open(path: &Path, checks: usize) -> Result<Self, IndexError> {
         let stored = MappedIndex::open(path)?;
-        let Description { trees, seed, .. } = *stored.description();
+        let Description { trees, seed, .. } = stored.description;
         Ok(Self {
             path: path.to_owned(),
             vocabulary: Vocabulary::new(stored.words(), trees, checks, seed),
@@ -86,7 +86,7 @@ impl Index {
 
     /// What the index was made from and how.
     pub fn description(&self) -> &Description {
-        self.stored.description()
+        &self.stored.description
     }
 
     /// The file of the index.

@@ -105,7 +105,8 @@ impl<W: Write> IndexWriter<W> {
 /// An index in its file, mapped: only the parts in use come into memory.
 pub struct MappedIndex {
     map: Mmap,
-    description: Description,
+    /// What the index was made from and how.
+    pub description: Description,
     features: Range<usize>,
     documents: Range<usize>,
     words: Range<usize>,
@@ -192,11 +193,6 @@ impl MappedIndex {
         is_sound.then_some(stored)
     }
 
-    /// What the index was made from and how.
-    pub fn description(&self) -> &Description {
-        &self.description
-    }
-
     /// The records of a part, of `N` numbers each.
     fn records<const N: usize>(&self, part: &Range<usize>) -> &[[[u8; 4]; N]] {
         let bytes = self.map.get(part.clone()).unwrap_or_default();
@@ -207,18 +203,17 @@ impl MappedIndex {
         Some(self.records::<PAIR>(part).get(index)?.map(u32::from_le_bytes))
     }
 
-    /// The records of a part from one start to the next; none where there is no such start.
+    /// The records of a part from a start to the next one; `starts` are at this place of the pairs of another
+    /// part. None where there is no such start.
     fn run<const N: usize>(
         &self,
         part: &Range<usize>,
-        starts: [Option<u32>; 2],
+        (starts, place): (&Range<usize>, usize),
+        index: usize,
     ) -> impl ExactSizeIterator<Item = [u32; N]> {
-        let range = match starts {
-            [Some(start), Some(end)] => start as usize..end as usize,
-            _ => 0..0,
-        };
-        let records = self.records::<N>(part).get(range).unwrap_or_default();
-        records.iter().map(|record| record.map(u32::from_le_bytes))
+        let start = |index| self.pair(starts, index).map_or(0, |pair| pair[place] as usize);
+        let records = self.records::<N>(part).get(start(index)..start(index + 1));
+        records.unwrap_or_default().iter().map(|record| record.map(u32::from_le_bytes))
     }
 
     /// The position of a document's frame in its scene.
@@ -228,13 +223,13 @@ impl MappedIndex {
 
     /// The features of a document, each with its visual word, in the order of their words.
     pub fn features(&self, document: usize) -> impl ExactSizeIterator<Item = (u32, Keypoint)> {
-        let start = |document| self.pair(&self.documents, document).map(|[_, start]| start);
-        let features = self.run::<FEATURE>(&self.features, [start(document), start(document + 1)]);
-        features.map(|[word, place @ ..]| {
-            let [x, y, scale, angle] = place.map(f32::from_bits);
-            let (response, laplacian_positive) = (0.0, false);
-            (word, Keypoint { x, y, scale, angle, response, laplacian_positive })
-        })
+        self.run::<FEATURE>(&self.features, (&self.documents, 1), document).map(
+            |[word, place @ ..]| {
+                let [x, y, scale, angle] = place.map(f32::from_bits);
+                let (response, laplacian_positive) = (0.0, false);
+                (word, Keypoint { x, y, scale, angle, response, laplacian_positive })
+            },
+        )
     }
 
     /// The centres of the vocabulary.
@@ -251,9 +246,7 @@ impl MappedIndex {
 
     /// The documents with a word, and its weight there.
     pub fn postings(&self, word: u32) -> impl Iterator<Item = (usize, f32)> {
-        let start = |word| self.pair(&self.lists, word).map(|[start, _]| start);
-        let word = word as usize;
-        let postings = self.run::<PAIR>(&self.postings, [start(word), start(word + 1)]);
+        let postings = self.run::<PAIR>(&self.postings, (&self.lists, 0), word as usize);
         postings.map(|[document, weight]| (document as usize, f32::from_bits(weight)))
     }
 }

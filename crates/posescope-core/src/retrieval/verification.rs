@@ -149,9 +149,7 @@ impl AffineFit<'_> {
                 let WordMatch { query, reference_keypoint: Keypoint { x, y, scale, .. }, .. } =
                     self.pairs[i];
                 let reference = [x, y, scale].map(f32::to_bits);
-                let is_free = !queries.contains(&query) && !references.contains(&reference);
-                is_free.then(|| {
-                    queries.insert(query);
+                (!references.contains(&reference) && queries.insert(query)).then(|| {
                     references.insert(reference);
                     let (query_pixel, reference_pixel) = self.points[i];
                     VerifiedMatch { query: query as usize, query_pixel, reference_pixel }

@@ -30,7 +30,8 @@ pub struct Clustering {
 
 /// Visual words with the forest that finds them.
 pub struct Vocabulary {
-    words: Vec<Descriptor>,
+    /// The centres of the words.
+    pub words: Vec<Descriptor>,
     forest: Forest,
     checks: usize,
 }
@@ -75,11 +76,6 @@ impl Vocabulary {
         }
         // An index that is opened makes the same forest of these words.
         Self::new(vocabulary.words, trees, checks, seed)
-    }
-
-    /// The centres of the words.
-    pub fn words(&self) -> &[Descriptor] {
-        &self.words
     }
 
     /// The word of each descriptor; `None` for one that has no distance from any.
@@ -168,7 +164,7 @@ mod tests {
                 let values = members.iter().map(|&m| f64::from(sample[m][dimension]));
                 values.sum::<f64>() / members.len() as f64
             };
-            let centre = vocabulary.words()[word as usize];
+            let centre = vocabulary.words[word as usize];
             for (dimension, value) in centre.into_iter().enumerate() {
                 assert!((f64::from(value) - mean(dimension)).abs() < 1e-6);
             }
@@ -181,7 +177,7 @@ mod tests {
         let error = |iterations| {
             let clustering = Clustering { words: 50, iterations, ..FOUR };
             let vocabulary = Vocabulary::learn(&sample, &clustering, |_| ());
-            let all = vocabulary.words();
+            let all = vocabulary.words;
             let distance = |descriptor| {
                 let distances = all.iter().map(|word| squared_distance(word, descriptor));
                 f64::from(distances.fold(f32::INFINITY, f32::min))
