@@ -87,8 +87,7 @@ pub fn inliers_beyond_chance(
     area_px: f64,
 ) -> Acceptance {
     let chance = (PI * threshold_px * threshold_px / area_px).min(1.0);
-    let independent = Independent { count: correspondences, tested: correspondences, chance };
-    independent.judge(inliers)
+    judged(inliers, correspondences, correspondences, chance)
 }
 
 /// As [`inliers_beyond_chance`], of places in the query instead of correspondences, so that none that
@@ -117,40 +116,21 @@ pub fn places_beyond_chance(
             _ => 1.0 - (1.0 - one).powi(size as i32),
         })
         .sum();
-    let independent = Independent {
-        count: places.count(),
-        tested: places.of.len(),
-        chance: any / places.count().max(1) as f64,
+    let chance = any / places.count().max(1) as f64;
+    judged(places.of_some(inliers), places.count(), places.of.len(), chance)
+}
+
+/// The verdict on the inliers among `count` that agree with a pose by chance each by itself, where samples are
+/// drawn from `tested` correspondences.
+fn judged(inliers: usize, count: usize, tested: usize, chance: f64) -> Acceptance {
+    // log₁₀ (4 C(tested, 3) · P[B(n − 3, p) ≥ k − 3]).
+    let log10_nfa = |k: usize| {
+        let tests = (MAX_SOLUTIONS as f64).ln() + ln_binomial(tested, SAMPLE);
+        let others = count.saturating_sub(SAMPLE);
+        (tests + ln_tail(k.saturating_sub(SAMPLE), others, chance)) / LN_10
     };
-    independent.judge(places.of_some(inliers))
-}
-
-/// What may agree with a pose by chance, each by itself.
-struct Independent {
-    /// How many there are.
-    count: usize,
-    /// Correspondences that samples are drawn from.
-    tested: usize,
-    /// The probability that one of them does.
-    chance: f64,
-}
-
-impl Independent {
-    fn judge(&self, inliers: usize) -> Acceptance {
-        Acceptance {
-            inliers,
-            log10_nfa: self.log10_nfa(inliers),
-            needed: (NEEDED..=self.count).find(|&k| self.log10_nfa(k) <= LOG10_EPSILON),
-        }
-    }
-
-    /// `log₁₀ (4 C(tested, 3) · P[B(n − 3, p) ≥ k − 3])`.
-    fn log10_nfa(&self, k: usize) -> f64 {
-        let tests = (MAX_SOLUTIONS as f64).ln() + ln_binomial(self.tested, SAMPLE);
-        let others = self.count.saturating_sub(SAMPLE);
-        let tail = ln_tail(k.saturating_sub(SAMPLE), others, self.chance);
-        (tests + tail) / LN_10
-    }
+    let needed = (NEEDED..=count).find(|&k| log10_nfa(k) <= LOG10_EPSILON);
+    Acceptance { inliers, log10_nfa: log10_nfa(inliers), needed }
 }
 
 /// The area over which pixels would have to be spread evenly to be as close together as they are
