@@ -45,14 +45,21 @@ pub trait Choice {
 
 /// A parameter of a struct, and its place there.
 pub struct Field<'a> {
-    about: About,
-    place: Place<'a>,
+    /// Its name, unit and meaning.
+    pub about: About,
+    /// Its value.
+    pub place: Place<'a>,
 }
 
-enum Place<'a> {
+/// The value of a parameter in its struct, and what it accepts.
+pub enum Place<'a> {
+    /// A real number.
     Number(&'a mut f64, RangeInclusive<f64>),
+    /// A whole number.
     Count(&'a mut usize, RangeInclusive<usize>),
+    /// A switch.
     Flag(&'a mut bool),
+    /// One of a few names.
     Choice(&'a mut dyn Choice),
 }
 
@@ -62,27 +69,7 @@ pub trait Describe {
     fn fields(&mut self) -> Vec<Field<'_>>;
 }
 
-impl<'a> Field<'a> {
-    /// A real number.
-    pub fn number(about: About, value: &'a mut f64, range: RangeInclusive<f64>) -> Self {
-        Self { about, place: Place::Number(value, range) }
-    }
-
-    /// A whole number.
-    pub fn count(about: About, value: &'a mut usize, range: RangeInclusive<usize>) -> Self {
-        Self { about, place: Place::Count(value, range) }
-    }
-
-    /// A switch.
-    pub fn flag(about: About, value: &'a mut bool) -> Self {
-        Self { about, place: Place::Flag(value) }
-    }
-
-    /// One of a few names.
-    pub fn choice(about: About, value: &'a mut dyn Choice) -> Self {
-        Self { about, place: Place::Choice(value) }
-    }
-
+impl Field<'_> {
     fn described(&self) -> Described {
         let (value, domain) = match &self.place {
             Place::Number(value, range) => (Value::Number(**value), Domain::Number(range.clone())),
@@ -323,8 +310,13 @@ macro_rules! parameters {
         $fields:ident, $place:expr, $doc:expr) => {{
         let unit = concat!("" $(, $unit)?);
         let about = $crate::describe::About { name: $key, unit, doc: $doc };
-        $fields.push($crate::describe::Field::$kind(about, $place $(, $range)?))
+        let place = $crate::describe::parameters!(@place $kind $place $(, $range)?);
+        $fields.push($crate::describe::Field { about, place })
     }};
+    (@place number $place:expr, $range:expr) => { $crate::describe::Place::Number($place, $range) };
+    (@place count $place:expr, $range:expr) => { $crate::describe::Place::Count($place, $range) };
+    (@place flag $place:expr) => { $crate::describe::Place::Flag($place) };
+    (@place choice $place:expr) => { $crate::describe::Place::Choice($place) };
 }
 pub(crate) use parameters;
 

@@ -231,25 +231,21 @@ fn shares(weigh: Weigh, candidates: &[Candidate<'_>]) -> Vec<Share> {
 
 /// The reason names the reference that should have been the best.
 fn no_pose(shares: &[Share], candidates: &[Candidate<'_>]) -> Failure {
-    let failed = shares.iter().filter(|share| share.outcome == ShareOutcome::Failed);
-    let weighed = failed.count();
-    let best = shares
+    let weighed: Vec<(&Candidate<'_>, &Failure)> = shares
         .iter()
         .zip(candidates)
         .filter(|(share, _)| share.outcome == ShareOutcome::Failed)
-        // The last of equals would win; the first one is wanted.
-        .rev()
-        .max_by_key(|(share, _)| share.matches);
-    match best {
-        Some((share, candidate)) if let Err(failure) = candidate.pose => {
-            Failure::NoReferenceSucceeded {
-                weighed,
-                references: shares.len(),
-                best: share.reference.clone(),
-                failure: Box::new(failure.clone()),
-            }
-        }
-        _ => Failure::NoReference { radius_m: None },
+        .filter_map(|(_, candidate)| Some((candidate, candidate.pose.err()?)))
+        .collect();
+    // The last of equals would win; the first one is wanted.
+    match weighed.iter().rev().max_by_key(|(candidate, _)| candidate.matches) {
+        Some((best, failure)) => Failure::NoReferenceSucceeded {
+            weighed: weighed.len(),
+            references: shares.len(),
+            best: best.reference.to_owned(),
+            failure: Box::new((*failure).clone()),
+        },
+        None => Failure::NoReference { radius_m: None },
     }
 }
 

@@ -128,13 +128,8 @@ fn features_of(photo: &Photo, memo: &Memo, params: &SurfParams) -> Arc<Features>
 fn check_camera(name: &str, photo: &Photo, intrinsics: &Intrinsics) -> Result<(), InputError> {
     let Intrinsics { fx, fy, cx, cy, width, height } = *intrinsics;
     let is_focal = |length: f64| length.is_finite() && length > 0.0;
-    if !is_focal(fx)
-        || !is_focal(fy)
-        || !cx.is_finite()
-        || !cy.is_finite()
-        || width == 0
-        || height == 0
-    {
+    let is_camera = [fx, fy].into_iter().all(is_focal) && [cx, cy].into_iter().all(f64::is_finite);
+    if !is_camera || width == 0 || height == 0 {
         return Err(InputError::Camera { frame: name.to_owned() });
     }
     if photo.dimensions() != (width, height) {

@@ -42,27 +42,18 @@ impl<K: Eq, V: Clone> Recent<K, V> {
     where
         K: Borrow<Q>,
     {
-        let mut entries = self.entries();
-        let at = entries.iter().position(|(known, _)| known.borrow() == key)?;
-        entries[at..].rotate_left(1);
-        entries.last().map(|(_, value)| value.clone())
+        used(&mut self.entries(), key)
     }
 
     /// Keeps the value, and returns the one kept: where two threads made it, the first.
     pub fn insert(&self, key: K, value: V) -> V {
         let mut entries = self.entries();
-        let kept = match entries.iter().position(|(known, _)| *known == key) {
-            Some(at) => {
-                entries[at..].rotate_left(1);
-                entries.last().map(|(_, value)| value.clone())
-            }
-            None => {
-                entries.push((key, value.clone()));
-                None
-            }
-        };
+        let kept = used(&mut entries, &key).unwrap_or_else(|| {
+            entries.push((key, value.clone()));
+            value
+        });
         self.make_room(&mut entries);
-        kept.unwrap_or(value)
+        kept
     }
 
     /// Keeps to the limit again after values have grown or are no longer held elsewhere.
@@ -106,6 +97,13 @@ impl<K: Eq, V: Clone> Recent<K, V> {
     fn entries(&self) -> MutexGuard<'_, Vec<(K, V)>> {
         self.entries.lock().unwrap_or_else(PoisonError::into_inner)
     }
+}
+
+/// The value of a key among entries, which becomes the last of them.
+fn used<K: Borrow<Q>, V: Clone, Q: Eq + ?Sized>(entries: &mut [(K, V)], key: &Q) -> Option<V> {
+    let at = entries.iter().position(|(known, _)| known.borrow() == key)?;
+    entries[at..].rotate_left(1);
+    entries.last().map(|(_, value)| value.clone())
 }
 
 #[cfg(test)]

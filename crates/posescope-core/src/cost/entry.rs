@@ -3,7 +3,7 @@
 use std::fmt;
 
 use super::{ALL, Cost, ExplanationKind, key};
-use crate::describe::{About, Describe, Field, choice};
+use crate::describe::{About, Describe, Field, Place, choice};
 
 /// How a direct method finds the pose of least cost.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -85,7 +85,7 @@ impl Describe for CostSetting {
         let doc = "How the pose of least cost is found: over the grid, from many starts, or from the reference \
                    pose downhill.";
         let about = About { name: "search", unit: "", doc };
-        fields.push(Field::choice(about, &mut self.search));
+        fields.push(Field { about, place: Place::Choice(&mut self.search) });
         fields
     }
 }

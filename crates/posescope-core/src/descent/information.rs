@@ -70,7 +70,7 @@ fn entropy(shares: &[f64]) -> f64 {
 impl<'a> Distance<'a> {
     pub(super) fn new(view: &'a View<'a>, bins: usize) -> Self {
         let bins = bins + 3;
-        let values = view.values().iter();
+        let values = view.values.iter();
         Self { view, bins, fallen: values.map(|&value| Fallen::new(value, bins)).collect() }
     }
 

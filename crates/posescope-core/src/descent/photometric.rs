@@ -33,7 +33,7 @@ impl<'a> Differences<'a> {
         let mut sizes: Vec<f64> = view
             .seen(&[0.0; 6])
             .iter()
-            .zip(view.values())
+            .zip(&view.values)
             .filter_map(|(seen, value)| Some((seen.as_ref()?.0 - value).abs()))
             .collect();
         sizes.sort_unstable_by(f64::total_cmp);
@@ -52,7 +52,7 @@ impl Residual for Differences<'_> {
 
     fn residual(&self, x: &Vec<f64>) -> Result<Vec<f64>, Infallible> {
         let seen = self.view.seen(x);
-        let pairs = seen.iter().zip(self.view.values());
+        let pairs = seen.iter().zip(&self.view.values);
         let difference = |(seen, value): (&Option<(f64, _)>, &f64)| {
             seen.as_ref().map_or(self.out_of_view, |(own, _)| own - value)
         };

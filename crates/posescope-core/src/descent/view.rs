@@ -18,7 +18,8 @@ pub struct View<'a> {
     intrinsics: Intrinsics,
     /// The points in the frame of the start.
     points: Vec<Vector3<f64>>,
-    values: Vec<f64>,
+    /// Their values in the reference photo.
+    pub(super) values: Vec<f64>,
     camera_from_reference: Pose,
 }
 
@@ -46,11 +47,6 @@ impl<'a> View<'a> {
             values,
             camera_from_reference: *camera_from_reference,
         }
-    }
-
-    /// The values of the points in the reference photo.
-    pub(super) fn values(&self) -> &[f64] {
-        &self.values
     }
 
     /// The camera after a motion.
