@@ -109,11 +109,6 @@ impl Fusion {
     pub fn all() -> impl Iterator<Item = Self> {
         ALL.iter().copied()
     }
-
-    /// The four of the paper, which average poses.
-    pub fn of_the_paper() -> impl Iterator<Item = Self> {
-        Self::all().filter(|fusion| matches!(fusion.way, Way::Weighed(_)))
-    }
 }
 
 impl PartialEq for Fusion {
@@ -206,27 +201,21 @@ fn shares(weigh: Weigh, candidates: &[Candidate<'_>]) -> Vec<Share> {
         Ok(_) if candidate.fell_back && first_method_succeeded => ShareOutcome::FallbackUnneeded,
         Ok(_) => ShareOutcome::Kept,
     };
-    let kept: f64 = candidates
-        .iter()
-        .zip(&weights)
-        .filter(|(candidate, weight)| outcome(candidate, **weight) == ShareOutcome::Kept)
-        .map(|(_, weight)| weight)
-        .sum();
-    candidates
-        .iter()
-        .zip(weights)
-        .map(|(candidate, weight)| {
-            let outcome = outcome(candidate, weight);
-            Share {
-                reference: candidate.reference.to_owned(),
-                matches: candidate.matches,
-                weight: if outcome == ShareOutcome::Kept { weight / kept } else { 0.0 },
-                outcome,
-                pose: candidate.pose.ok().copied(),
-                support: None,
-            }
-        })
-        .collect()
+    let weighed = candidates.iter().zip(weights);
+    let outcomes: Vec<(&Candidate<'_>, f64, ShareOutcome)> = weighed
+        .map(|(candidate, weight)| (candidate, weight, outcome(candidate, weight)))
+        .collect();
+    let is_kept = |outcome: ShareOutcome| outcome == ShareOutcome::Kept;
+    let kept: f64 = outcomes.iter().filter(|one| is_kept(one.2)).map(|one| one.1).sum();
+    let share = |(candidate, weight, outcome): (&Candidate<'_>, f64, ShareOutcome)| Share {
+        reference: candidate.reference.to_owned(),
+        matches: candidate.matches,
+        weight: if is_kept(outcome) { weight / kept } else { 0.0 },
+        outcome,
+        pose: candidate.pose.ok().copied(),
+        support: None,
+    };
+    outcomes.into_iter().map(share).collect()
 }
 
 /// The reason names the reference that should have been the best.
@@ -255,6 +244,11 @@ mod tests {
     use crate::diagnosis::Code;
     use crate::history::History;
     use proptest::prelude::*;
+
+    /// The four of the paper, which average poses.
+    fn of_the_paper() -> impl Iterator<Item = Fusion> {
+        Fusion::all().filter(|fusion| matches!(fusion.way, Way::Weighed(_)))
+    }
 
     fn at(x: f64) -> Pose {
         Pose::translation(x, 0.0, 0.0)
@@ -394,7 +388,7 @@ mod tests {
 
     #[test]
     fn without_a_reference_there_is_no_pose() {
-        for entry in Fusion::of_the_paper() {
+        for entry in of_the_paper() {
             assert_eq!(Code::of(&fused_nothing(&entry)), Code::R1);
         }
     }
@@ -411,7 +405,7 @@ mod tests {
         fn every_fusion_gives_weights_that_can_be_shared_out(
             matches in prop::collection::vec(0usize..3000, 1..8),
         ) {
-            for entry in Fusion::of_the_paper() {
+            for entry in of_the_paper() {
                 let weights = weigh(&entry)(&matches);
                 prop_assert_eq!(weights.len(), matches.len());
                 prop_assert!(weights.iter().all(|weight| weight.is_finite() && *weight >= 0.0));
@@ -430,7 +424,7 @@ mod tests {
         #[test]
         fn a_single_reference_is_taken_as_it_is(x in -1e6..1e6f64, angle in -3.0..3.0f64) {
             let pose = Pose::new([x, 2.0, 3.0].into(), [0.0, angle, 0.0].into());
-            for entry in Fusion::of_the_paper() {
+            for entry in of_the_paper() {
                 let candidate =
                     Candidate { reference: "r", matches: 7, pose: Ok(&pose), fell_back: false };
                 let (fused, _) =
