@@ -17,7 +17,7 @@ use posescope::localize::QueryResult;
 use posescope::method::Method;
 use posescope::run::ScenePair;
 use posescope::scene::{self, Scene, SceneError};
-use posescope::session::{RunMode, RunState, Task};
+use posescope::session::{Job, RunMode, RunState, Task};
 
 /// Size of the window, as it opens.
 const SIZE: [f32; 2] = [1500.0, 950.0];
@@ -71,17 +71,16 @@ fn open() -> Window {
     let reference = street.find("000062").expect("a frame");
     let mut task = Task::of("street");
     task.protocol.name_references(&["000062".to_owned()]);
-    let setup = Setup {
+    let job = Job {
         task,
         references: Arc::clone(&street),
         queries: Arc::clone(&street),
-        offered: vec![query],
         query,
         chosen: vec![reference].into(),
         index: Arc::default(),
-        mode: RunMode::Running,
-        folder: std::env::temp_dir(),
+        frames: Arc::default(),
     };
+    let setup = Setup::of_lesson(job, std::env::temp_dir());
     let mut window = Harness::builder()
         .with_size(SIZE)
         .wgpu()
@@ -207,7 +206,8 @@ impl ManyResults {
     }
 
     fn read(&self) -> Results {
-        let read = app::results_of_run(self.folder.path(), &self.pair, self.scene.as_ref());
+        let read =
+            posescope::run::results_of_pair(self.folder.path(), &self.pair, self.scene.as_ref());
         let (results, elsewhere) = read.expect("readable");
         assert_eq!(elsewhere, 0);
         results

@@ -10,11 +10,9 @@
 
 mod action;
 mod adapter;
-mod arrangement;
 mod camera;
 mod changes;
 mod command;
-mod deciding;
 mod dispatch;
 mod frame;
 mod headless;
@@ -22,10 +20,8 @@ mod lecture;
 mod lesson;
 mod memo;
 mod navigation;
-mod pictures;
 mod queries;
 mod run_pictures;
-mod run_results;
 mod save;
 mod saved;
 mod scoring;
@@ -36,7 +32,6 @@ mod shown;
 mod state;
 mod textures;
 mod theme;
-mod thumbnails;
 mod view_context;
 mod view_options;
 pub mod views;
@@ -44,24 +39,22 @@ mod window;
 mod worker;
 
 pub use action::{ACTIONS, Action, Group};
-pub use arrangement::Arrangement;
 pub use camera::NamedPose;
-pub use run_results::results_of_run;
 pub use save::SaveTarget;
-pub use scoring::{CostAlong, CostLine, DenseAsk, DenseMap, Probe};
+pub use scoring::{CostAlong, CostLine, DenseAsk, DenseMap, Probe, Scoring};
 pub use selection::{KnownResults, ResultRow, Results, VerdictChange};
-pub use setup::{ReferencePick, Setup};
+pub use setup::Setup;
 pub use shot::{Moment, Shot, ShotError, shoot};
 pub use shown::{ShownReason, ShownView};
 pub use state::{AppState, Note};
+pub(crate) use view_context::Sends;
 pub use view_context::ViewContext;
-pub use view_options::{CompareMode, Tab, ViewOptions};
+pub use view_options::{Arrangement, CompareMode, Tab, ViewOptions};
 pub use window::{WindowError, has_display, open, open_lesson};
 
 use egui::{Margin, Panel};
-use frame::Panes;
 use frame::help::ActionSearch;
-use frame::size::Sizes;
+use frame::{Panes, Sizes};
 use lesson::OpenLesson;
 
 use crate::lesson::Lesson;
@@ -202,53 +195,54 @@ impl App {
         let fixed = |panel: Panel, size: f32, margin: Margin| {
             panel.exact_size(size).resizable(false).frame(plain(margin))
         };
+        let context = &ViewContext::new(state, commands);
         fixed(Panel::top("toolbar"), sizes.toolbar, Margin::symmetric(8, 0))
-            .show(ui, |ui| frame::toolbar::ui(ui, state, commands, panes));
+            .show(ui, |ui| frame::toolbar::ui(ui, context, panes));
         let mut canvas = egui::Rect::NOTHING;
         let central = egui::CentralPanel::default().frame(plain(Margin::same(6)));
-        let options = &state.options;
+        let options = context.options;
         let below = Margin::symmetric(8, 4);
         match options.layout {
             _ if options.is_alone => {
                 central.show(ui, |ui| {
                     canvas = ui.max_rect();
-                    frame::canvas::alone(ui, state, commands, panes);
+                    frame::canvas::alone(ui, context, panes);
                 });
             }
             Arrangement::Inspect => {
                 fixed(Panel::top("verdicts"), sizes.verdicts, Margin::ZERO)
-                    .show(ui, |ui| frame::verdicts::ui(ui, state, commands));
-                let height = sizes.storyboard.min(frame::storyboard::height(&state.setup));
+                    .show(ui, |ui| frame::verdicts::ui(ui, context));
+                let height = sizes.storyboard.min(frame::storyboard::height(context.setup));
                 fixed(Panel::bottom("storyboard"), height, below)
-                    .show(ui, |ui| frame::storyboard::ui(ui, state, commands));
+                    .show(ui, |ui| frame::storyboard::ui(ui, context));
                 if options.shows_queries && sizes.has_sides {
                     fixed(Panel::left("queries"), sizes.queries, Margin::same(6))
-                        .show(ui, |ui| panes.show(ui, views::QUERIES, state, commands));
+                        .show(ui, |ui| panes.show(ui, views::QUERIES, context));
                 }
                 if options.shows_inspector && sizes.has_sides {
                     fixed(Panel::right("inspector"), sizes.inspector, Margin::symmetric(10, 6))
-                        .show(ui, |ui| frame::inspector::ui(ui, state, commands, panes));
+                        .show(ui, |ui| frame::inspector::ui(ui, context, panes));
                 }
                 central.show(ui, |ui| {
                     canvas = ui.max_rect();
-                    frame::canvas::ui(ui, state, commands, panes, 4);
+                    frame::canvas::ui(ui, context, panes, 4);
                 });
             }
             Arrangement::Lecture => {
                 fixed(Panel::bottom("lecture"), sizes.sentence, below)
-                    .show(ui, |ui| lecture::ui(ui, state, commands));
+                    .show(ui, |ui| lecture::ui(ui, context));
                 if let Some(lesson) = lesson {
                     Panel::left("lesson")
                         .exact_size(lesson::WIDTH)
                         .resizable(false)
-                        .show(ui, |ui| lesson.ui(ui, state, commands));
+                        .show(ui, |ui| lesson.ui(ui, context));
                 }
                 central.show(ui, |ui| {
                     canvas = ui.max_rect();
-                    if state.options.lockstep.is_some() {
-                        panes.show(ui, "lockstep", state, commands);
+                    if context.options.lockstep.is_some() {
+                        panes.show(ui, "lockstep", context);
                     } else {
-                        frame::canvas::ui(ui, state, commands, panes, 2);
+                        frame::canvas::ui(ui, context, panes, 2);
                     }
                 });
             }
@@ -256,9 +250,9 @@ impl App {
                 let width = ui.available_width() * 0.44;
                 fixed(Panel::right("selected"), width, Margin::same(10)).show(ui, |ui| {
                     canvas = ui.max_rect();
-                    frame::batch::right(ui, state, commands, panes);
+                    frame::batch::right(ui, context, panes);
                 });
-                central.show(ui, |ui| frame::batch::left(ui, state, commands, panes));
+                central.show(ui, |ui| frame::batch::left(ui, context, panes));
             }
         }
         self.canvas = canvas;
@@ -266,12 +260,13 @@ impl App {
 
     /// What is open above all parts.
     fn above(&mut self, ctx: &egui::Context) {
-        frame::notes::ui(ctx, &self.state, &self.commands);
+        let context = ViewContext::new(&self.state, &self.commands);
+        frame::notes(ctx, &context);
         let is_over = |asking: &mut save::Asking| asking.ui(ctx, &self.commands);
         if self.asking.as_mut().is_some_and(is_over) {
             self.asking = None;
         }
-        let is_over = |search: &mut ActionSearch| search.ui(ctx, &self.state, &self.commands);
+        let is_over = |search: &mut ActionSearch| search.ui(ctx, &context);
         if self.search.as_mut().is_some_and(is_over) {
             self.search = None;
         }

@@ -106,6 +106,58 @@ pub(crate) fn sentence(event: &Event) -> Option<String> {
     })
 }
 
+/// What a stage does, for someone who sees it for the first time.
+#[cfg(feature = "app")]
+pub(crate) fn about(stage: Stage) -> &'static str {
+    use crate::grid::Phase;
+
+    match stage {
+        Stage::Estimator(_) => "The method begins with two photos. One has a pose and a scan.",
+        Stage::Retrieve => "The photos' looks suggest which places could be the right one.",
+        Stage::Detect => "It finds points that stand out, and describes the surroundings of each.",
+        Stage::Match => {
+            "Each query point looks for its like in the reference and keeps only a clear winner."
+        }
+        Stage::DepthLift => {
+            "The scan gives matched points a depth, so they become points in space."
+        }
+        Stage::MatchGuided => {
+            "A first pose says where each point must be seen, so it may match more freely."
+        }
+        Stage::Consensus => {
+            "Three matches give a pose, a fourth tells which; the pose with most support wins."
+        }
+        Stage::Accept => "Would chance alone explain as many matches? Then there is no pose.",
+        Stage::Color => "The scan takes its colours from the reference photo.",
+        Stage::Search(Phase::PositionCoarse) => {
+            "It renders the map at each position of a coarse grid and compares it with the query."
+        }
+        Stage::Search(Phase::PositionFine) => {
+            "Around the position of lowest cost the grid becomes finer."
+        }
+        Stage::Search(Phase::YawCoarse) => {
+            "At the position of lowest cost the camera turns left and right."
+        }
+        Stage::Search(Phase::YawFine) => {
+            "Around the heading of lowest cost the steps become finer."
+        }
+        Stage::Descend => {
+            "From the reference it goes downhill, first over blurred photos, then over sharper ones."
+        }
+        Stage::SearchCoarse => {
+            "Smaller copies of the photos have wider basins, so it searches them first."
+        }
+        Stage::RefinePlane => "The best coarse minima go downhill in position and heading.",
+        Stage::RefineSix => "Now height, pitch and roll may change too.",
+        Stage::Judge => "One cost compares the poses of several methods.",
+        Stage::Assess => {
+            "How good is the minimum? It is compared with its rivals and with shuffled pixels."
+        }
+        Stage::Fuse => "The poses from all references become one.",
+        _ => stage.name(),
+    }
+}
+
 /// The stages around an event, outermost first.
 pub(crate) fn stages(open: &[Stage]) -> String {
     let names: Vec<&str> = open.iter().map(|stage| stage.name()).collect();

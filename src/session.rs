@@ -7,6 +7,7 @@
 mod breakpoint;
 mod index_file;
 mod job;
+mod job_changes;
 mod message;
 mod pausing;
 mod run;

@@ -2,14 +2,15 @@
 //!
 //! A new action is one entry. Keys, tooltips, menus, the list of keys and the search all come from the table.
 
-use egui::{Button, Key, KeyboardShortcut, Modifiers, Ui};
+use egui::{Button, Key, KeyboardShortcut, Modifiers, Response, Ui};
 
 use super::App;
-use super::arrangement::Arrangement;
 use super::camera::{NamedPose, Nudge};
 use super::command::Queue;
 use super::save::SaveTarget;
 use super::state::AppState;
+use super::view_context::{Sends, ViewContext};
+use super::view_options::Arrangement;
 use super::view_options::{CompareMode, Tab};
 use crate::session::RunMode;
 
@@ -220,23 +221,33 @@ impl Action {
     }
 
     /// Its entry in a menu.
-    pub(super) fn menu_item(&self, ui: &mut Ui, state: &AppState, commands: &Queue) {
+    pub(super) fn menu_item(&self, ui: &mut Ui, context: &ViewContext<'_>) {
         let keys = self.keys_text(ui.ctx());
-        let button = Button::selectable((self.is_on)(state), self.text).shortcut_text(keys);
-        if ui.add(button).clicked() {
-            commands.send(self.run);
+        let button = Button::selectable((self.is_on)(context.state), self.text).shortcut_text(keys);
+        if ui.add(button).sends(context, self.run) {
             ui.close();
         }
     }
 }
 
 /// A button that does the action of this text; its tooltip comes from the table.
-pub(super) fn button(ui: &mut Ui, state: &AppState, commands: &Queue, name: &str, text: &str) {
+pub(super) fn button(ui: &mut Ui, context: &ViewContext<'_>, name: &str, text: &str) {
     let Some(action) = of(text) else { return };
-    let button = Button::selectable((action.is_on)(state), name).frame_when_inactive(true);
-    if ui.add(button).on_hover_text(action.tooltip(ui.ctx())).clicked() {
-        commands.send(action.run);
-    }
+    let button = Button::selectable((action.is_on)(context.state), name).frame_when_inactive(true);
+    ui.add(button).on_hover_text(action.tooltip(ui.ctx())).sends(context, action.run);
+}
+
+/// The same for what is switched on and off, without a frame while it is off.
+pub(super) fn toggle(
+    ui: &mut Ui,
+    context: &ViewContext<'_>,
+    name: &str,
+    text: &'static str,
+) -> Response {
+    let is_on = of(text).is_some_and(|action| (action.is_on)(context.state));
+    let response = ui.selectable_label(is_on, name).on_hover_text(tooltip(ui.ctx(), text));
+    response.sends(context, move |app| app.act(text));
+    response
 }
 
 /// Sends the commands of the keys of this frame, unless a field has the keyboard.

@@ -1,20 +1,21 @@
 //! How commands change the state: the run, the cursor, the query, its references, the camera.
 
-use super::arrangement::Arrangement;
 use super::camera::{NamedPose, Nudge};
-use super::deciding::deciding;
 use super::navigation::Navigation;
 use super::queries::Queries;
 use super::run_pictures::RunPictures;
-use super::setup::ReferencePick;
+use super::selection::Results;
 use super::state::{AppState, KeptRun};
+use super::view_options::Arrangement;
 use super::view_options::{CompareMode, Tab};
-use crate::event::PhaseSearched;
+use crate::diagnosis::DecidedAt;
+use crate::event::{PhaseSearched, Stage};
 use crate::fusion::Fusion;
 use crate::geometry::Pose;
 use crate::grid::Phase;
 use crate::image::Degradation;
-use crate::localize::References;
+use crate::lesson::Moment;
+use crate::localize::{QueryResult, References, Selection};
 use crate::method::Method;
 use crate::session::{Breakpoint, Breakpoints, Part, RunMode, RunState};
 
@@ -239,15 +240,15 @@ impl AppState {
         }
     }
 
-    /// Chooses the references in another way.
-    pub fn pick_references(&mut self, pick: ReferencePick) {
+    /// Chooses the references in another way; `None` by hand.
+    pub fn pick_references(&mut self, pick: Option<Selection>) {
         self.stop_queries();
         match pick {
-            ReferencePick::ByHand => {
+            None => {
                 let chosen = self.setup.chosen.frames.clone();
                 self.setup.choose_by_hand(chosen);
             }
-            ReferencePick::By(selection) => {
+            Some(selection) => {
                 self.setup.task.protocol.select(selection);
                 self.setup.chosen = References::default();
                 self.start_run(RunMode::Running);
@@ -275,14 +276,20 @@ impl AppState {
     /// Changes the uncertainty radius \[m\] and runs again.
     pub(super) fn set_radius(&mut self, radius_m: f64) {
         self.setup.task.protocol.radii_m = vec![radius_m];
-        self.setup.go_to(self.setup.query);
+        self.choose_anew();
         self.restart_run();
+    }
+
+    /// Forgets references that are not chosen by hand: new ones are needed.
+    fn choose_anew(&mut self) {
+        let query = self.setup.query;
+        self.setup.go_to(query);
     }
 
     /// Changes the seed and runs again.
     pub fn set_seed(&mut self, seed: u64) {
         self.setup.set_seed(seed);
-        self.setup.go_to(self.setup.query);
+        self.choose_anew();
         self.restart_run();
     }
 
@@ -338,7 +345,7 @@ impl AppState {
 
     /// Keeps all results that are known as A, to compare those that follow with.
     pub(super) fn keep_results(&mut self) {
-        self.set_results_before(Some(self.results.clone()));
+        self.set_results_before(Some(Results::clone(&self.results)));
         self.note("These results are kept as A; change a setting and run all again", false);
     }
 
@@ -417,5 +424,43 @@ impl AppState {
             NamedPose::Truth => loaded.truth.filter(|_| self.options.shows_truth),
             NamedPose::Last => self.camera_before,
         }
+    }
+}
+
+/// The moment that shows why a result is what it is: the end of the stage that its primary verdict is
+/// about, where there is one, else the end of the method.
+fn deciding(result: &QueryResult) -> Moment {
+    let code = result.diagnosis.first().map(|finding| finding.code);
+    let stage = code.and_then(|code| match code.rule().decided_at {
+        DecidedAt::Stage(stage) => Some(stage),
+        DecidedAt::End => None,
+    });
+    let of_a_method = |method: Method, stage: Stage| Moment::After {
+        // Choosing and fusing belong to no method.
+        method: (!Breakpoint::is_outside(stage.name())).then_some(method),
+        stage: stage.name(),
+    };
+    match stage {
+        Some(stage) => of_a_method(result.method, stage),
+        None => Moment::After { method: None, stage: result.method.name() },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnosis::RULES;
+    use crate::event::Stage;
+
+    #[test]
+    fn every_verdict_leads_to_a_stage_that_breakpoints_know() {
+        for rule in RULES {
+            if let DecidedAt::Stage(stage) = rule.decided_at {
+                let name = stage.name();
+                assert!(Breakpoint::stages().contains(&name), "{}: {name}", rule.code);
+            }
+        }
+        assert!(Breakpoint::is_outside(Stage::Fuse.name()));
+        assert!(!Breakpoint::is_outside(Stage::Match.name()));
     }
 }

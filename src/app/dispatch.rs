@@ -4,11 +4,11 @@ use std::path::{Path, PathBuf};
 
 use super::App;
 use super::action;
-use super::arrangement::Arrangement;
 use super::frame::help::ActionSearch;
 use super::navigation::Navigation;
 use super::save::{Asking, SaveTarget};
 use super::saved::SavedSession;
+use super::view_options::Arrangement;
 
 impl App {
     /// Does the action of [`ACTIONS`](super::ACTIONS) that has this text, as its key or its button does.

@@ -10,8 +10,8 @@ use super::App;
 use super::action;
 use super::command::Queue;
 use super::setup::Setup;
-use super::state::AppState;
 use super::theme;
+use super::view_context::{Sends, ViewContext};
 use crate::geometry::Pose;
 use crate::grid::Offset;
 use crate::lesson::{Answer, Lesson, Moment, Page, Question, SettingError, named_scenes};
@@ -98,7 +98,8 @@ impl OpenLesson {
             return Ok(None);
         }
         let opened = |name: &str| self.scenes.get(name).cloned();
-        let open = self.lesson.setting(&wanted).open(&opened)?;
+        let mut open = self.lesson.setting(&wanted).open(&opened)?;
+        open.frames = Arc::clone(&setup.frames);
         self.variant = wanted;
         let setup = Setup::of_lesson(open, setup.folder.clone());
         self.remember(&setup);
@@ -160,7 +161,7 @@ impl OpenLesson {
     }
 
     /// Draws the page.
-    pub(super) fn ui(&mut self, ui: &mut Ui, state: &AppState, commands: &Queue) {
+    pub(super) fn ui(&mut self, ui: &mut Ui, context: &ViewContext<'_>) {
         let (number, pages) = (self.page + 1, self.lesson.pages.len());
         ui.add_space(4.0);
         ui.horizontal_wrapped(|ui| {
@@ -169,20 +170,18 @@ impl OpenLesson {
                 .small_button("Close")
                 .on_hover_text("Back to the window as it is without a lesson");
             let close = close.accessible_name("Close the lesson");
-            if close.clicked() {
-                commands.send(App::close_lesson);
-            }
+            close.sends(context, App::close_lesson);
         });
         let progress = ProgressBar::new(number as f32 / pages as f32).desired_height(6.0);
         ui.add(progress);
         ui.horizontal(|ui| {
             let turn = |ui: &mut Ui, is_on: bool, name: &str, text: &str| {
-                ui.add_enabled_ui(is_on, |ui| action::button(ui, state, commands, name, text));
+                ui.add_enabled_ui(is_on, |ui| action::button(ui, context, name, text));
             };
             turn(ui, number > 1, "◀ Back", "Previous page");
             ui.label(format!("page {number} of {pages}"));
             turn(ui, number < pages, "Next ▶", "Next page");
-            if matches!(state.run_state(), RunState::Loading | RunState::Running) {
+            if matches!(context.state.run_state(), RunState::Loading | RunState::Running) {
                 ui.spinner();
             }
         });
@@ -195,7 +194,7 @@ impl OpenLesson {
             if let Some(question) = &page.question {
                 ui.separator();
                 let given = self.given.get(&self.page).copied();
-                asked_ui(ui, state, commands, question, given);
+                asked_ui(ui, context, question, given);
                 if given.is_some() {
                     CommonMarkViewer::new().show(ui, &mut self.words, &question.because);
                 }
@@ -215,13 +214,7 @@ fn larger(ui: &mut Ui) {
     }
 }
 
-fn asked_ui(
-    ui: &mut Ui,
-    state: &AppState,
-    commands: &Queue,
-    question: &Question,
-    given: Option<Given>,
-) {
+fn asked_ui(ui: &mut Ui, context: &ViewContext<'_>, question: &Question, given: Option<Given>) {
     ui.label(RichText::new(&question.ask).strong());
     match (&question.answer, given) {
         (Answer::Choice { choices, right }, given) => {
@@ -230,9 +223,7 @@ fn asked_ui(
                 let Some(given) = given else {
                     let size = [ui.available_width(), 0.0];
                     let button = egui::Button::new(text).wrap().min_size(size.into());
-                    if ui.add(button).clicked() {
-                        commands.send(move |app| app.answer(index));
-                    }
+                    ui.add(button).sends(context, move |app| app.answer(index));
                     continue;
                 };
                 ui.label(match (index == *right, given == Given::Choice(index)) {
@@ -248,16 +239,14 @@ fn asked_ui(
         }
         (Answer::Place(_), None) => {
             ui.weak("Click on the map, or move the camera with Alt and the arrows");
-            let words = state.camera.and_then(|camera| place(state, &camera));
+            let words = context.state.camera.and_then(|camera| place(context, &camera));
             let is_placed = words.is_some();
             ui.label(words.unwrap_or_else(|| "Nothing is chosen yet".to_owned()));
             let button = ui.add_enabled(is_placed, egui::Button::new("This is my guess (Enter)"));
-            if button.clicked() {
-                commands.send(App::guess);
-            }
+            button.sends(context, App::guess);
         }
         (Answer::Place(method), Some(Given::Place(guess))) => {
-            for words in outcome(state, *method, &guess) {
+            for words in outcome(context, *method, &guess) {
                 ui.label(RichText::new(words).strong());
             }
         }
@@ -266,8 +255,8 @@ fn asked_ui(
 }
 
 /// Where a camera is, seen from the reference.
-fn place(state: &AppState, camera: &Pose) -> Option<String> {
-    let run = state.run();
+fn place(context: &ViewContext<'_>, camera: &Pose) -> Option<String> {
+    let run = context.state.run();
     let problem = run.loaded.as_deref()?.problems.first()?;
     let offset = Offset::of(&problem.reference_from_query(camera));
     let side = if offset.right_m < 0.0 { "left" } else { "right" };
@@ -279,13 +268,13 @@ fn place(state: &AppState, camera: &Pose) -> Option<String> {
 }
 
 /// How good a guess was, as far as that is told.
-fn outcome(state: &AppState, method: Method, guess: &Pose) -> Vec<String> {
-    let run = state.run();
+fn outcome(context: &ViewContext<'_>, method: Method, guess: &Pose) -> Vec<String> {
+    let run = context.state.run();
     let apart = |pose: &Pose| (guess.translation.vector - pose.translation.vector).norm();
     let span = run.span_of(Part::Reference(method, 0));
-    let span = span.filter(|span| state.has_come(span));
+    let span = span.filter(|span| context.state.has_come(span));
     let pose = span.and_then(|span| span.result.as_ref()?.pose.as_ref()?.to_pose());
-    let mut words: Vec<String> = place(state, guess).into_iter().collect();
+    let mut words: Vec<String> = place(context, guess).into_iter().collect();
     match pose {
         Some(pose) => {
             words.push(format!("{} puts it {:.2} m from there", method.label(), apart(&pose)));

@@ -13,8 +13,8 @@ use super::worker::{Answers, Worker};
 use crate::event::{KindSet, Side};
 use crate::localize::{LocalizeObserver, QueryResult};
 use crate::picture;
-use crate::scene::{FrameStore, Scene};
-use crate::session::JobError;
+use crate::scene::Scene;
+use crate::session::{Job, JobError};
 use crate::trace::{Cancelled, Record, Sink};
 
 /// Width of a thumbnail \[px\].
@@ -23,13 +23,12 @@ const THUMBNAIL_WIDTH: u32 = 124;
 /// The results of a query, or why it could not be run.
 pub(super) type BatchOutcome = (usize, Result<Vec<QueryResult>, String>);
 
-/// Of the queries' and the references' frames; `None` for a photo that cannot be read.
-type Thumbnails = Answers<(Side, usize), Arc<dyn Scene>, Option<TextureHandle>>;
-
 /// Thumbnails and results that are made beside the window's thread.
 pub struct Queries {
-    thumbnails: RefCell<Thumbnails>,
-    worker: Worker<(Setup, UntilStopped), BatchOutcome>,
+    /// Of the queries' and the references' frames; `None` for a photo that cannot be read.
+    thumbnails: RefCell<Answers<(Side, usize), Option<TextureHandle>>>,
+    ctx: egui::Context,
+    worker: Worker<BatchOutcome>,
     batch: Option<Batch>,
 }
 
@@ -72,18 +71,8 @@ impl LocalizeObserver for UntilStopped {
 
 impl Queries {
     pub(super) fn new(ctx: egui::Context) -> Self {
-        let painter = ctx.clone();
-        let thumbnails =
-            Answers::new("thumbnails", ctx.clone(), move |of: &_, scene: Arc<dyn Scene>| {
-                let image = thumbnail(&*scene, *of)?;
-                Some(painter.load_texture(
-                    format!("thumbnail {of:?}"),
-                    image,
-                    TextureOptions::LINEAR,
-                ))
-            });
-        let worker = Worker::in_parts("queries", ctx, localize_all);
-        Self { thumbnails: RefCell::new(thumbnails), worker, batch: None }
+        let thumbnails = RefCell::new(Answers::new("thumbnails", &ctx));
+        Self { thumbnails, worker: Worker::new("queries", &ctx), ctx, batch: None }
     }
 
     /// The thumbnail of a frame of the queries' or the references' scene, once it is made. With a setup, asking for it
@@ -95,7 +84,13 @@ impl Queries {
         setup: Option<&Setup>,
     ) -> Option<TextureHandle> {
         let mut thumbnails = self.thumbnails.borrow_mut();
-        thumbnails.ask((side, frame), || Some(Arc::clone(setup?.scene(side))));
+        thumbnails.ask((side, frame), || {
+            let (scene, ctx) = (Arc::clone(setup?.scene(side)), self.ctx.clone());
+            Some(move || {
+                let image = thumbnail(&*scene, frame)?;
+                Some(ctx.load_texture("thumbnail", image, TextureOptions::LINEAR))
+            })
+        });
         thumbnails.get(&(side, frame))?.clone()
     }
 
@@ -121,8 +116,10 @@ impl Queries {
             return;
         }
         let stop = UntilStopped::default();
-        self.worker.ask((setup.clone(), stop.clone()));
-        self.batch = Some(Batch { stop, done: 0, all: setup.offered.len() });
+        let mut setup = setup.clone();
+        setup.frames = Arc::default();
+        self.batch = Some(Batch { stop: stop.clone(), done: 0, all: setup.offered.len() });
+        self.worker.ask(move |emit| localize_all(&setup, &stop, emit));
     }
 
     /// Takes in what was made.
@@ -139,7 +136,7 @@ impl Queries {
     }
 }
 
-fn thumbnail(scene: &dyn Scene, (_, frame): (Side, usize)) -> Option<ColorImage> {
+fn thumbnail(scene: &dyn Scene, frame: usize) -> Option<ColorImage> {
     let photo = scene.photo(frame).ok()?;
     let (width, height) = photo.dimensions();
     let small = picture::photo(&photo).thumbnail(THUMBNAIL_WIDTH, height * THUMBNAIL_WIDTH / width);
@@ -147,10 +144,9 @@ fn thumbnail(scene: &dyn Scene, (_, frame): (Side, usize)) -> Option<ColorImage>
 }
 
 /// Localises all queries of a setup. A query whose estimator panics is reported like one whose files cannot be read.
-fn localize_all((setup, stop): (Setup, UntilStopped), emit: &mut dyn FnMut(BatchOutcome) -> bool) {
-    let frames = Arc::default();
+fn localize_all(setup: &Setup, stop: &UntilStopped, emit: &mut dyn FnMut(BatchOutcome) -> bool) {
     for &query in &setup.offered {
-        let localized = catch_unwind(AssertUnwindSafe(|| localize(&setup, query, &frames, &stop)));
+        let localized = catch_unwind(AssertUnwindSafe(|| localize(&setup.job, query, stop)));
         let outcome = match localized {
             Ok(Ok(results)) => Ok(results),
             Ok(Err(error)) if error.is_cancelled() => break,
@@ -163,14 +159,9 @@ fn localize_all((setup, stop): (Setup, UntilStopped), emit: &mut dyn FnMut(Batch
     }
 }
 
-fn localize(
-    setup: &Setup,
-    query: usize,
-    frames: &Arc<FrameStore>,
-    stop: &UntilStopped,
-) -> Result<Vec<QueryResult>, JobError> {
-    let mut setup = setup.clone();
-    setup.go_to(query);
-    setup.leave_itself_out();
-    setup.job(frames).work(0, &mut stop.clone(), |_| {})
+fn localize(job: &Job, query: usize, stop: &UntilStopped) -> Result<Vec<QueryResult>, JobError> {
+    let mut job = job.clone();
+    job.go_to(query);
+    job.leave_itself_out();
+    job.work(0, &mut stop.clone(), |_| {})
 }

@@ -8,10 +8,10 @@ use posescope_core::text::json_message;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
-use super::arrangement::Arrangement;
 use super::setup::Setup;
+use super::view_options::Arrangement;
 use crate::scene::{self, Scene};
-use crate::session::{IndexFile, Task, TaskScenes};
+use crate::session::{IndexFile, Job, Task, TaskScenes};
 
 /// The version of the file's form.
 const SCHEMA: &str = "posescope.session/4";
@@ -92,12 +92,9 @@ impl SavedSession {
             .iter()
             .map(|name| references.find(name).map_err(words))
             .collect::<Result<_, _>>()?;
-        Ok(Setup {
-            offered: if is_same_scene {
-                present.offered.clone()
-            } else {
-                (0..queries.frames().len()).collect()
-            },
+        let job = Job {
+            // The scenes are others, even where they have the same names.
+            frames: Arc::default(),
             references,
             queries,
             query,
@@ -108,6 +105,14 @@ impl SavedSession {
                 Arc::new(IndexFile::of(task))
             },
             task: task.clone(),
+        };
+        Ok(Setup {
+            offered: if is_same_scene {
+                present.offered.clone()
+            } else {
+                (0..job.queries.frames().len()).collect()
+            },
+            job,
             ..present.clone()
         })
     }

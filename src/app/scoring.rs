@@ -14,6 +14,171 @@ use crate::problem::Problem;
 use crate::proof::between;
 use crate::render::{Comparison, Score};
 
+/// What was asked and what is known so far, for the problem and the parameters of one run.
+pub struct Scoring {
+    prober: Worker<Probe>,
+    /// The pose that was asked for last.
+    asked: Option<Pose>,
+    probe: Option<Probe>,
+    /// Of each method along the line that was asked for last.
+    lines: Answers<CostLine, CostAlong>,
+    filler: Worker<Scored>,
+    /// The map that is being filled. It stands still while it is not shown.
+    filling: Option<DenseAsk>,
+    /// Whether a map was asked for since the last poll.
+    is_shown: bool,
+    /// The latest of each method.
+    maps: Vec<DenseMap>,
+}
+
+impl Scoring {
+    pub(super) fn new(ctx: &egui::Context) -> Self {
+        Self {
+            prober: Worker::new("prober", ctx),
+            asked: None,
+            probe: None,
+            lines: Answers::new("cost line", ctx),
+            filler: Worker::new("dense map", ctx),
+            filling: None,
+            is_shown: false,
+            maps: Vec::new(),
+        }
+    }
+
+    /// Forgets everything: the problem or the parameters have changed.
+    pub(super) fn forget(&mut self) {
+        self.prober.forget();
+        self.asked = None;
+        self.probe = None;
+        self.lines.forget();
+        self.pause();
+        self.maps.clear();
+    }
+
+    /// Takes in answers. Errors are faults of ours.
+    pub(super) fn poll(&mut self) -> Vec<String> {
+        let mut errors = Vec::new();
+        for answer in self.prober.poll() {
+            match answer {
+                Some(probe) => self.probe = Some(probe),
+                None => errors.push("the pose could not be tried".to_owned()),
+            }
+        }
+        if !self.lines.poll() {
+            errors.push("the cost between two poses could not be computed".to_owned());
+        }
+        for answer in self.filler.poll() {
+            let map = self.maps.iter_mut().find(|map| Some(map.ask) == self.filling);
+            match (answer, map) {
+                (
+                    Some(Some((scores, took))),
+                    Some(DenseMap { surface: Ok(surface), took: all, .. }),
+                ) => {
+                    surface.take(&scores);
+                    *all += took;
+                }
+                (Some(None), Some(map)) => {
+                    errors
+                        .push(format!("{} has no cost to fill a map with", map.ask.method.label()));
+                }
+                (None, _) => errors.push("the dense map could not be computed".to_owned()),
+                _ => {}
+            }
+        }
+        if !self.filler.is_busy() {
+            self.filling = None;
+        }
+        if !std::mem::take(&mut self.is_shown) {
+            self.pause();
+        }
+        errors
+    }
+
+    /// Asks what these methods' costs say of a pose, in place of the pose that was asked for before.
+    pub(super) fn ask(
+        &mut self,
+        problem: &Problem,
+        methods: Vec<Method>,
+        params: &Params,
+        pose: Pose,
+    ) {
+        if self.asked.replace(pose) == Some(pose) {
+            return;
+        }
+        self.prober.forget();
+        let (problem, params) = (problem.clone(), params.clone());
+        self.prober.ask(move |emit| {
+            emit(Probe::of(&problem, &methods, &params, pose));
+        });
+    }
+
+    /// What is known of the pose that was asked for last; until then, of the one before.
+    pub fn probe(&self) -> Option<&Probe> {
+        self.probe.as_ref()
+    }
+
+    /// Whether the answer for a pose is still to come.
+    pub fn is_probing(&self) -> bool {
+        self.prober.is_busy()
+    }
+
+    /// Has the cost along a line computed.
+    pub(super) fn trace(&mut self, problem: &Problem, params: &Params, line: CostLine) {
+        self.lines.forget_where(|other| other.method == line.method && *other != line);
+        self.lines.ask(line, || {
+            let (problem, params) = (problem.clone(), params.clone());
+            Some(move || CostAlong::of(line, &problem, &params))
+        });
+    }
+
+    /// What is known of a method's cost along the line that was asked for last.
+    pub fn along(&self, method: Method) -> Option<&CostAlong> {
+        self.lines.find(|line| line.method == method)
+    }
+
+    /// Whether the cost along a line is still to come.
+    pub fn is_tracing(&self) -> bool {
+        self.lines.is_busy()
+    }
+
+    /// Has a dense map filled for as long as this is called in each frame. Another map of the same method is forgotten;
+    /// one that was begun goes on.
+    pub(super) fn fill(&mut self, problem: &Problem, params: &Params, ask: DenseAsk) {
+        self.is_shown = true;
+        if self.filling == Some(ask) {
+            return;
+        }
+        self.pause();
+        if !self.maps.iter().any(|map| map.ask == ask) {
+            self.maps.retain(|map| map.ask.method != ask.method);
+            self.maps.push(DenseMap::new(ask, problem, params));
+        }
+        let map = self.maps.iter().find(|map| map.ask == ask);
+        let surface = map.and_then(|map| map.surface.as_ref().ok());
+        let Some(surface) = surface.filter(|surface| !surface.is_complete()) else {
+            return;
+        };
+        self.filling = Some(ask);
+        let (problem, params, surface) = (problem.clone(), params.clone(), surface.clone());
+        self.filler.ask(move |emit| fill(&problem, &params, ask.method, surface, emit));
+    }
+
+    fn pause(&mut self) {
+        self.filler.forget();
+        self.filling = None;
+    }
+
+    /// The dense map of a method that was asked for last.
+    pub fn dense_map(&self, method: Method) -> Option<&DenseMap> {
+        self.maps.iter().find(|map| map.ask.method == method)
+    }
+
+    /// Whether a dense map is being filled.
+    pub fn is_filling(&self) -> bool {
+        self.filling.is_some()
+    }
+}
+
 /// The direct methods at one pose.
 #[derive(Clone)]
 pub struct Probe {
@@ -23,96 +188,25 @@ pub struct Probe {
     pub comparisons: Vec<(Method, Arc<Comparison>)>,
 }
 
-struct ProbeRequest {
-    problem: Problem,
-    methods: Vec<Method>,
-    params: Params,
-    pose: Pose,
-}
-
-/// Answers for the pose that was asked for last; older questions are dropped.
-pub(super) struct Prober {
-    worker: Worker<ProbeRequest, Probe>,
-    asked: Option<Pose>,
-    latest: Option<Probe>,
-}
-
-impl Prober {
-    pub(super) fn new(ctx: egui::Context) -> Self {
-        Self {
-            worker: Worker::new("prober", ctx, |request: ProbeRequest| request.answer()),
-            asked: None,
-            latest: None,
-        }
-    }
-
-    /// Asks what these methods' costs say of a pose, unless it was asked for last.
-    pub(super) fn ask(
-        &mut self,
-        problem: &Problem,
-        methods: &[Method],
-        params: &Params,
-        pose: Pose,
-    ) {
-        if self.asked == Some(pose) {
-            return;
-        }
-        self.asked = Some(pose);
-        self.worker.forget();
-        self.worker.ask(ProbeRequest {
-            problem: problem.clone(),
-            methods: methods.to_vec(),
-            params: params.clone(),
-            pose,
-        });
-    }
-
-    /// Forgets everything: the problem or the parameters have changed.
-    pub(super) fn forget(&mut self) {
-        self.worker.forget();
-        self.asked = None;
-        self.latest = None;
-    }
-
-    /// Takes in answers. An error is a fault of ours.
-    pub(super) fn poll(&mut self) -> Result<(), String> {
-        for answer in self.worker.poll() {
-            self.latest = Some(answer.ok_or("the pose could not be tried")?);
-        }
-        Ok(())
-    }
-
-    /// The answer for a pose; until it comes, the latest there is.
-    pub(super) fn latest(&self) -> Option<&Probe> {
-        self.latest.as_ref()
-    }
-
-    /// Whether an answer is still to come.
-    pub(super) fn is_busy(&self) -> bool {
-        self.worker.is_busy()
-    }
-}
-
-impl ProbeRequest {
-    fn answer(&self) -> Probe {
+impl Probe {
+    fn of(problem: &Problem, methods: &[Method], params: &Params, pose: Pose) -> Self {
         let compare = |method: Method| {
-            let estimator = estimator::entry(method).make(&self.params);
-            let comparison = estimator.compare_at(&self.problem, &self.pose)?;
+            let estimator = estimator::entry(method).make(params);
+            let comparison = estimator.compare_at(problem, &pose)?;
             Some((method, Arc::new(comparison)))
         };
         // Beside each other, and not in the pool of threads: a thread of the pool that waits for what
         // another method makes of the frame would take up a part of that itself, and wait for ever.
         let comparisons = std::thread::scope(|scope| {
-            let methods = self.methods.iter();
-            let started: Vec<_> =
-                methods.map(|&method| scope.spawn(move || compare(method))).collect();
+            let started = methods.iter().map(|&method| scope.spawn(move || compare(method)));
+            let started: Vec<_> = started.collect();
             let ended = started.into_iter().map(|thread| match thread.join() {
                 Ok(comparison) => comparison,
                 Err(panic) => std::panic::resume_unwind(panic),
             });
             ended.flatten().collect()
         });
-        Probe { pose: self.pose, comparisons }
+        Self { pose, comparisons }
     }
 }
 
@@ -159,21 +253,17 @@ pub struct CostAlong {
     pub scores: Vec<(f64, Option<Score>)>,
 }
 
-/// The costs along lines: of each method the one that was asked for last.
-pub(super) type Lines = Answers<CostLine, (Problem, Params), CostAlong>;
-
-/// Starts the thread that scores the poses of lines.
-pub(super) fn lines(ctx: egui::Context) -> Lines {
-    Answers::new("cost line", ctx, |line: &CostLine, question: (Problem, Params)| {
-        let (problem, params) = question;
+impl CostAlong {
+    /// Scores the poses of a line.
+    fn of(line: CostLine, problem: &Problem, params: &Params) -> Self {
         let pose = |share| problem.reference_from_query(&line.pose(share));
         let poses: Vec<Pose> = CostLine::shares().map(pose).collect();
-        let estimator = estimator::entry(line.method).make(&params);
-        let scorer = estimator.scorer(&problem);
+        let estimator = estimator::entry(line.method).make(params);
+        let scorer = estimator.scorer(problem);
         let scores = scorer.map_or_else(Vec::new, |scorer| scorer.score(&poses));
         let scores = CostLine::shares().zip(scores.into_iter().map(Some)).collect();
-        CostAlong { line: *line, scores }
-    })
+        Self { line, scores }
+    }
 }
 
 /// Which dense map is wanted.
@@ -189,9 +279,12 @@ pub struct DenseAsk {
 
 /// A dense map, as far as it is filled.
 pub struct DenseMap {
-    ask: DenseAsk,
-    surface: Result<DenseSurface, LatticeTooLarge>,
-    took: Duration,
+    /// What was asked for.
+    pub ask: DenseAsk,
+    /// What is known so far, or why nothing can be known.
+    pub surface: Result<DenseSurface, LatticeTooLarge>,
+    /// How long it took so far.
+    pub took: Duration,
 }
 
 impl DenseMap {
@@ -200,154 +293,32 @@ impl DenseMap {
         grid.coarse_step_m = params.surface.step_m;
         grid.yaw_step_deg = params.surface.yaw_step_deg;
         let radius_m = problem.uncertainty_radius_m;
-        Self {
-            ask,
-            surface: DenseSurface::new(radius_m, &grid, ask.least_covered),
-            took: Duration::ZERO,
-        }
-    }
-
-    /// What was asked for.
-    pub fn ask(&self) -> &DenseAsk {
-        &self.ask
-    }
-
-    /// What is known so far, or why nothing can be known.
-    pub fn surface(&self) -> Result<&DenseSurface, &LatticeTooLarge> {
-        self.surface.as_ref()
-    }
-
-    /// How long it took so far.
-    pub fn took(&self) -> Duration {
-        self.took
+        let surface = DenseSurface::new(radius_m, &grid, ask.least_covered);
+        Self { ask, surface, took: Duration::ZERO }
     }
 }
 
-/// A map to go on with from where it is.
-struct DenseRequest {
-    problem: Problem,
-    params: Params,
-    ask: DenseAsk,
-    surface: DenseSurface,
-}
-
-/// The scores of the next hypotheses of a map, or that the method has no cost.
-struct Scored {
-    ask: DenseAsk,
-    scores: Option<Vec<Score>>,
-    took: Duration,
-}
-
-/// Fills the map that is shown, and stands still while none is.
-pub(super) struct DenseFiller {
-    worker: Worker<DenseRequest, Scored>,
-    /// The map that is being filled.
-    filling: Option<DenseAsk>,
-    /// Whether a map was asked for since the last poll.
-    is_shown: bool,
-    /// The latest of each method.
-    maps: Vec<DenseMap>,
-}
-
-impl DenseFiller {
-    pub(super) fn new(ctx: egui::Context) -> Self {
-        Self {
-            worker: Worker::in_parts("dense map", ctx, fill),
-            filling: None,
-            is_shown: false,
-            maps: Vec::new(),
-        }
-    }
-
-    /// Has a map filled for as long as this is called in each frame. Another map of the same method is forgotten; one
-    /// that was begun goes on.
-    pub(super) fn ask(&mut self, problem: &Problem, params: &Params, ask: DenseAsk) {
-        self.is_shown = true;
-        if self.filling == Some(ask) {
-            return;
-        }
-        self.pause();
-        if !self.maps.iter().any(|map| map.ask == ask) {
-            self.maps.retain(|map| map.ask.method != ask.method);
-            self.maps.push(DenseMap::new(ask, problem, params));
-        }
-        let map = self.maps.iter().find(|map| map.ask == ask);
-        let surface = map.and_then(|map| map.surface.as_ref().ok());
-        let Some(surface) = surface.filter(|surface| !surface.is_complete()) else {
-            return;
-        };
-        self.filling = Some(ask);
-        self.worker.ask(DenseRequest {
-            problem: problem.clone(),
-            params: params.clone(),
-            ask,
-            surface: surface.clone(),
-        });
-    }
-
-    fn pause(&mut self) {
-        self.worker.forget();
-        self.filling = None;
-    }
-
-    /// Forgets all maps: the problem or the parameters have changed.
-    pub(super) fn forget(&mut self) {
-        self.pause();
-        self.maps.clear();
-    }
-
-    /// Takes in answers, and stands still if no map was asked for since the last time. An error is a fault of ours.
-    pub(super) fn poll(&mut self) -> Result<(), String> {
-        for answer in self.worker.poll() {
-            let scored = answer.ok_or("the dense map could not be computed")?;
-            let Some(scores) = scored.scores else {
-                self.pause();
-                let method = scored.ask.method.label();
-                return Err(format!("{method} has no cost to fill a map with"));
-            };
-            let map = self.maps.iter_mut().find(|map| map.ask == scored.ask);
-            if let Some(map) = map
-                && let Ok(surface) = &mut map.surface
-            {
-                surface.take(&scores);
-                map.took += scored.took;
-            }
-        }
-        if !self.worker.is_busy() {
-            self.filling = None;
-        }
-        if !self.is_shown {
-            self.pause();
-        }
-        self.is_shown = false;
-        Ok(())
-    }
-
-    /// The map of a method that was asked for last.
-    pub(super) fn map(&self, method: Method) -> Option<&DenseMap> {
-        self.maps.iter().find(|map| map.ask.method == method)
-    }
-
-    /// Whether more is to come.
-    pub(super) fn is_busy(&self) -> bool {
-        self.filling.is_some()
-    }
-}
+/// The scores of the next hypotheses of a map and the time that they took; `None` where the method has no cost.
+type Scored = Option<(Vec<Score>, Duration)>;
 
 /// Scores batch after batch for as long as more is wanted.
-fn fill(mut request: DenseRequest, emit: &mut dyn FnMut(Scored) -> bool) {
-    let DenseRequest { problem, params, ask, surface } = &mut request;
-    let estimator = estimator::entry(ask.method).make(params);
+fn fill(
+    problem: &Problem,
+    params: &Params,
+    method: Method,
+    mut surface: DenseSurface,
+    emit: &mut dyn FnMut(Scored) -> bool,
+) {
+    let estimator = estimator::entry(method).make(params);
     let Some(scorer) = estimator.scorer(problem) else {
-        emit(Scored { ask: *ask, scores: None, took: Duration::ZERO });
+        emit(None);
         return;
     };
     let mut is_wanted = true;
     while is_wanted && !surface.is_complete() {
         let begun = Instant::now();
-        let scores = Some(surface.score_next(&scorer));
-        let took = begun.elapsed();
-        is_wanted = emit(Scored { ask: *ask, scores, took });
+        let scores = surface.score_next(&scorer);
+        is_wanted = emit(Some((scores, begun.elapsed())));
     }
 }
 

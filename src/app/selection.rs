@@ -2,6 +2,7 @@
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
+use std::ops::Deref;
 use std::rc::Rc;
 
 use super::memo::Memo;
@@ -55,16 +56,6 @@ impl std::fmt::Display for VerdictChange {
     }
 }
 
-/// The known results, and those to hold them against.
-#[derive(Clone, Copy)]
-pub(super) struct Known<'a> {
-    pub(super) now: &'a Results,
-    /// The results A, if some were kept or opened.
-    pub(super) before: Option<&'a Results>,
-    /// Grows with every change of either.
-    pub(super) version: u64,
-}
-
 /// What is asked of results to be looked at.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Wanted {
@@ -79,22 +70,64 @@ pub(super) struct Wanted {
 /// The rows that are wanted, or what is wrong with the condition.
 type Found = Result<Rc<[ResultRow]>, ConditionError>;
 
-/// The latest answers, which hold as long as nothing changes.
+/// The results of the queries that were run, those that they are compared with, and the latest selections of them, which
+/// hold as long as nothing changes.
 #[derive(Default)]
-pub(super) struct Selection {
+pub struct BatchResults {
+    now: Results,
+    /// The results A, if some were kept or opened.
+    before: Option<Results>,
+    /// Grows with every change.
+    version: u64,
     rows: RefCell<Memo<(u64, Wanted), Found>>,
     migrations: RefCell<Memo<u64, Rc<[Migration]>>>,
 }
 
-impl<'a> Known<'a> {
+impl Deref for BatchResults {
+    type Target = Results;
+
+    fn deref(&self) -> &Results {
+        &self.now
+    }
+}
+
+impl BatchResults {
+    /// Takes over other results.
+    pub(super) fn set(&mut self, now: Results) {
+        self.now = now;
+        self.version += 1;
+    }
+
+    /// Takes over what the results are compared with; without any, nothing.
+    pub(super) fn set_before(&mut self, before: Option<Results>) {
+        self.before = before;
+        self.version += 1;
+    }
+
+    /// Takes over the results of a query.
+    pub(super) fn insert(&mut self, query: usize, results: Vec<QueryResult>) {
+        self.now.insert(query, results);
+        self.version += 1;
+    }
+
+    /// Grows with every change.
+    pub(super) fn version(&self) -> u64 {
+        self.version
+    }
+
+    /// Whether there are results A.
+    pub(super) fn has_before(&self) -> bool {
+        self.before.is_some()
+    }
+
     /// The result of a row.
-    pub(super) fn result(&self, row: ResultRow) -> Option<&'a QueryResult> {
+    pub(super) fn result(&self, row: ResultRow) -> Option<&QueryResult> {
         self.now.get(&row.query)?.get(row.place)
     }
 
     /// What the same method gave for the same query and setting before.
-    fn before(&self, query: usize, now: &QueryResult) -> Option<&'a QueryResult> {
-        let before = self.before?.get(&query)?;
+    fn before(&self, query: usize, now: &QueryResult) -> Option<&QueryResult> {
+        let before = self.before.as_ref()?.get(&query)?;
         before.iter().find(|before| {
             before.method == now.method
                 && before.fusion == now.fusion
@@ -103,11 +136,11 @@ impl<'a> Known<'a> {
     }
 
     /// The same for the result of a row.
-    pub(super) fn before_row(&self, row: ResultRow) -> Option<&'a QueryResult> {
+    pub(super) fn before_row(&self, row: ResultRow) -> Option<&QueryResult> {
         self.before(row.query, self.result(row)?)
     }
 
-    fn rows(&self) -> impl Iterator<Item = (ResultRow, &'a QueryResult)> {
+    fn all(&self) -> impl Iterator<Item = (ResultRow, &QueryResult)> {
         self.now.iter().flat_map(|(&query, results)| {
             let results = results.iter().enumerate();
             results.map(move |(place, result)| (ResultRow { query, place }, result))
@@ -118,6 +151,23 @@ impl<'a> Known<'a> {
     fn verdicts(&self, query: usize, now: &QueryResult) -> Option<[Option<Code>; 2]> {
         Some([self.before(query, now)?, now].map(primary))
     }
+
+    /// The results that are wanted, in the order of the queries.
+    pub(super) fn select(&self, wanted: Wanted) -> Found {
+        let mut rows = self.rows.borrow_mut();
+        rows.get((self.version, wanted.clone()), || wanted.find(self)).clone()
+    }
+
+    /// What became of the verdicts since the results A, also of those that stayed what they were.
+    pub(super) fn migrations(&self) -> Rc<[Migration]> {
+        let count = || {
+            let verdicts = |(row, result): (ResultRow, &QueryResult)| {
+                Some((result.method, self.verdicts(row.query, result)?))
+            };
+            migrations(self.all().filter_map(verdicts)).into()
+        };
+        Rc::clone(self.migrations.borrow_mut().get(self.version, count))
+    }
 }
 
 fn primary(result: &QueryResult) -> Option<Code> {
@@ -125,7 +175,7 @@ fn primary(result: &QueryResult) -> Option<Code> {
 }
 
 impl Wanted {
-    fn find(&self, known: Known<'_>) -> Found {
+    fn find(&self, known: &BatchResults) -> Found {
         let condition: Option<Condition> = match self.condition.trim() {
             "" => None,
             typed => Some(typed.parse()?),
@@ -143,25 +193,6 @@ impl Wanted {
                 && (!self.only_changed || known.verdicts(row.query, result).is_some_and(is_other))
                 && condition.as_ref().is_none_or(|condition| condition.is_met(result))
         };
-        Ok(known.rows().filter(is_wanted).map(|(row, _)| row).collect())
-    }
-}
-
-impl Selection {
-    /// The results that are wanted, in the order of the queries.
-    pub(super) fn rows(&self, known: Known<'_>, wanted: Wanted) -> Found {
-        let mut rows = self.rows.borrow_mut();
-        rows.get((known.version, wanted.clone()), || wanted.find(known)).clone()
-    }
-
-    /// What became of the verdicts that both have, also of those that stayed what they were.
-    pub(super) fn migrations(&self, known: Known<'_>) -> Rc<[Migration]> {
-        let count = || {
-            let verdicts = |(row, result): (ResultRow, &QueryResult)| {
-                Some((result.method, known.verdicts(row.query, result)?))
-            };
-            migrations(known.rows().filter_map(verdicts)).into()
-        };
-        Rc::clone(self.migrations.borrow_mut().get(known.version, count))
+        Ok(known.all().filter(is_wanted).map(|(row, _)| row).collect())
     }
 }

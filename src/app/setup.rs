@@ -1,117 +1,45 @@
 //! What the window is opened on.
 
-use std::fmt;
+use std::ops::{Deref, DerefMut};
 use std::path::PathBuf;
-use std::str::FromStr;
-use std::sync::Arc;
 
 use crate::estimator;
 use crate::event::Side;
-use crate::image::Degradation;
-use crate::localize::{References, Selection, frames_within, is_one_drive};
+use crate::localize::Selection;
 use crate::method::Method;
-use crate::scene::{FrameStore, Scene};
-use crate::session::{IndexFile, Job, RunMode, Task};
-use crate::text::UnknownWord;
-
-/// How the references of a query are chosen.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ReferencePick {
-    /// The frames that were named, for every query.
-    ByHand,
-    /// Anew for every query.
-    By(Selection),
-}
-
-impl fmt::Display for ReferencePick {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::ByHand => f.write_str("by hand"),
-            Self::By(selection) => selection.fmt(f),
-        }
-    }
-}
-
-impl FromStr for ReferencePick {
-    type Err = UnknownWord;
-
-    fn from_str(text: &str) -> Result<Self, UnknownWord> {
-        match text {
-            "by hand" => Ok(Self::ByHand),
-            text => text.parse().map(Self::By),
-        }
-    }
-}
-
-posescope_core::serde_as_text!(ReferencePick);
+use crate::session::{Job, RunMode};
 
 /// What is run, and how the window begins.
 #[derive(Clone)]
 pub struct Setup {
-    /// What is asked of every query.
-    pub task: Task,
-    /// Where the references are.
-    pub references: Arc<dyn Scene>,
-    /// Where the queries are; often the same scene.
-    pub queries: Arc<dyn Scene>,
+    /// The query to begin with, its references, and what is asked of every query.
+    pub job: Job,
     /// The queries that the list offers, as positions in their scene.
     pub offered: Vec<usize>,
-    /// The query to begin with.
-    pub query: usize,
-    /// Its references; none where they are still to be chosen.
-    pub chosen: References,
-    /// What a choice by looks asks.
-    pub index: Arc<IndexFile>,
     /// Whether it waits at the first step or runs.
     pub mode: RunMode,
     /// Where recordings, pictures and sessions are saved unless somebody names another place.
     pub folder: PathBuf,
 }
 
+impl Deref for Setup {
+    type Target = Job;
+
+    fn deref(&self) -> &Job {
+        &self.job
+    }
+}
+
+impl DerefMut for Setup {
+    fn deref_mut(&mut self) -> &mut Job {
+        &mut self.job
+    }
+}
+
 impl Setup {
     /// What a lesson localises.
     pub fn of_lesson(job: Job, folder: PathBuf) -> Self {
-        let Job { references, queries, query, chosen, task, index, .. } = job;
-        Self {
-            offered: vec![query],
-            references,
-            queries,
-            query,
-            chosen,
-            index,
-            task,
-            mode: RunMode::Running,
-            folder,
-        }
-    }
-
-    pub(super) fn job(&self, frames: &Arc<FrameStore>) -> Job {
-        Job {
-            references: Arc::clone(&self.references),
-            queries: Arc::clone(&self.queries),
-            query: self.query,
-            chosen: self.chosen.clone(),
-            task: self.task.clone(),
-            index: Arc::clone(&self.index),
-            frames: Arc::clone(frames),
-        }
-    }
-
-    /// Takes the query's own frame from references that were picked by hand for another one: a photo says
-    /// nothing about itself.
-    pub(super) fn leave_itself_out(&mut self) {
-        if self.task.protocol.is_by_hand() && self.is_one_drive() {
-            let others = self.chosen.frames.iter().copied();
-            let others: Vec<usize> = others.filter(|frame| *frame != self.query).collect();
-            if others.len() < self.chosen.frames.len() {
-                self.chosen = others.into();
-            }
-        }
-    }
-
-    /// Whether queries and references are frames of one drive.
-    pub(super) fn is_one_drive(&self) -> bool {
-        is_one_drive(self.references.as_ref(), self.queries.as_ref())
+        Self { offered: vec![job.query], job, mode: RunMode::Running, folder }
     }
 
     /// The methods whose cost can be looked at: those asked for that search one, those of the paper
@@ -124,115 +52,10 @@ impl Setup {
         }
     }
 
-    /// How the references of queries are chosen.
-    pub fn pick(&self) -> ReferencePick {
-        if self.task.protocol.is_by_hand() {
-            ReferencePick::ByHand
-        } else {
-            ReferencePick::By(self.task.protocol.selection())
-        }
-    }
-
-    /// Goes to another query; where references are not chosen by hand, new ones are needed.
-    pub(super) fn go_to(&mut self, query: usize) {
-        self.query = query;
-        if !self.task.protocol.is_by_hand() {
-            self.chosen = References::default();
-        }
-    }
-
-    /// Frames that could be references of a query: with pose and cloud, within the radius where the
-    /// query's position is known.
-    pub fn candidates(&self, query: usize) -> Vec<usize> {
-        let (references, queries) = (self.references.as_ref(), self.queries.as_ref());
-        let is_one_drive = self.is_one_drive();
-        let is_query = |frame| is_one_drive && frame == query;
-        match queries.position(query) {
-            Some(place) => frames_within(references, &place, self.task.reach_m(), &is_query),
-            None => (0..references.frames().len())
-                .filter(|&frame| !is_query(frame) && references.has_cloud(frame))
-                .filter(|&frame| references.pose(frame).is_some())
-                .collect(),
-        }
-    }
-
-    /// Changes what is asked as these arguments of the command line would: those of remedies.
-    ///
-    /// # Errors
-    /// A line that says which argument cannot be followed.
-    pub(super) fn change(&mut self, args: &[String]) -> Result<(), String> {
-        for pair in args.chunks(2) {
-            let [option, value] = pair else {
-                return Err(format!("{}: a value expected", pair.concat()));
-            };
-            let wrong = |why: &dyn fmt::Display| format!("{option} {value}: {why}");
-            match option.as_str() {
-                "--set" => {
-                    let params = &mut self.task.params;
-                    params.assign(value).map_err(|why| wrong(&why))?;
-                }
-                "--radius" => {
-                    self.task.protocol.radii_m = vec![value.parse().map_err(|why| wrong(&why))?];
-                }
-                "--method" => {
-                    let method = Method::called(value).map_err(|why| wrong(&why))?;
-                    let methods = &mut self.task.protocol.methods;
-                    if !methods.contains(&method) {
-                        methods.push(method);
-                    }
-                    // In the order in which they run.
-                    let place = |asked: &Method| estimator::methods().position(|m| m == *asked);
-                    methods.sort_by_key(|asked| place(asked).unwrap_or(usize::MAX));
-                }
-                "--reference" => {
-                    let frame = self.references.find(value).map_err(|why| wrong(&why))?;
-                    self.choose_by_hand(vec![frame]);
-                }
-                _ => return Err(wrong(&"no argument of a remedy")),
-            }
-        }
-        Ok(())
-    }
-
-    /// Takes these frames as the references.
-    pub(super) fn choose_by_hand(&mut self, frames: Vec<usize>) {
-        self.chosen = frames.into();
-        let names = self.reference_names();
-        self.task.protocol.name_references(&names);
-    }
-
-    /// Degrades the photos of the queries, in the place of any degradation before.
-    pub(super) fn degrade(&mut self, degradation: Degradation) {
-        self.task.protocol.degrade = degradation;
-        self.queries = self.task.protocol.degraded(&self.queries);
-    }
-
-    /// Changes the seed of every random choice, the noise of degraded photos too.
-    pub(super) fn set_seed(&mut self, seed: u64) {
-        self.task.protocol.seed = seed;
-        self.queries = self.task.protocol.degraded(&self.queries);
-    }
-
-    /// The scene of the queries or of the references.
-    pub(super) fn scene(&self, side: Side) -> &Arc<dyn Scene> {
-        match side {
-            Side::Query => &self.queries,
-            Side::Reference => &self.references,
-        }
-    }
-
-    /// Query and reference frames as a person tells them apart: with their scene where there are two.
-    pub fn label(&self, side: Side, frame: usize) -> String {
-        self.label_of(side, &self.scene(side).frames()[frame])
-    }
-
-    /// The same for a frame that is known by its name.
-    pub(super) fn label_of(&self, side: Side, name: &str) -> String {
-        if self.queries.name() == self.references.name() {
-            name.to_owned()
-        } else {
-            format!("{} {name}", self.scene(side).name())
-        }
+    /// How the references of queries are chosen; `None` by hand.
+    pub fn pick(&self) -> Option<Selection> {
+        let protocol = &self.task.protocol;
+        (!protocol.is_by_hand()).then(|| protocol.selection())
     }
 
     /// What the window is about, for its title.
@@ -255,34 +78,5 @@ impl Setup {
         let degraded =
             if degradation.is_none() { String::new() } else { format!(" ({degradation})") };
         format!("posescope: {scene}{query}{degraded}{from}")
-    }
-
-    /// The name of the query.
-    pub fn query_name(&self) -> &str {
-        &self.queries.frames()[self.query]
-    }
-
-    /// The names of its references.
-    pub fn reference_names(&self) -> Vec<String> {
-        let chosen = self.chosen.frames.iter();
-        chosen.map(|&frame| self.references.frames()[frame].clone()).collect()
-    }
-
-    /// The references that repeating the run has to name: those that were ranked are ranked again.
-    fn named_references(&self) -> Vec<String> {
-        match self.chosen.ranking {
-            Some(_) => Vec::new(),
-            None => self.reference_names(),
-        }
-    }
-
-    /// The arguments that repeat this run. See [`Task::arguments`].
-    pub fn arguments(&self) -> Vec<String> {
-        (self.task).arguments(self.query_name(), &self.named_references())
-    }
-
-    /// The command line that repeats this run. See [`Task::command_line`].
-    pub fn command_line(&self) -> String {
-        (self.task).command_line(self.query_name(), &self.named_references())
     }
 }

@@ -2,7 +2,6 @@
 
 mod shown;
 
-use std::sync::Arc;
 use std::time::Duration;
 
 use egui::TextureHandle;
@@ -10,10 +9,8 @@ use egui::TextureHandle;
 use super::navigation::Navigation;
 use super::queries::Queries;
 use super::run_pictures::RunPictures;
-use super::scoring::{
-    self, CostAlong, CostLine, DenseAsk, DenseFiller, DenseMap, Lines, Probe, Prober,
-};
-use super::selection::{Known, KnownResults, Results, Selection};
+use super::scoring::{CostLine, DenseAsk, Scoring};
+use super::selection::{BatchResults, KnownResults, Results};
 use super::setup::Setup;
 use super::shown::ShownReason;
 use super::textures::Textures;
@@ -22,9 +19,7 @@ use crate::event::Side;
 use crate::geometry::Pose;
 use crate::lesson::Moment;
 use crate::localize::QueryResult;
-use crate::method::Method;
 use crate::run::Protocol;
-use crate::scene::FrameStore;
 use crate::session::{Breakpoints, Part, Run, RunMode, RunState, Session, Span};
 
 /// Something to tell the person at the window.
@@ -51,8 +46,6 @@ pub struct KeptRun {
 pub struct AppState {
     /// What is run: scenes, query, references, parameters.
     pub setup: Setup,
-    /// Frames of the setup's scenes, with what its runs have worked out about them.
-    frames: Arc<FrameStore>,
     pub(super) session: Session,
     pub(super) ctx: egui::Context,
     pub(super) navigation: Navigation,
@@ -70,11 +63,8 @@ pub struct AppState {
     pub camera: Option<Pose>,
     /// Where the camera was before the last jump.
     pub(super) camera_before: Option<Pose>,
-    pub(super) prober: Prober,
-    /// For the cost along the line from a result to the truth.
-    lines: Lines,
-    /// For the map of every position with every heading.
-    dense_filler: DenseFiller,
+    /// What the costs say of poses that the run did not try.
+    pub scoring: Scoring,
     /// The queries, what is known of them.
     pub queries: Queries,
     /// The latest notes, the newest last.
@@ -82,26 +72,17 @@ pub struct AppState {
     /// Pictures on the graphics card.
     pub textures: Textures,
     /// Results of the queries that were run, by query.
-    pub results: Results,
-    /// The results A, which those of now are held against.
-    results_before: Option<Results>,
-    /// Grows with every change of the known results.
-    results_version: u64,
-    pub(super) selection: Selection,
+    pub results: BatchResults,
     /// The results that the window was opened with, which a restored session goes back to.
     first_results: Results,
 }
 
 impl AppState {
     pub(super) fn new(setup: Setup, ctx: egui::Context) -> Self {
-        let frames = Arc::default();
-        let session = start(&setup, setup.mode, &frames, &ctx);
+        let session = start(&setup, setup.mode, &ctx);
         Self {
-            prober: Prober::new(ctx.clone()),
-            lines: scoring::lines(ctx.clone()),
-            dense_filler: DenseFiller::new(ctx.clone()),
+            scoring: Scoring::new(&ctx),
             queries: Queries::new(ctx.clone()),
-            frames,
             session,
             pictures: RunPictures::new(&ctx),
             opens_at_cause: true,
@@ -114,10 +95,7 @@ impl AppState {
             camera_before: None,
             notes: Vec::new(),
             textures: Textures::default(),
-            results: Results::new(),
-            results_before: None,
-            results_version: 0,
-            selection: Selection::default(),
+            results: BatchResults::default(),
             first_results: Results::new(),
             setup,
         }
@@ -125,25 +103,15 @@ impl AppState {
 
     /// Takes results over that were known before the window was opened.
     pub(super) fn set_known_results(&mut self, results: KnownResults) {
-        self.results.clone_from(&results.now);
+        self.results.set(results.now.clone());
         self.first_results = results.now;
         self.set_results_before(results.before);
     }
 
     /// Takes over what the results of now are held against; without any, nothing.
     pub(super) fn set_results_before(&mut self, before: Option<Results>) {
-        self.results_before = before;
+        self.results.set_before(before);
         self.options.verdict_change = None;
-        self.results_version += 1;
-    }
-
-    /// All results that are known, with those that they are held against.
-    pub(super) fn known(&self) -> Known<'_> {
-        Known {
-            now: &self.results,
-            before: self.results_before.as_ref(),
-            version: self.results_version,
-        }
     }
 
     /// The present run.
@@ -184,14 +152,9 @@ impl AppState {
             .or_else(|| self.camera.map(|pose| (pose, ShownReason::Camera)))
     }
 
-    /// What is known about the pose that was asked for last.
-    pub fn probe(&self) -> Option<&Probe> {
-        self.prober.latest()
-    }
-
     /// Whether the answer for the pose that is looked at is still worked out.
     pub fn is_probing(&self) -> bool {
-        self.looking_at().is_some() && self.prober.is_busy()
+        self.looking_at().is_some() && self.scoring.is_probing()
     }
 
     /// Lets notes go that were there long enough.
@@ -221,15 +184,9 @@ impl AppState {
                 self.on_run_end();
             }
         }
-        if let Err(why) = self.prober.poll() {
-            self.note(why, true);
-        }
         for (query, outcome) in self.queries.poll() {
             match outcome {
-                Ok(results) => {
-                    self.results.insert(query, results);
-                    self.results_version += 1;
-                }
+                Ok(results) => self.results.insert(query, results),
                 Err(why) => self.note(why, true),
             }
         }
@@ -237,16 +194,13 @@ impl AppState {
             && let Some(problem) = self.problem().cloned()
         {
             let methods = self.setup.direct_methods();
-            self.prober.ask(&problem, &methods, &self.session.run().params, pose);
+            self.scoring.ask(&problem, methods, &self.session.run().params, pose);
         }
         self.pictures.update(self.session.run(), self.options.shows_truth);
         if let Some(kept) = &mut self.kept {
             kept.pictures.update(&kept.run, self.options.shows_truth);
         }
-        if !self.lines.poll() {
-            self.note("the cost between two poses could not be computed", true);
-        }
-        if let Err(why) = self.dense_filler.poll() {
+        for why in self.scoring.poll() {
             self.note(why, true);
         }
     }
@@ -260,38 +214,18 @@ impl AppState {
     /// Whether anything of what the views show is still worked out, beside a run.
     pub fn is_working_out(&self) -> bool {
         self.is_probing()
-            || self.is_tracing_line()
-            || self.dense_filler.is_busy()
+            || self.scoring.is_tracing()
+            || self.scoring.is_filling()
             || self.queries.is_painting()
             || self.pictures.is_busy()
             || self.kept.as_ref().is_some_and(|kept| kept.pictures.is_busy())
     }
 
-    /// What is known of a method's cost along the line that was asked for last.
-    pub fn cost_along(&self, method: Method) -> Option<&CostAlong> {
-        self.lines.find(|line| line.method == method)
-    }
-
-    /// Whether the cost along a line is still worked out.
-    pub fn is_tracing_line(&self) -> bool {
-        self.lines.is_busy()
-    }
-
     /// Has the cost along a line worked out for the problem at the cursor.
     pub(super) fn trace_line(&mut self, line: CostLine) {
-        let question = self.problem().map(|problem| (problem.clone(), self.run().params.clone()));
-        self.lines.forget_where(|other| other.method == line.method && *other != line);
-        self.lines.ask(line, || question);
-    }
-
-    /// The dense map of a method that was asked for last.
-    pub fn dense_map(&self, method: Method) -> Option<&DenseMap> {
-        self.dense_filler.map(method)
-    }
-
-    /// Whether a dense map is being filled.
-    pub fn is_filling_dense_map(&self) -> bool {
-        self.dense_filler.is_busy()
+        if let Some(problem) = self.problem().cloned() {
+            self.scoring.trace(&problem, &self.session.run().params, line);
+        }
     }
 
     /// Has a dense map filled, as long as somebody looks at it.
@@ -299,7 +233,7 @@ impl AppState {
         let run = self.session.run();
         let loaded = run.loaded.as_deref();
         if let Some(problem) = loaded.and_then(|loaded| loaded.problems.get(ask.reference)) {
-            self.dense_filler.ask(problem, &run.params, ask);
+            self.scoring.fill(problem, &run.params, ask);
         }
     }
 
@@ -354,7 +288,6 @@ impl AppState {
             RunState::Finished => {
                 let results = self.session.run().results().cloned().collect();
                 self.results.insert(self.setup.query, results);
-                self.results_version += 1;
                 if self.opens_at_cause && self.navigation.follows() {
                     self.go_to_cause();
                 }
@@ -390,16 +323,14 @@ impl AppState {
     pub(super) fn start_run(&mut self, mode: RunMode) {
         // The run before would go on beside the new one.
         self.session.cancel();
-        self.session = start(&self.setup, mode, &self.frames, &self.ctx);
+        self.session = start(&self.setup, mode, &self.ctx);
         self.navigation = Navigation::default();
         self.hovered = None;
         self.options.selected_feature = None;
         self.pictures.forget();
         self.options.shows_why = false;
         self.opens_at_cause = mode == RunMode::Running;
-        self.prober.forget();
-        self.lines.forget();
-        self.dense_filler.forget();
+        self.scoring.forget();
     }
 
     /// Explains the results that are wrong, or no longer; what was computed is at hand.
@@ -430,16 +361,14 @@ impl AppState {
     /// Another setup altogether; the cursor goes to a record as soon as the run has come so far.
     pub(super) fn restore(&mut self, setup: Setup, cursor: usize) {
         self.queries = Queries::new(self.ctx.clone());
-        // The scenes are others, even where they have the same names.
-        self.frames = Arc::default();
         self.change_setup(setup, Navigation::towards_record(cursor));
-        self.results = self.first_results.clone();
+        self.results.set(self.first_results.clone());
     }
 
     /// Another setup whose scenes are partly those of this one; the cursor goes where `navigation` says.
     pub(super) fn change_setup(&mut self, setup: Setup, navigation: Navigation) {
         self.stop_queries();
-        self.results = Results::new();
+        self.results.set(Results::new());
         self.set_results_before(None);
         self.setup = setup;
         self.kept = None;
@@ -466,12 +395,8 @@ impl AppState {
     }
 }
 
-fn start(setup: &Setup, mode: RunMode, frames: &Arc<FrameStore>, ctx: &egui::Context) -> Session {
+fn start(setup: &Setup, mode: RunMode, ctx: &egui::Context) -> Session {
     let ctx = ctx.clone();
-    Session::start(
-        setup.job(frames),
-        mode,
-        Breakpoints::new(setup.task.breakpoints.iter().cloned()),
-        move || ctx.request_repaint(),
-    )
+    let breakpoints = Breakpoints::new(setup.task.breakpoints.iter().cloned());
+    Session::start(setup.job.clone(), mode, breakpoints, move || ctx.request_repaint())
 }

@@ -134,7 +134,7 @@ impl<'a> ViewContext<'a> {
     /// the latest that the estimator rendered.
     pub fn shown(&self, method: Method) -> Option<ShownView> {
         if let Some((_, reason)) = self.state.looking_at()
-            && let Some(probe) = self.state.probe()
+            && let Some(probe) = self.state.scoring.probe()
             && let Some((_, comparison)) = probe.comparisons.iter().find(|(of, _)| *of == method)
         {
             // While the answer for this pose is worked out the last one stays, under its own pose.
@@ -180,6 +180,21 @@ impl<'a> ViewContext<'a> {
             best: assessed.map(|assessed| assessed.best),
             truth: report.and_then(|report| report.truth).filter(|_| self.options.shows_truth),
         }
+    }
+}
+
+/// A widget with something to be done once it is clicked.
+pub(crate) trait Sends {
+    /// Sends a command if it was clicked, and returns whether it was.
+    fn sends(&self, context: &ViewContext<'_>, command: impl FnOnce(&mut App) + 'static) -> bool;
+}
+
+impl Sends for egui::Response {
+    fn sends(&self, context: &ViewContext<'_>, command: impl FnOnce(&mut App) + 'static) -> bool {
+        if self.clicked() {
+            context.send(command);
+        }
+        self.clicked()
     }
 }
 

@@ -11,7 +11,6 @@ mod features;
 mod fusion;
 mod histogram;
 mod images;
-mod in_sight;
 pub(super) mod legend;
 mod lockstep;
 mod log;

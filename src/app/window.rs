@@ -4,9 +4,9 @@ use egui::ViewportBuilder;
 
 use super::App;
 use super::adapter;
-use super::arrangement::Arrangement;
 use super::selection::KnownResults;
 use super::setup::Setup;
+use super::view_options::Arrangement;
 use crate::lesson::Lesson;
 
 /// Why no window could be opened, and what would help.

@@ -1,4 +1,4 @@
-//! Threads that answer questions one after the other.
+//! Threads that do jobs one after the other.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
@@ -6,11 +6,14 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::{self, Receiver, Sender};
 use std::thread;
 
-/// Answers questions in their order, beside the window's thread. [`Worker::forget`] drops those that wait.
-pub(super) struct Worker<Q, A> {
-    questions: Sender<(usize, Q)>,
+/// Something to compute, in parts that are handed to its argument. That returns whether more is wanted.
+type Job<A> = Box<dyn FnOnce(&mut dyn FnMut(A) -> bool) + Send>;
+
+/// Does jobs in their order, beside the window's thread. [`Worker::forget`] drops those that wait.
+pub(super) struct Worker<A> {
+    jobs: Sender<(usize, Job<A>)>,
     answers: Receiver<(usize, Message<A>)>,
-    /// Grows when questions are dropped; older ones are not worked on.
+    /// Grows when jobs are dropped; older ones are not worked on.
     epoch: Arc<AtomicUsize>,
     waiting: usize,
 }
@@ -19,35 +22,20 @@ pub(super) struct Worker<Q, A> {
 enum Message<A> {
     /// An answer, or a part of one.
     Part(A),
-    /// The end of a question; not whole where it ended in a panic.
+    /// The end of a job; not whole where it ended in a panic.
     End { is_whole: bool },
 }
 
-impl<Q: Send + 'static, A: Send + 'static> Worker<Q, A> {
-    /// Starts a thread with one answer to each question. It wakes the window for each answer.
-    pub(super) fn new(
-        name: &str,
-        ctx: egui::Context,
-        answer: impl Fn(Q) -> A + Send + 'static,
-    ) -> Self {
-        Self::in_parts(name, ctx, move |question, emit| {
-            emit(answer(question));
-        })
-    }
-
-    /// Starts a thread that answers each question in parts. `emit` returns whether more is wanted.
-    pub(super) fn in_parts(
-        name: &str,
-        ctx: egui::Context,
-        answer: impl Fn(Q, &mut dyn FnMut(A) -> bool) + Send + 'static,
-    ) -> Self {
-        let (questions, inbox) = mpsc::channel::<(usize, Q)>();
+impl<A: Send + 'static> Worker<A> {
+    /// Starts a thread. It wakes the window for each answer.
+    pub(super) fn new(name: &str, ctx: &egui::Context) -> Self {
+        let (jobs, inbox) = mpsc::channel::<(usize, Job<A>)>();
         let (outbox, answers) = mpsc::channel();
         let epoch = Arc::new(AtomicUsize::new(0));
-        let now = Arc::clone(&epoch);
+        let (now, ctx) = (Arc::clone(&epoch), ctx.clone());
         // Without a thread `ask` finds nobody to send to.
         let _ = thread::Builder::new().name(name.to_owned()).spawn(move || {
-            for (asked, question) in inbox {
+            for (asked, job) in inbox {
                 let is_wanted = || asked >= now.load(Ordering::Relaxed);
                 if !is_wanted() {
                     continue;
@@ -58,24 +46,24 @@ impl<Q: Send + 'static, A: Send + 'static> Worker<Q, A> {
                     is_sent
                 };
                 let mut emit = |part| send(Message::Part(part)) && is_wanted();
-                let answered = catch_unwind(AssertUnwindSafe(|| answer(question, &mut emit)));
-                if !send(Message::End { is_whole: answered.is_ok() }) {
+                let done = catch_unwind(AssertUnwindSafe(|| job(&mut emit)));
+                if !send(Message::End { is_whole: done.is_ok() }) {
                     break;
                 }
             }
         });
-        Self { questions, answers, epoch, waiting: 0 }
+        Self { jobs, answers, epoch, waiting: 0 }
     }
 
-    /// Asks a question.
-    pub(super) fn ask(&mut self, question: Q) {
+    /// Asks for something that is computed in parts.
+    pub(super) fn ask(&mut self, job: impl FnOnce(&mut dyn FnMut(A) -> bool) + Send + 'static) {
         let epoch = self.epoch.load(Ordering::Relaxed);
-        if self.questions.send((epoch, question)).is_ok() {
+        if self.jobs.send((epoch, Box::new(job))).is_ok() {
             self.waiting += 1;
         }
     }
 
-    /// The answers since the last call. `None` stands for a question that ended in a panic.
+    /// The answers since the last call. `None` stands for a job that ended in a panic.
     pub(super) fn poll(&mut self) -> Vec<Option<A>> {
         let now = self.epoch.load(Ordering::Relaxed);
         let mut taken = Vec::new();
@@ -94,7 +82,7 @@ impl<Q: Send + 'static, A: Send + 'static> Worker<Q, A> {
         taken
     }
 
-    /// Drops all questions that wait, and the answer to the one at work.
+    /// Drops all jobs that wait, and the answer to the one at work.
     pub(super) fn forget(&mut self) {
         self.epoch.fetch_add(1, Ordering::Relaxed);
         self.waiting = 0;
@@ -106,39 +94,36 @@ impl<Q: Send + 'static, A: Send + 'static> Worker<Q, A> {
     }
 }
 
-impl<Q, A> Drop for Worker<Q, A> {
+impl<A> Drop for Worker<A> {
     fn drop(&mut self) {
         self.epoch.fetch_add(1, Ordering::Relaxed);
     }
 }
 
-/// Answers to questions that are each asked once, by key.
-pub(super) struct Answers<K, Q, A> {
-    worker: Worker<(K, Q), (K, A)>,
+/// What is computed once for each key.
+pub(super) struct Answers<K, A> {
+    worker: Worker<(K, A)>,
     /// What was asked; `None` until there is an answer.
     known: Vec<(K, Option<A>)>,
 }
 
-impl<K: Clone + PartialEq + Send + 'static, Q: Send + 'static, A: Send + 'static> Answers<K, Q, A> {
+impl<K: Clone + PartialEq + Send + 'static, A: Send + 'static> Answers<K, A> {
     /// Starts the thread that answers.
-    pub(super) fn new(
-        name: &str,
-        ctx: egui::Context,
-        answer: impl Fn(&K, Q) -> A + Send + 'static,
-    ) -> Self {
-        let worker = Worker::new(name, ctx, move |(key, question): (K, Q)| {
-            let answer = answer(&key, question);
-            (key, answer)
-        });
-        Self { worker, known: Vec::new() }
+    pub(super) fn new(name: &str, ctx: &egui::Context) -> Self {
+        Self { worker: Worker::new(name, ctx), known: Vec::new() }
     }
 
-    /// Asks a question, unless that was done before.
-    pub(super) fn ask(&mut self, key: K, question: impl FnOnce() -> Option<Q>) {
+    /// Asks for the answer to a key, unless that was done before. `job` gives what computes it, if that is known.
+    pub(super) fn ask<J>(&mut self, key: K, job: impl FnOnce() -> Option<J>)
+    where
+        J: FnOnce() -> A + Send + 'static,
+    {
         let is_asked = self.known.iter().any(|(known, _)| *known == key);
-        if let Some(question) = (!is_asked).then(question).flatten() {
+        if let Some(job) = (!is_asked).then(job).flatten() {
             self.known.push((key.clone(), None));
-            self.worker.ask((key, question));
+            self.worker.ask(move |emit| {
+                emit((key, job()));
+            });
         }
     }
 
@@ -192,13 +177,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn answers_come_in_order_and_dropped_questions_have_none() {
-        let ctx = egui::Context::default();
-        let mut worker = Worker::new("test", ctx, |number: u32| {
-            assert!(number != 13, "a question that panics");
-            2 * number
-        });
-        let collect = |worker: &mut Worker<u32, u32>| {
+    fn answers_come_in_order_and_dropped_jobs_have_none() {
+        let mut worker = Worker::new("test", &egui::Context::default());
+        let ask = |worker: &mut Worker<u32>, number: u32| {
+            worker.ask(move |emit| {
+                assert!(number != 13, "a job that panics");
+                emit(2 * number);
+            });
+        };
+        let collect = |worker: &mut Worker<u32>| {
             let mut all = Vec::new();
             while worker.is_busy() {
                 all.extend(worker.poll());
@@ -206,10 +193,10 @@ mod tests {
             }
             all
         };
-        worker.ask(1);
+        ask(&mut worker, 1);
         worker.forget();
         for number in [2, 13, 3] {
-            worker.ask(number);
+            ask(&mut worker, number);
         }
         assert_eq!(collect(&mut worker), [Some(4), None, Some(6)]);
     }

@@ -5,9 +5,9 @@ use std::sync::Arc;
 
 use posescope::app::{self, KnownResults, Results, Setup, WindowError};
 use posescope::localize::QueryResult;
-use posescope::run::{ScenePair, read_run};
+use posescope::run::{ScenePair, read_run, results_of_pair};
 use posescope::scene::{self, Scene};
-use posescope::session::{IndexFile, RunMode, Task, TaskScenes};
+use posescope::session::{IndexFile, Job, RunMode, Task, TaskScenes};
 
 use super::args::{RunArgs, ViewArgs};
 use super::defaults;
@@ -58,7 +58,7 @@ pub fn setup(args: &ViewArgs) -> Result<(Setup, KnownResults), CliError> {
 
 /// The results of a run folder for a pair of scenes. Prints how many results belong to other scenes.
 fn results_of(folder: &Path, pair: &ScenePair, queries: &dyn Scene) -> Result<Results, CliError> {
-    let (results, elsewhere) = app::results_of_run(folder, pair, queries)?;
+    let (results, elsewhere) = results_of_pair(folder, pair, queries)?;
     if elsewhere > 0 {
         let (references, queries) = (&pair.scene, &pair.query_scene);
         eprintln!(
@@ -84,17 +84,16 @@ fn of_a_scene(args: &ViewArgs) -> Result<Setup, CliError> {
 }
 
 fn setup_of(task: Task, scenes: TaskScenes, offered: Vec<usize>, chosen: Vec<usize>) -> Setup {
-    Setup {
-        offered,
+    let job = Job {
         references: scenes.references,
         queries: scenes.queries,
         query: 0,
         chosen: chosen.into(),
         index: Arc::new(IndexFile::of(&task)),
         task,
-        mode: RunMode::Running,
-        folder: defaults::FOLDER.into(),
-    }
+        frames: Arc::default(),
+    };
+    Setup { job, offered, mode: RunMode::Running, folder: defaults::FOLDER.into() }
 }
 
 /// Starts with the named query, that of the demonstration, or the first that has a reference.
@@ -199,8 +198,8 @@ fn of_a_run(args: &ViewArgs, folder: &Path) -> Result<(Setup, KnownResults), Cli
     let chosen = named.iter().copied().chain(of_run);
     let chosen = chosen.map(|name| references.find(name));
     let chosen = chosen.collect::<Result<Vec<_>, _>>()?;
-    let setup =
-        Setup { query, ..setup_of(task, scenes, results.keys().copied().collect(), chosen) };
+    let mut setup = setup_of(task, scenes, results.keys().copied().collect(), chosen);
+    setup.query = query;
     let known = KnownResults { now: results, before };
     Ok((setup, known))
 }

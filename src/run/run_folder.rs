@@ -3,6 +3,7 @@
 //! A query's results are appended together once all are computed, so a killed run loses at most the current
 //! query. Resuming cuts off incomplete lines and ends with the same bytes.
 
+use std::collections::{BTreeMap, HashMap};
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, BufRead as _, BufReader, Seek as _, SeekFrom, Write as _};
 use std::path::{Path, PathBuf};
@@ -15,6 +16,7 @@ use super::scene_pair::ScenePair;
 use crate::localize::{QueryResult, StageTimes};
 use crate::method::Method;
 use crate::params::Params;
+use crate::scene::Scene;
 use posescope_core::files::write_whole;
 use posescope_core::text::json_message;
 
@@ -374,6 +376,31 @@ pub fn read_results<T: DeserializeOwned>(
             message: json_message(&error),
         })
     }))
+}
+
+/// The results that are about a pair of the run's scenes, by the frames of the queries, and how many are about others.
+///
+/// # Errors
+/// Results that cannot be read.
+pub fn results_of_pair(
+    folder: &Path,
+    pair: &ScenePair,
+    queries: &dyn Scene,
+) -> Result<(BTreeMap<usize, Vec<QueryResult>>, usize), FolderError> {
+    let frames = queries.frames().iter().enumerate();
+    let frames: HashMap<&str, usize> = frames.map(|(at, name)| (name.as_str(), at)).collect();
+    let mut results = BTreeMap::<usize, Vec<QueryResult>>::new();
+    let mut elsewhere = 0;
+    for result in read_results::<QueryResult>(folder)? {
+        let result = result?;
+        let of_queries = result.query_scene.as_ref().unwrap_or(&result.scene);
+        let is_of_pair = result.scene == pair.scene && *of_queries == pair.query_scene;
+        match frames.get(result.query.as_str()).filter(|_| is_of_pair) {
+            Some(&frame) => results.entry(frame).or_default().push(result),
+            None => elsewhere += 1,
+        }
+    }
+    Ok((results, elsewhere))
 }
 
 /// The raw lines of `results.jsonl`, in the order of [`read_results`].

@@ -9,12 +9,12 @@ use posescope::app::{App, Results, SaveTarget, Setup};
 use posescope::diagnosis::Grade;
 use posescope::method::Method;
 use posescope::scene::{self, Scene};
-use posescope::session::{Part, RunMode};
+use posescope::session::{Job, Part};
 
 use crate::walls_scene::GREY;
 use crate::window::{
-    app, finish, finished, is_said, press, results, run_until_idle, send, setup, wait, window,
-    window_with_results,
+    app, finish, finished, is_said, press, results, run_until_idle, send, setup, setup_at, wait,
+    window, window_with_results,
 };
 
 /// How many results the bar calls right.
@@ -32,7 +32,7 @@ fn the_bar_says_what_each_result_is_worth_and_the_sentence_why() {
     }
     assert_eq!(right_ones(&window), 4);
 
-    let mut grey = finished(Setup { query: GREY, ..setup() });
+    let mut grey = finished(setup_at(GREY));
     assert_eq!(right_ones(&grey), 0);
     for result in results(&grey) {
         send(&mut grey, |app| app.app_state_mut().show_outcome(Part::Reference(result.method, 0)));
@@ -47,7 +47,7 @@ fn the_bar_says_what_each_result_is_worth_and_the_sentence_why() {
 /// The window goes to the first method that is wrong, and shows why.
 #[test]
 fn a_run_that_ends_opens_at_the_cause() {
-    let grey = finished(Setup { query: GREY, ..setup() });
+    let grey = finished(setup_at(GREY));
     let state = app(&grey);
     assert!(state.options.shows_why);
     let span = state.run().span_at(state.cursor()).expect("a part");
@@ -74,7 +74,7 @@ fn a_run_that_ends_opens_at_the_cause() {
 
 #[test]
 fn nothing_moves_between_two_steps() {
-    let mut window = finished(Setup { query: GREY, ..setup() });
+    let mut window = finished(setup_at(GREY));
     let places = |window: &Harness<'_, App>| -> Vec<egui::Rect> {
         ["Step", "Truth", "Compare", "Search", "Step inside the stage", "Why", "FB: "]
             .map(|label| {
@@ -162,15 +162,12 @@ fn the_first_screen_says_which_keys_to_press() {
 fn night_against_snow() -> Setup {
     let open = |name: &str| -> Arc<dyn Scene> { scene::open(name, None).expect("built in").into() };
     let (references, queries) = (open("street:snow"), open("street:night"));
-    Setup {
-        offered: (0..queries.frames().len()).collect(),
-        query: queries.find("450").expect("a frame"),
-        chosen: vec![references.find("450").expect("a frame")].into(),
-        references,
-        queries,
-        mode: RunMode::Paused,
-        ..setup()
-    }
+    let mut setup = setup();
+    setup.offered = (0..queries.frames().len()).collect();
+    setup.query = queries.find("450").expect("a frame");
+    setup.chosen = vec![references.find("450").expect("a frame")].into();
+    setup.job = Job { references, queries, ..setup.job };
+    setup
 }
 
 #[test]
@@ -210,7 +207,7 @@ fn a_lecture_shows_nothing_of_what_is_still_to_come() {
 #[test]
 fn a_batch_is_filtered_sorted_and_opened() {
     let all = finished(setup());
-    let grey = finished(Setup { query: GREY, ..setup() });
+    let grey = finished(setup_at(GREY));
     let known = [(1, results(&all)), (GREY, results(&grey))];
     let mut window = window_with_results(setup(), Results::from(known));
     press(&mut window, Modifiers::NONE, Key::F4);
@@ -256,9 +253,9 @@ fn saving_asks_where_and_offers_a_name_that_says_what_it_is() {
 
 #[test]
 fn what_is_known_from_a_run_folder_is_told_before_the_query_is_run_again() {
-    let grey = finished(Setup { query: GREY, ..setup() });
+    let grey = finished(setup_at(GREY));
     let known: Results = [(GREY, results(&grey))].into();
-    let mut window = window_with_results(Setup { query: GREY, ..setup() }, known.clone());
+    let mut window = window_with_results(setup_at(GREY), known.clone());
     run_until_idle(&mut window);
     assert!(is_said(&window, "FB: paused") && is_said(&window, "MI: not run yet"));
     // The table says the cause in a phrase.

@@ -9,7 +9,7 @@ use posescope::method::Method;
 use posescope::session::{Part, RunMode};
 
 use crate::walls_scene::GREY;
-use crate::window::{app, finish, send, setup, wait};
+use crate::window::{app, finish, send, setup, setup_at, wait};
 
 /// Sizes of the window \[points\], and the least share of it that the canvas has.
 const SIZES: [([f32; 2], f32); 4] = [
@@ -53,7 +53,7 @@ fn rect(window: &Harness<'_, App>, label: &str) -> Rect {
 
 #[test]
 fn the_canvas_has_the_room_and_the_toolbar_is_one_line_at_every_size() {
-    let mut window = window(SIZES[0].0, Setup { query: GREY, ..setup() });
+    let mut window = window(SIZES[0].0, setup_at(GREY));
     for (size, share) in SIZES {
         window.set_size(size.into());
         window.run_steps(3);

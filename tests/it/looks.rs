@@ -13,7 +13,7 @@ use posescope::session::{RunMode, RunState};
 
 use crate::painted::{PaintedWindow, painted};
 use crate::walls_scene::GREY;
-use crate::window::{app, run_until_idle, send, setup, wait};
+use crate::window::{app, run_until_idle, send, setup, setup_at, wait};
 
 /// The views whose point is pixels.
 const PICTURES: [&str; 4] = ["images", "synthetic", "space", "surface"];
@@ -88,7 +88,7 @@ fn every_layout_looks_as_it_did() {
         (Arrangement::Lecture, "lecture"),
         (Arrangement::Batch, "batch"),
     ];
-    let setup = Setup { query: GREY, mode: RunMode::Running, ..setup() };
+    let setup = Setup { mode: RunMode::Running, ..setup_at(GREY) };
     let Some(PaintedWindow { mut window, mut judge }) = painted(setup, SIZES[0]) else {
         return;
     };

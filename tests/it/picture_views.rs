@@ -229,10 +229,10 @@ fn a_pose_of_ones_own_has_the_costs_of_both_methods() {
     send(&mut window, |app| {
         app.app_state_mut().camera = truth;
     });
-    wait(&mut window, |app| app.app_state().probe().is_some());
+    wait(&mut window, |app| app.app_state().scoring.probe().is_some());
     window.step();
     window.get_by_label_contains("MI, camera in hand: cost ");
-    let probe = app(&window).probe().expect("an answer").clone();
+    let probe = app(&window).scoring.probe().expect("an answer").clone();
     for (_, comparison) in &probe.comparisons {
         let cost = comparison.score.cost.expect("a cost");
         window.get_by_label(&format!("present {cost:.4}"));

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
-use posescope::app::{App, ReferencePick, SaveTarget, Setup};
+use posescope::app::{App, SaveTarget, Setup};
 use posescope::camera::Intrinsics;
 use posescope::cloud::Cloud;
 use posescope::event::KindSet;
@@ -29,8 +29,7 @@ fn maximize(window: &mut Harness<'_, App>, view: &'static str) {
 }
 
 fn pick(window: &mut Harness<'_, App>, selection: Selection) -> RunState {
-    let pick = ReferencePick::By(selection);
-    send(window, |app| app.app_state_mut().pick_references(pick));
+    send(window, |app| app.app_state_mut().pick_references(Some(selection)));
     run_until_idle(window)
 }
 
@@ -238,13 +237,10 @@ impl Scene for Slow {
 #[test]
 fn the_bar_says_how_many_frames_were_looked_at() {
     let scene: Arc<dyn Scene> = Arc::new(Slow(Walls::new()));
-    let mut slow = Setup {
-        references: Arc::clone(&scene),
-        queries: scene,
-        chosen: Vec::new().into(),
-        mode: RunMode::Running,
-        ..setup()
-    };
+    let mut slow = Setup { mode: RunMode::Running, ..setup() };
+    slow.references = Arc::clone(&scene);
+    slow.queries = scene;
+    slow.chosen = Vec::new().into();
     slow.task.protocol.select(Selection::Matched(1));
     let mut window = crate::window::window(slow);
     let mut is_told = false;

@@ -300,11 +300,11 @@ fn the_costs_from_the_result_to_the_truth_end_in_those_of_both() {
     move_to_end(&mut window, Method::MI);
     send(&mut window, |app| app.app_state_mut().show_alone(Some("surface")));
     wait(&mut window, |app| {
-        app.app_state().cost_along(Method::MI).is_some() && !app.app_state().is_tracing_line()
+        app.app_state().scoring.along(Method::MI).is_some() && !app.app_state().scoring.is_tracing()
     });
     window.run_steps(2);
     let state = app(&window);
-    let along = state.cost_along(Method::MI).expect("traced");
+    let along = state.scoring.along(Method::MI).expect("traced");
     let result = span(&window, Method::MI).result.expect("a result");
     let reported = result.cost.as_ref().expect("a cost");
     let at = |share: f64| {
@@ -335,7 +335,7 @@ fn the_costs_from_the_result_to_the_truth_end_in_those_of_both() {
     window.run_steps(3);
     let hovered = app(&window).hovered.expect("a pose");
     let way = hovered.translation.vector - along_from(&window);
-    let length = app(&window).cost_along(Method::MI).expect("traced").line.length_m();
+    let length = app(&window).scoring.along(Method::MI).expect("traced").line.length_m();
     assert!(way.norm() < 1.3 * length, "{way} of {length}");
     // A truth that is hidden has no line.
     send(&mut window, |app| app.act("Ground truth"));
@@ -354,7 +354,8 @@ fn filled_densely() -> Harness<'static, App> {
     window.key_press(egui::Key::F);
     window.run_steps(2);
     wait(&mut window, |app| {
-        app.app_state().dense_map(Method::MI).is_some() && !app.app_state().is_filling_dense_map()
+        app.app_state().scoring.dense_map(Method::MI).is_some()
+            && !app.app_state().scoring.is_filling()
     });
     window.run_steps(2);
     window
@@ -362,8 +363,8 @@ fn filled_densely() -> Harness<'static, App> {
 
 /// What is known of the dense map of MI.
 fn dense(window: &Harness<'_, App>) -> DenseSurface {
-    let map = app(window).dense_map(Method::MI);
-    map.expect("asked for").surface().expect("small").clone()
+    let map = app(window).scoring.dense_map(Method::MI);
+    map.expect("asked for").surface.as_ref().expect("small").clone()
 }
 
 #[test]
@@ -451,7 +452,7 @@ fn the_dense_map_is_the_cheapest_heading_of_each_position_and_takes_the_camera_t
     assert!(text(&window, "Cost map").contains("position, coarse"));
     window.key_press(egui::Key::F);
     window.run_steps(3);
-    assert!(!app(&window).is_filling_dense_map());
+    assert!(!app(&window).scoring.is_filling());
     assert!(text(&window, "Cost map").contains(&format!("{all} of {all}")));
 }
 
@@ -465,13 +466,13 @@ fn a_dense_map_that_nobody_looks_at_stands_still_and_is_gone_on_with() {
     // Many more hypotheses than can be scored between two frames.
     window.key_press(egui::Key::F);
     let has_begun = |app: &App| {
-        let map = app.app_state().dense_map(Method::MI);
-        map.is_some_and(|map| map.surface().expect("small").tried() > 0)
+        let map = app.app_state().scoring.dense_map(Method::MI);
+        map.is_some_and(|map| map.surface.as_ref().expect("small").tried() > 0)
     };
     wait(&mut window, has_begun);
     window.state_mut().app_state_mut().show_alone(Some("report"));
     window.run_steps(4);
-    assert!(!app(&window).is_filling_dense_map());
+    assert!(!app(&window).scoring.is_filling());
     std::thread::sleep(std::time::Duration::from_millis(50));
     window.run_steps(2);
     let stood = dense(&window);
@@ -481,8 +482,8 @@ fn a_dense_map_that_nobody_looks_at_stands_still_and_is_gone_on_with() {
     assert!(!stood.is_complete());
     window.state_mut().app_state_mut().show_alone(Some("surface"));
     let is_done = |app: &App| {
-        let map = app.app_state().dense_map(Method::MI);
-        map.is_some_and(|map| map.surface().expect("small").is_complete())
+        let map = app.app_state().scoring.dense_map(Method::MI);
+        map.is_some_and(|map| map.surface.as_ref().expect("small").is_complete())
     };
     wait(&mut window, is_done);
     let whole = dense(&window);
@@ -508,13 +509,15 @@ fn a_dense_map_that_nobody_looks_at_stands_still_and_is_gone_on_with() {
     // Other parameters make it another map.
     window.state_mut().app_state_mut().set_param("grid.yaw_range", "1");
     wait(&mut window, |app| {
-        let map = app.app_state().dense_map(Method::MI);
-        map.is_none_or(|map| map.surface().expect("small").hypotheses() != whole.hypotheses())
+        let map = app.app_state().scoring.dense_map(Method::MI);
+        map.is_none_or(|map| {
+            map.surface.as_ref().expect("small").hypotheses() != whole.hypotheses()
+        })
     });
 }
 
 fn along_from(window: &Harness<'_, App>) -> nalgebra::Vector3<f64> {
-    let along = app(window).cost_along(Method::MI);
+    let along = app(window).scoring.along(Method::MI);
     along.expect("traced").line.from.translation.vector
 }
 

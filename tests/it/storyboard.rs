@@ -4,17 +4,17 @@ use egui::accesskit::Role;
 use egui::{Key, Modifiers};
 use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
-use posescope::app::{App, Setup};
+use posescope::app::App;
 use posescope::method::Method;
 use posescope::session::{Part, Span};
 
 use crate::walls_scene::GREY;
-use crate::window::{app, finish, finished, is_said, press, send, setup, wait};
+use crate::window::{app, finish, finished, is_said, press, send, setup, setup_at, wait};
 
 const MI: Part = Part::Reference(Method::MI, 0);
 
 fn grey() -> Harness<'static, App> {
-    finished(Setup { query: GREY, ..setup() })
+    finished(setup_at(GREY))
 }
 
 /// The last records of the stages right below a part of the run.
@@ -96,7 +96,7 @@ fn remedies_are_tried_beside_the_picture_of_the_cause() {
 
 #[test]
 fn changed_settings_stand_below_the_cause_with_their_defaults() {
-    let mut changed = Setup { query: GREY, ..setup() };
+    let mut changed = setup_at(GREY);
     changed.task.params.assign("pm.sigma=2").expect("a value");
     let window = finished(changed);
     for words in ["--radius 3 (default 15)", "pm.sigma=2 (default "] {
@@ -106,7 +106,8 @@ fn changed_settings_stand_below_the_cause_with_their_defaults() {
 
 #[test]
 fn a_fused_pose_answers_for_its_references() {
-    let mut fusing = Setup { query: GREY, chosen: vec![0, 2].into(), ..setup() };
+    let mut fusing = setup_at(GREY);
+    fusing.chosen = vec![0, 2].into();
     fusing.task.protocol.fusions = vec!["avg".parse().expect("a fusion")];
     let window = finished(fusing);
     let state = app(&window);

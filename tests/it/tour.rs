@@ -8,7 +8,7 @@ use posescope::app::{App, Setup};
 use posescope::diagnosis::Grade;
 use posescope::method::Method;
 use posescope::scene::{self, Scene};
-use posescope::session::RunMode;
+use posescope::session::{Job, RunMode};
 
 use crate::painted::{PaintedWindow, painted};
 use crate::window::{app, finish, run_until_idle, send, setup, wait};
@@ -29,15 +29,9 @@ fn the_tour_leads_from_a_failure_to_a_right_pose() {
     let open = |name: &str| -> Arc<dyn Scene> { scene::open(name, None).expect("built in").into() };
     let (references, queries) = (open("street:snow"), open("street:night"));
     let frames = [120, 212, 232, 361, 450, 600];
-    let mut setup = Setup {
-        offered: frames.to_vec(),
-        query: 120,
-        chosen: Vec::new().into(),
-        references,
-        queries,
-        mode: RunMode::Running,
-        ..setup()
-    };
+    let mut setup = Setup { offered: frames.to_vec(), mode: RunMode::Running, ..setup() };
+    let chosen = Vec::new().into();
+    setup.job = Job { query: 120, chosen, references, queries, ..setup.job };
     setup.task.scene = "street:snow".to_owned();
     setup.task.protocol.query_scene = vec!["street:night".to_owned()];
     setup.task.protocol.radii_m = vec![15.0];

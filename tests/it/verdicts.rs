@@ -52,14 +52,11 @@ fn the_terminal_and_the_window_write_the_same_numbers_under_the_same_names() {
     let folder = sequence.folder().display().to_string();
     let scene: Arc<dyn Scene> = scene::open(&folder, None).expect("a scene").into();
     let frame = |name| scene.find(name).expect("a frame");
-    let mut setup = Setup {
-        offered: vec![frame("5")],
-        query: frame("5"),
-        chosen: vec![frame("4")].into(),
-        queries: scene.clone(),
-        references: scene.clone(),
-        ..setup()
-    };
+    let mut setup = Setup { offered: vec![frame("5")], ..setup() };
+    setup.query = frame("5");
+    setup.chosen = vec![frame("4")].into();
+    setup.queries = scene.clone();
+    setup.references = scene.clone();
     setup.task.scene = folder;
     setup.task.protocol.methods = vec![Method::FB];
     let mut window = finished(setup);

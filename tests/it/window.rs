@@ -14,7 +14,7 @@ use posescope::params::Params;
 use posescope::run::Protocol;
 use posescope::scene;
 use posescope::scene::Scene;
-use posescope::session::{RunMode, RunState, Task};
+use posescope::session::{Job, RunMode, RunState, Task};
 
 use crate::binary::has;
 use crate::small_sequence::SmallSequence;
@@ -23,7 +23,7 @@ use crate::walls_scene::{GREY, UNREADABLE, Walls};
 /// The small world, waiting at its first step.
 pub fn setup() -> Setup {
     let scene = Arc::new(Walls::new());
-    Setup {
+    let job = Job {
         task: Task {
             protocol: Protocol {
                 references: Vec::new(),
@@ -35,13 +35,20 @@ pub fn setup() -> Setup {
         },
         references: scene.clone(),
         queries: scene,
-        offered: vec![1, 2, GREY],
         query: 1,
         chosen: vec![0].into(),
         index: Arc::default(),
-        mode: RunMode::Paused,
-        folder: std::env::temp_dir(),
-    }
+        frames: Arc::default(),
+    };
+    let offered = vec![1, 2, GREY];
+    Setup { job, offered, mode: RunMode::Paused, folder: std::env::temp_dir() }
+}
+
+/// The same at another query.
+pub fn setup_at(query: usize) -> Setup {
+    let mut setup = setup();
+    setup.query = query;
+    setup
 }
 
 /// The window without a graphics card: what it shows is not painted.
@@ -336,8 +343,9 @@ fn the_next_failure_is_found_once_all_queries_were_run() {
 #[test]
 fn the_run_over_all_queries_and_a_run_with_old_settings_stop_soon() {
     let scene: Arc<dyn Scene> = Arc::new(Walls::new());
-    let mut setup =
-        Setup { references: Arc::clone(&scene), queries: Arc::clone(&scene), ..setup() };
+    let mut setup = setup();
+    setup.references = Arc::clone(&scene);
+    setup.queries = Arc::clone(&scene);
     setup.task.protocol.methods = vec![Method::PM];
     // A million hypotheses.
     for change in ["grid.fine_range=5", "grid.fine_step=0.01"] {
@@ -559,7 +567,7 @@ fn the_camera_in_hand_has_costs_of_its_own() {
     assert_eq!(app(&window).camera, Some(truth));
     wait(&mut window, |app| !app.app_state().is_probing());
     let state = app(&window);
-    let probe = state.probe().expect("answered");
+    let probe = state.scoring.probe().expect("answered");
     for (method, comparison) in &probe.comparisons {
         let results = results(&window);
         let result = results.iter().find(|result| result.method == *method);

@@ -9,9 +9,8 @@ use super::inspector::capital;
 use super::verdicts::{split, told};
 use super::{Panes, canvas, proof::elided};
 use crate::app::App;
-use crate::app::command::Queue;
-use crate::app::state::AppState;
 use crate::app::theme;
+use crate::app::{Sends, ViewContext};
 use crate::diagnosis::Grade;
 use crate::localize::QueryResult;
 use crate::measure::Overview;
@@ -22,12 +21,13 @@ const BAR: f32 = 22.0;
 /// Bars and causes that are drawn, at most.
 const MAX: usize = 8;
 
-pub(crate) fn left(ui: &mut Ui, state: &AppState, commands: &Queue, panes: &mut Panes) {
-    let results: Vec<QueryResult> = state
+pub(crate) fn left(ui: &mut Ui, context: &ViewContext<'_>, panes: &mut Panes) {
+    let results: Vec<QueryResult> = context
+        .state
         .results
         .values()
         .flatten()
-        .map(|result| result.shown(state.options.shows_truth))
+        .map(|result| result.shown(context.options.shows_truth))
         .collect();
     let overview = Overview::of(&results.iter().collect::<Vec<_>>());
     ui.add_space(4.0);
@@ -39,13 +39,13 @@ pub(crate) fn left(ui: &mut Ui, state: &AppState, commands: &Queue, panes: &mut 
         let headline =
             RichText::new(&overview.headline).size(15.0).color(ui.visuals().strong_text_color());
         ui.label(headline);
-        let (text, help) = match state.queries.progress() {
+        let (text, help) = match context.state.queries.progress() {
             Some((done, all)) => (format!("Stop ({done} of {all})"), "Stop"),
             None => ("Run all".to_owned(), "Localise all queries, to know which fail"),
         };
-        if ui.button(text).on_hover_text(help).clicked() {
-            commands.send(|app| app.act("Run all queries, or stop"));
-        }
+        ui.button(text)
+            .on_hover_text(help)
+            .sends(context, |app| app.act("Run all queries, or stop"));
     });
     ui.add_space(4.0);
     let rows = overview.bars.len().max(overview.causes.len()).min(MAX);
@@ -54,7 +54,7 @@ pub(crate) fn left(ui: &mut Ui, state: &AppState, commands: &Queue, panes: &mut 
     let (bars, causes) = area.split_left_right_at_fraction(0.5);
     draw_bars(ui, &overview, bars.with_max_x(bars.right() - 16.0));
     draw_causes(ui, &overview, causes);
-    panes.show(ui, "batch", state, commands);
+    panes.show(ui, "batch", context);
 }
 
 /// One bar for each method: right, unmeasured, wrong, no pose.
@@ -142,13 +142,13 @@ fn draw_causes(ui: &Ui, overview: &Overview, area: Rect) {
 }
 
 /// The selected result: its name, its sentence, its proof, and one plot below.
-pub(crate) fn right(ui: &mut Ui, state: &AppState, commands: &Queue, panes: &mut Panes) {
+pub(crate) fn right(ui: &mut Ui, context: &ViewContext<'_>, panes: &mut Panes) {
     let area = ui.available_rect_before_wrap();
     let (upper, lower) = area.split_top_bottom_at_fraction(0.56);
     ui.scope_builder(UiBuilder::new().max_rect(upper), |ui| {
         ui.shrink_clip_rect(upper);
-        let span = state.shown_span();
-        match &span.and_then(|span| state.outcome(span)) {
+        let span = context.span();
+        match &span.and_then(|span| context.state.outcome(span)) {
             Some(result) => {
                 let error = result.off().map_or(String::new(), |off| format!(" · {off} off"));
                 ui.strong(format!("{} · {}{error}", result.query, result.method.label()));
@@ -161,19 +161,18 @@ pub(crate) fn right(ui: &mut Ui, state: &AppState, commands: &Queue, panes: &mut
         }
         ui.horizontal(|ui| {
             let open = ui.button("Open in Inspect");
-            if open.on_hover_text("Show this query at its proof picture (Enter)").clicked() {
-                commands.send(App::open_selected);
-            }
+            open.on_hover_text("Show this query at its proof picture (Enter)")
+                .sends(context, App::open_selected);
         });
         match span.map(|span| span.part) {
-            Some(part) if state.needs_why(part) => canvas::why(ui, state, panes),
-            _ => canvas::ui(ui, state, commands, panes, 1),
+            Some(part) if context.state.needs_why(part) => canvas::why(ui, context, panes),
+            _ => canvas::ui(ui, context, panes, 1),
         }
     });
     let lower = lower.with_min_y(lower.top() + 8.0);
     ui.scope_builder(UiBuilder::new().max_rect(lower), |ui| {
         ui.shrink_clip_rect(lower);
-        panes.show(ui, "charts", state, commands);
+        panes.show(ui, "charts", context);
     });
     ui.advance_cursor_after_rect(area);
 }

@@ -3,10 +3,9 @@
 use egui::{Rect, RichText, Sense, Ui, UiBuilder, vec2};
 
 use super::{Panes, proof, stage};
-use crate::app::command::Queue;
-use crate::app::state::AppState;
 use crate::app::theme;
 use crate::app::views;
+use crate::app::{Sends, ViewContext};
 
 /// Share of the width that the large picture takes where others stand beside it.
 const LARGE: f32 = 0.66;
@@ -15,14 +14,14 @@ const GAP: f32 = 8.0;
 const TITLE: f32 = 18.0;
 
 /// The views on the canvas: the large one first.
-pub(crate) fn scene(state: &AppState) -> Vec<&'static str> {
-    let here = state.shown_stage();
+pub(crate) fn scene(context: &ViewContext<'_>) -> Vec<&'static str> {
+    let here = context.state.shown_stage();
     let of_stage = stage::scene(here);
-    let mut views: Vec<&'static str> = match &state.options.presented {
+    let mut views: Vec<&'static str> = match &context.options.presented {
         Some(presented) => presented.clone(),
         None => of_stage.to_vec(),
     };
-    if let Some((at, large)) = state.options.large
+    if let Some((at, large)) = context.options.large
         && at == here
     {
         views.retain(|view| *view != large);
@@ -32,12 +31,12 @@ pub(crate) fn scene(state: &AppState) -> Vec<&'static str> {
     views
 }
 
-pub(crate) fn ui(ui: &mut Ui, state: &AppState, commands: &Queue, panes: &mut Panes, most: usize) {
-    if state.options.shows_why && !state.is_presenting() {
-        why(ui, state, panes);
+pub(crate) fn ui(ui: &mut Ui, context: &ViewContext<'_>, panes: &mut Panes, most: usize) {
+    if context.options.shows_why && !context.state.is_presenting() {
+        why(ui, context, panes);
         return;
     }
-    let mut views = scene(state);
+    let mut views = scene(context);
     views.truncate(most);
     let area = ui.available_rect_before_wrap();
     let (large, beside) = match views.as_slice() {
@@ -49,7 +48,7 @@ pub(crate) fn ui(ui: &mut Ui, state: &AppState, commands: &Queue, panes: &mut Pa
         }
     };
     if let Some(first) = views.first() {
-        inside(ui, large, |ui| panes.show(ui, first, state, commands));
+        inside(ui, large, |ui| panes.show(ui, first, context));
     }
     let others = views.get(1..).unwrap_or_default();
     let height = (beside.height() - GAP * others.len().saturating_sub(1) as f32)
@@ -58,8 +57,8 @@ pub(crate) fn ui(ui: &mut Ui, state: &AppState, commands: &Queue, panes: &mut Pa
         let corner = beside.min + vec2(0.0, index as f32 * (height + GAP));
         let rect = Rect::from_min_size(corner, vec2(beside.width(), height));
         let (title, rest) = rect.split_top_bottom_at_y(rect.top() + TITLE);
-        small_title(ui, state, commands, name, title);
-        inside(ui, rest, |ui| panes.show(ui, name, state, commands));
+        small_title(ui, context, name, title);
+        inside(ui, rest, |ui| panes.show(ui, name, context));
     }
     ui.advance_cursor_after_rect(area);
 }
@@ -73,7 +72,7 @@ fn inside(ui: &mut Ui, rect: Rect, draw: impl FnOnce(&mut Ui)) {
 }
 
 /// The name above a small picture; a click makes it the large one.
-fn small_title(ui: &mut Ui, state: &AppState, commands: &Queue, name: &'static str, rect: Rect) {
+fn small_title(ui: &mut Ui, context: &ViewContext<'_>, name: &'static str, rect: Rect) {
     let title =
         views::ALL.iter().find(|entry| entry.name == name).map_or(name, |entry| entry.title);
     let response = ui.interact(rect, ui.scope_id().with(("small", name)), Sense::click());
@@ -87,42 +86,42 @@ fn small_title(ui: &mut Ui, state: &AppState, commands: &Queue, name: &'static s
     let galley = ui.painter().layout_no_wrap(title.to_owned(), theme::CAPTION, color);
     ui.painter().galley(rect.min + vec2(2.0, 2.0), galley, color);
     if response.on_hover_text(spoken).clicked() {
-        let large = Some((state.shown_stage(), name));
-        commands.send(move |app| app.state.options.large = large);
+        let large = Some((context.state.shown_stage(), name));
+        context.send(move |app| app.state.options.large = large);
     }
 }
 
 /// The proof picture of what is selected.
-pub(super) fn why(ui: &mut Ui, state: &AppState, panes: &mut Panes) {
-    let part = state.shown_span().map(|span| span.part);
+pub(super) fn why(ui: &mut Ui, context: &ViewContext<'_>, panes: &mut Panes) {
+    let part = context.span().map(|span| span.part);
     let Some(part) = part else {
         proof::empty(ui, "Nothing has run yet. Space runs the query.");
         return;
     };
-    match state.proof(part) {
+    match context.state.proof(part) {
         Some(picture) => {
             if panes.proof_of != Some(part) {
                 panes.proof_of = Some(part);
                 panes.swapped = None;
             }
             let picture = std::sync::Arc::clone(picture);
-            proof::ui(ui, &state.textures, &picture, &mut panes.swapped);
+            proof::ui(ui, &context.state.textures, &picture, &mut panes.swapped);
         }
-        None if state.is_proving() => proof::empty(ui, "The picture is being made."),
+        None if context.state.is_proving() => proof::empty(ui, "The picture is being made."),
         None => proof::empty(ui, "This method left nothing that a picture could show."),
     }
 }
 
 /// A view alone, with a way back.
-pub(crate) fn alone(ui: &mut Ui, state: &AppState, commands: &Queue, panes: &mut Panes) {
+pub(crate) fn alone(ui: &mut Ui, context: &ViewContext<'_>, panes: &mut Panes) {
     ui.horizontal(|ui| {
         let button = ui.button(RichText::new("All panels").small());
-        if button.on_hover_text("Back to the window with all its parts (M)").clicked() {
-            commands.send(|app| app.state.show_alone(None));
-        }
+        button
+            .on_hover_text("Back to the window with all its parts (M)")
+            .sends(context, |app| app.state.show_alone(None));
     });
-    match state.options.alone {
-        Some(view) => panes.show(ui, view, state, commands),
-        None => self::ui(ui, state, commands, panes, usize::MAX),
+    match context.options.alone {
+        Some(view) => panes.show(ui, view, context),
+        None => self::ui(ui, context, panes, usize::MAX),
     }
 }

@@ -2,9 +2,8 @@
 
 use egui::{Key, Modal, Modifiers, ScrollArea, TextEdit, Ui};
 
+use crate::app::ViewContext;
 use crate::app::action::{ACTIONS, Action, Group};
-use crate::app::command::Queue;
-use crate::app::state::AppState;
 
 /// The list of keys, in two columns.
 pub(crate) fn keys_ui(ctx: &egui::Context, open: &mut bool) {
@@ -62,13 +61,13 @@ pub(crate) struct ActionSearch {
 
 impl ActionSearch {
     /// Draws the search; whether it is over.
-    pub(crate) fn ui(&mut self, ctx: &egui::Context, state: &AppState, commands: &Queue) -> bool {
+    pub(crate) fn ui(&mut self, ctx: &egui::Context, context: &ViewContext<'_>) -> bool {
         let modal = Modal::new(egui::Id::unique("action search"));
-        let answer = modal.show(ctx, |ui| self.content(ui, state, commands));
+        let answer = modal.show(ctx, |ui| self.content(ui, context));
         answer.inner || answer.should_close()
     }
 
-    fn content(&mut self, ui: &mut Ui, state: &AppState, commands: &Queue) -> bool {
+    fn content(&mut self, ui: &mut Ui, context: &ViewContext<'_>) -> bool {
         const MAX: usize = 12;
         ui.set_width(420.0);
         let pressed = |ui: &Ui, key| ui.input_mut(|input| input.consume_key(Modifiers::NONE, key));
@@ -98,7 +97,7 @@ impl ActionSearch {
         let mut taken = found.get(self.chosen).filter(|_| enter).copied();
         for (index, action) in found.iter().enumerate() {
             let is_chosen = index == self.chosen;
-            let text = if (action.is_on)(state) {
+            let text = if (action.is_on)(context.state) {
                 format!("{}: on", action.text)
             } else {
                 action.text.to_owned()
@@ -114,7 +113,7 @@ impl ActionSearch {
             ui.weak("No action has these words. Try one of them alone.");
         }
         if let Some(action) = taken {
-            commands.send(action.run);
+            context.send(action.run);
         }
         taken.is_some()
     }

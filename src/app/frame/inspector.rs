@@ -10,55 +10,52 @@ use super::Panes;
 use super::stage::three_digits;
 use super::storyboard::part_name;
 use super::verdicts::{short, split, told};
-use crate::app::command::Queue;
-use crate::app::state::AppState;
 use crate::app::theme;
 use crate::app::view_options::Tab;
+use crate::app::{Sends, ViewContext};
 use crate::diagnosis::{Code, Confidence, Diagnosis, Grade, confidence};
 use crate::localize::{Explanation, Helped, QueryResult};
 use crate::session::Run;
 
-pub(crate) fn ui(ui: &mut Ui, state: &AppState, commands: &Queue, panes: &mut Panes) {
-    let tab = state.options.tab;
+pub(crate) fn ui(ui: &mut Ui, context: &ViewContext<'_>, panes: &mut Panes) {
+    let tab = context.options.tab;
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 2.0;
         for (other, title) in Tab::ALL {
             let text = RichText::new(title).size(12.5);
             let button = Button::selectable(tab == other, text).frame_when_inactive(false);
-            if ui.add(button).clicked() {
-                commands.send(move |app| app.state.show_tab(other));
-            }
+            ui.add(button).sends(context, move |app| app.state.show_tab(other));
         }
     });
     ui.separator();
     match tab {
         Tab::Why => {
             let area = ScrollArea::vertical().id_salt("why").auto_shrink(false);
-            area.show(ui, |ui| why(ui, state, commands));
+            area.show(ui, |ui| why(ui, context));
         }
         Tab::Numbers => {
             let area = ScrollArea::vertical().id_salt("numbers").auto_shrink(false);
-            area.show(ui, |ui| numbers::ui(ui, state));
+            area.show(ui, |ui| numbers::ui(ui, context));
         }
-        Tab::Parameters => panes.show(ui, "parameters", state, commands),
-        Tab::Log => panes.show(ui, "log", state, commands),
+        Tab::Parameters => panes.show(ui, "parameters", context),
+        Tab::Log => panes.show(ui, "log", context),
     }
 }
 
-fn why(ui: &mut Ui, state: &AppState, commands: &Queue) {
-    let Some(span) = state.shown_span() else {
+fn why(ui: &mut Ui, context: &ViewContext<'_>) {
+    let Some(span) = context.span() else {
         ui.weak("Nothing has run yet. Space runs the query.");
         return;
     };
-    let Some(result) = state.outcome(span) else {
+    let Some(result) = context.state.outcome(span) else {
         ui.weak(format!("{} has no result yet.", part_name(span.part)));
         return;
     };
     match result.diagnosis.split_first() {
         Some((primary, others)) => {
             finding(ui, primary);
-            changed(ui, state.shown_run());
-            helped(ui, state, commands, &result, primary);
+            changed(ui, context.run);
+            helped(ui, context, &result, primary);
             if !others.is_empty() {
                 heading(ui, "Also found");
                 for (index, other) in others.iter().enumerate() {
@@ -82,7 +79,7 @@ fn why(ui: &mut Ui, state: &AppState, commands: &Queue) {
         None => {
             ui.strong(format!("{}: {}", part_name(span.part), result.grade));
             ui.label(told(&result));
-            changed(ui, state.shown_run());
+            changed(ui, context.run);
         }
     }
     if let Some(known) = &result.confidence {
@@ -247,27 +244,20 @@ pub(crate) fn capital(text: &str) -> String {
 }
 
 /// What made the result right, in groups; what may, where nothing was tried.
-fn helped(
-    ui: &mut Ui,
-    state: &AppState,
-    commands: &Queue,
-    result: &QueryResult,
-    primary: &Diagnosis,
-) {
+fn helped(ui: &mut Ui, context: &ViewContext<'_>, result: &QueryResult, primary: &Diagnosis) {
     if !result.grade.is_failure() {
         return;
     }
     let Some(explanation) = &result.explanation else {
         heading(ui, "What may help");
         ui.label(result.advice(primary));
-        if result.error.or(result.initial_error).is_some() && state.setup.task.protocol.explain == 0
+        if result.error.or(result.initial_error).is_some()
+            && context.setup.task.protocol.explain == 0
         {
             let button = ui
                 .button("Try what would help")
                 .on_hover_text("Run the query again in other ways (E)");
-            if button.clicked() {
-                commands.send(|app| app.state.switch_explaining());
-            }
+            button.sends(context, |app| app.state.switch_explaining());
         }
         return;
     };
@@ -279,7 +269,7 @@ fn helped(
         }
         heading(ui, title);
         for helped in group {
-            ui.push_id(("remedy", &helped.args), |ui| remedy(ui, commands, helped));
+            ui.push_id(("remedy", &helped.args), |ui| remedy(ui, context, helped));
         }
     }
     heading(ui, "Tried, did not help");
@@ -307,7 +297,7 @@ fn without_help(explanation: &Explanation) -> String {
     words
 }
 
-fn remedy(ui: &mut Ui, commands: &Queue, helped: &Helped) {
+fn remedy(ui: &mut Ui, context: &ViewContext<'_>, helped: &Helped) {
     let args = short(&helped.args);
     let stroke = Stroke::new(1.0, ui.visuals().widgets.noninteractive.bg_stroke.color);
     let frame = Frame::new().stroke(stroke).corner_radius(3.0).inner_margin(vec2(8.0, 4.0));
@@ -322,7 +312,7 @@ fn remedy(ui: &mut Ui, commands: &Queue, helped: &Helped) {
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, &spoken));
     if response.on_hover_text("Keeps this run as A and runs the query with this").clicked() {
         let args = helped.args.clone();
-        commands.send(move |app| app.state.try_again(&args));
+        context.send(move |app| app.state.try_again(&args));
     }
 }
 

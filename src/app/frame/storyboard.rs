@@ -9,10 +9,9 @@ use egui::{
 
 use super::proof::{self, elided};
 use super::stage;
-use crate::app::command::Queue;
 use crate::app::setup::Setup;
-use crate::app::state::AppState;
 use crate::app::theme;
+use crate::app::{Sends, ViewContext};
 use crate::diagnosis::Grade;
 use crate::event::Stage;
 use crate::session::{Breakpoint, Part, RunState, Span, StageBar};
@@ -45,10 +44,10 @@ pub(crate) fn height(setup: &Setup) -> f32 {
 }
 
 /// Draws all rows and the line below them.
-pub(crate) fn ui(ui: &mut Ui, state: &AppState, commands: &Queue) {
+pub(crate) fn ui(ui: &mut Ui, context: &ViewContext<'_>) {
     let area = ui.available_rect_before_wrap();
     let (above, line) = area.split_top_bottom_at_y(area.bottom() - SCRUB);
-    let rows = rows(state);
+    let rows = rows(context);
     let most = rows.iter().map(|row| row.stages.len() + 1).max().unwrap_or(1);
     let room = above.width() - NAME - 12.0;
     let width = (room / most as f32 - GAP).clamp(*WIDTH.start(), *WIDTH.end());
@@ -59,20 +58,20 @@ pub(crate) fn ui(ui: &mut Ui, state: &AppState, commands: &Queue) {
         area.show(ui, |ui| {
             ui.spacing_mut().item_spacing = vec2(GAP, GAP);
             for row in &rows {
-                ui.horizontal(|ui| draw(ui, state, commands, row, vec2(width, height)));
+                ui.horizontal(|ui| draw(ui, context, row, vec2(width, height)));
             }
         });
     });
     ui.scope_builder(UiBuilder::new().max_rect(line), |ui| {
-        scrub(ui, state, commands);
+        scrub(ui, context);
     });
 }
 
 /// The rows: the choice of references, each method on the reference that is shown, its fusions.
-fn rows(state: &AppState) -> Vec<Row<'_>> {
-    let run = state.shown_run();
-    let reference = run.reference_at(state.shown_cursor());
-    let methods = state.setup.task.protocol.methods.iter();
+fn rows<'a>(context: &ViewContext<'a>) -> Vec<Row<'a>> {
+    let run = context.run;
+    let reference = run.reference_at(context.cursor);
+    let methods = context.setup.task.protocol.methods.iter();
     let own = methods.clone().map(|&method| Part::Reference(method, reference));
     let fused = methods.map(|&method| Part::Fusion(method));
     let fused = fused.filter(|part| run.span_of(*part).is_some());
@@ -81,31 +80,32 @@ fn rows(state: &AppState) -> Vec<Row<'_>> {
     parts
         .map(|part| {
             let span = run.span_of(part);
-            let stages = span.map_or(Vec::new(), |span| state.stages_of(span));
+            let stages = span.map_or(Vec::new(), |span| context.state.stages_of(span));
             Row { part, span, stages }
         })
         .collect()
 }
 
-fn draw(ui: &mut Ui, state: &AppState, commands: &Queue, row: &Row<'_>, size: egui::Vec2) {
-    name(ui, state, commands, row, size.y);
+fn draw(ui: &mut Ui, context: &ViewContext<'_>, row: &Row<'_>, size: egui::Vec2) {
+    name(ui, context, row, size.y);
     let Some(span) = row.span else { return };
-    let is_here = state.shown_span().is_some_and(|here| here.records == span.records);
-    let shows_why = is_here && state.options.shows_why;
-    let run = state.shown_run();
+    let is_here = context.span().is_some_and(|here| here.records == span.records);
+    let shows_why = is_here && context.options.shows_why;
+    let run = context.run;
     for bar in &row.stages {
-        let end = state.stage_end(span, bar);
+        let end = context.state.stage_end(span, bar);
         let here = bar.records.start..end + 1;
-        let is_selected = is_here && !shows_why && here.contains(&state.shown_cursor());
+        let is_selected = is_here && !shows_why && here.contains(&context.cursor);
         let records = bar.records.start..bar.records.end.min(run.len());
-        let has_failed = bar.succeeded == Some(false) && state.has_begun(bar.records.end - 1);
+        let has_failed =
+            bar.succeeded == Some(false) && context.state.has_begun(bar.records.end - 1);
         // The view at the start is rendered right after the cloud has its colours.
         let shown = match bar.stage {
             Stage::Color => records.start..(records.end + 2).min(span.records.end),
             _ => records.clone(),
         };
         let caption = stage::caption(bar.stage, has_failed, &run.records()[shown.clone()]);
-        let picture = state.thumbnail(&span.records, &shown);
+        let picture = context.state.thumbnail(&span.records, &shown);
         let cell = Cell {
             caption,
             spoken: format!("{} {}", part_name(row.part), stage::name(bar.stage)),
@@ -115,31 +115,22 @@ fn draw(ui: &mut Ui, state: &AppState, commands: &Queue, row: &Row<'_>, size: eg
             is_pale: bar.reused,
         };
         let response = cell.ui(ui, size);
-        if response.clicked() {
-            commands.send(move |app| app.state.move_cursor(end));
-        }
+        response.sends(context, move |app| app.state.move_cursor(end));
         let part = row.part;
         let stage = bar.stage;
-        response.context_menu(|ui| stop_here(ui, state, commands, part, stage.name()));
+        response.context_menu(|ui| stop_here(ui, context, part, stage.name()));
     }
-    why(ui, state, commands, row, size, shows_why);
+    why(ui, context, row, size, shows_why);
 }
 
 /// The last picture: why the result is what it is.
-fn why(
-    ui: &mut Ui,
-    state: &AppState,
-    commands: &Queue,
-    row: &Row<'_>,
-    size: egui::Vec2,
-    is_selected: bool,
-) {
+fn why(ui: &mut Ui, context: &ViewContext<'_>, row: &Row<'_>, size: egui::Vec2, is_selected: bool) {
     let Some(span) = row.span else { return };
-    let result = state.outcome(span).filter(|result| result.grade != Grade::Right);
+    let result = context.state.outcome(span).filter(|result| result.grade != Grade::Right);
     let Some(result) = result else { return };
     let caption = if result.grade.is_failure() { "why" } else { "what decided" };
-    let picture = state.proof(span.part).map(|picture| {
-        let texture = proof::texture(ui, &state.textures, &picture.large);
+    let picture = context.state.proof(span.part).map(|picture| {
+        let texture = proof::texture(ui, &context.state.textures, &picture.large);
         (texture.id(), texture.size_vec2())
     });
     let cell = Cell {
@@ -152,17 +143,17 @@ fn why(
     };
     if cell.ui(ui, size).clicked() {
         let part = row.part;
-        commands.send(move |app| app.state.show_part(part, true));
+        context.send(move |app| app.state.show_part(part, true));
     }
 }
 
-fn stop_here(ui: &mut Ui, state: &AppState, commands: &Queue, part: Part, stage: &str) {
+fn stop_here(ui: &mut Ui, context: &ViewContext<'_>, part: Part, stage: &str) {
     let breakpoint = match part.method() {
         Some(method) if !Breakpoint::is_outside(stage) => format!("{method}.{stage}"),
         _ => stage.to_owned(),
     };
     let mut texts: Vec<String> =
-        state.setup.task.breakpoints.iter().map(ToString::to_string).collect();
+        context.setup.task.breakpoints.iter().map(ToString::to_string).collect();
     let known = texts.iter().position(|text| *text == breakpoint);
     let words = match known {
         Some(_) => format!("Do not stop at {breakpoint}"),
@@ -175,7 +166,7 @@ fn stop_here(ui: &mut Ui, state: &AppState, commands: &Queue, part: Part, stage:
             }
             None => texts.push(breakpoint),
         }
-        commands.send(|app| app.state.set_breakpoints(texts));
+        context.send(|app| app.state.set_breakpoints(texts));
         ui.close();
     }
 }
@@ -235,9 +226,9 @@ pub(crate) fn part_name(part: Part) -> String {
     }
 }
 
-fn name(ui: &mut Ui, state: &AppState, commands: &Queue, row: &Row<'_>, height: f32) {
+fn name(ui: &mut Ui, context: &ViewContext<'_>, row: &Row<'_>, height: f32) {
     let (rect, response) = ui.allocate_exact_size(vec2(NAME, height), Sense::click());
-    let run = state.shown_run();
+    let run = context.run;
     let references = run.loaded.as_deref().map_or(0, |loaded| loaded.problems.len());
     let of = match row.part.reference() {
         Some(reference) if references > 1 => format!("  ref {} of {references}", reference + 1),
@@ -246,7 +237,7 @@ fn name(ui: &mut Ui, state: &AppState, commands: &Queue, row: &Row<'_>, height: 
     let color = row.part.method().map_or(ui.visuals().text_color(), |method| {
         theme::text(ui.visuals(), theme::method(method))
     });
-    let result = row.span.and_then(|span| state.outcome(span));
+    let result = row.span.and_then(|span| context.state.outcome(span));
     let (grade, grade_color) = match &result {
         Some(result) => {
             let text = result.off().unwrap_or_else(|| result.grade.to_string());
@@ -269,31 +260,31 @@ fn name(ui: &mut Ui, state: &AppState, commands: &Queue, row: &Row<'_>, height: 
     painter.text(pos2(at.right(), lower), Align2::LEFT_CENTER, &of, small, weak);
     let help = if of.is_empty() { "Show what it did" } else { "Show the next reference" };
     if response.on_hover_text(help).clicked() {
-        click(state, commands, row, references);
+        click(context, row, references);
     }
 }
 
 /// A click on a name shows the method; a second one its next reference.
-fn click(state: &AppState, commands: &Queue, row: &Row<'_>, references: usize) {
-    let here = state.shown_span().map(|span| span.part);
+fn click(context: &ViewContext<'_>, row: &Row<'_>, references: usize) {
+    let here = context.span().map(|span| span.part);
     let part = match row.part {
         Part::Reference(method, reference) if here == Some(row.part) && references > 1 => {
             Part::Reference(method, (reference + 1) % references)
         }
         part => part,
     };
-    commands.send(move |app| app.state.show_outcome(part));
+    context.send(move |app| app.state.show_outcome(part));
 }
 
 /// The line that moves the cursor inside the selected stage, and what the run is doing.
-fn scrub(ui: &mut Ui, state: &AppState, commands: &Queue) {
-    let run = state.shown_run();
-    let cursor = state.shown_cursor();
-    let words = status(state);
+fn scrub(ui: &mut Ui, context: &ViewContext<'_>) {
+    let run = context.run;
+    let cursor = context.cursor;
+    let words = status(context);
     ui.horizontal_centered(|ui| {
-        let span = state.shown_span();
+        let span = context.span();
         let method = span.and_then(|span| span.part.method());
-        let stages = span.map_or(Vec::new(), |span| state.stages_of(span));
+        let stages = span.map_or(Vec::new(), |span| context.state.stages_of(span));
         let bar = stages.into_iter().find(|bar| bar.records.contains(&cursor));
         let title = match (span, bar) {
             (Some(span), Some(bar)) => {
@@ -312,7 +303,7 @@ fn scrub(ui: &mut Ui, state: &AppState, commands: &Queue) {
         let records = bar.map(|bar| bar.records.clone()).or(span.map(|span| span.records.clone()));
         let records = records.unwrap_or(0..0);
         let width = (ui.available_width() - 250.0).max(60.0);
-        line(ui, commands, &records, cursor, width, color);
+        line(ui, context, &records, cursor, width, color);
         let position = match run.len() {
             0 => words,
             len => format!("step {cursor} of {} · {words}", len - 1),
@@ -323,7 +314,7 @@ fn scrub(ui: &mut Ui, state: &AppState, commands: &Queue) {
 
 fn line(
     ui: &mut Ui,
-    commands: &Queue,
+    context: &ViewContext<'_>,
     records: &Range<usize>,
     cursor: usize,
     width: f32,
@@ -345,20 +336,20 @@ fn line(
         let share = ((pointer.x - inside.left()) / inside.width().max(1.0)).clamp(0.0, 1.0);
         let wanted = records.start + (share * last as f32).round() as usize;
         if wanted != cursor && !records.is_empty() {
-            commands.send(move |app| app.state.move_cursor(wanted));
+            context.send(move |app| app.state.move_cursor(wanted));
         }
     }
     response.on_hover_text("Drag to move inside the stage (← →)");
 }
 
 /// What the run is doing, in a few words.
-fn status(state: &AppState) -> String {
-    match state.run_state() {
-        RunState::Loading => match state.run().ranking {
+fn status(context: &ViewContext<'_>) -> String {
+    match context.state.run_state() {
+        RunState::Loading => match context.state.run().ranking {
             Some([ranked, candidates]) => format!("choosing references, {ranked} of {candidates}"),
             None => "loading".to_owned(),
         },
-        RunState::Running => match &state.run().explaining {
+        RunState::Running => match &context.state.run().explaining {
             Some(explaining) => explaining.to_string(),
             None => "running".to_owned(),
         },

@@ -4,11 +4,10 @@ use egui::containers::menu::{MenuButton, MenuConfig};
 use egui::{Align, Button, Label, Layout, PopupCloseBehavior, Response, RichText, Ui};
 
 use super::Panes;
+use crate::app::Arrangement;
 use crate::app::action::{self, ACTIONS, Group, button};
-use crate::app::arrangement::Arrangement;
-use crate::app::command::Queue;
-use crate::app::state::AppState;
 use crate::app::theme;
+use crate::app::{Sends, ViewContext};
 use crate::event::Side;
 use crate::session::RunState;
 
@@ -16,14 +15,14 @@ use crate::session::RunState;
 const RIGHT: f32 = 440.0;
 const MIDDLE: f32 = 232.0;
 
-pub(crate) fn ui(ui: &mut Ui, state: &AppState, commands: &Queue, panes: &mut Panes) {
+pub(crate) fn ui(ui: &mut Ui, context: &ViewContext<'_>, panes: &mut Panes) {
     ui.horizontal_centered(|ui| {
-        menu(ui, state, commands);
+        menu(ui, context);
         let room = ui.available_width() - RIGHT - MIDDLE;
-        part(ui, room.max(200.0), |ui| query(ui, state, commands, panes));
-        part(ui, MIDDLE, |ui| running(ui, state, commands, panes));
+        part(ui, room.max(200.0), |ui| query(ui, context, panes));
+        part(ui, MIDDLE, |ui| running(ui, context, panes));
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-            shown(ui, state, commands);
+            shown(ui, context);
         });
     });
 }
@@ -38,19 +37,19 @@ fn part(ui: &mut Ui, width: f32, draw: impl FnOnce(&mut Ui)) {
 }
 
 /// What is seldom needed.
-fn menu(ui: &mut Ui, state: &AppState, commands: &Queue) {
+fn menu(ui: &mut Ui, context: &ViewContext<'_>) {
     let response = ui.menu_button("Menu", |ui| {
         for (group, title) in Group::ALL {
             ui.menu_button(title, |ui| {
                 for action in ACTIONS.iter().filter(|action| action.group == group) {
-                    action.menu_item(ui, state, commands);
+                    action.menu_item(ui, context);
                 }
             });
         }
         ui.menu_button("Views", |ui| {
             for entry in crate::app::views::ALL {
-                if ui.button(entry.title).on_hover_text(entry.about).clicked() {
-                    commands.send(|app| app.state.show_view(entry.name));
+                let button = ui.button(entry.title).on_hover_text(entry.about);
+                if button.sends(context, |app| app.state.show_view(entry.name)) {
                     ui.close();
                 }
             }
@@ -59,14 +58,14 @@ fn menu(ui: &mut Ui, state: &AppState, commands: &Queue) {
     response.response.on_hover_text("All actions");
 }
 
-fn query(ui: &mut Ui, state: &AppState, commands: &Queue, panes: &mut Panes) {
-    let setup = &state.setup;
+fn query(ui: &mut Ui, context: &ViewContext<'_>, panes: &mut Panes) {
+    let setup = &context.setup;
     let scene = RichText::new(setup.queries.name()).strong();
     ui.add(Label::new(scene).truncate()).on_hover_text("The scene of the query");
     ui.weak("›");
-    button(ui, state, commands, "◀", "Previous query");
+    button(ui, context, "◀", "Previous query");
     ui.label(RichText::new(setup.query_name()).strong()).on_hover_text("The query");
-    button(ui, state, commands, "▶", "Next query");
+    button(ui, context, "▶", "Next query");
     // The names of the references are worth more than the word before them.
     if ui.available_width() > 170.0 {
         ui.weak("against");
@@ -83,7 +82,7 @@ fn query(ui: &mut Ui, state: &AppState, commands: &Queue, panes: &mut Panes) {
         [first, others @ ..] => format!("{first} and {} more", others.len()),
     };
     let chip = Button::new(format!("{text} ▾")).truncate();
-    let show = |ui: &mut Ui| panes.show(ui, "references", state, commands);
+    let show = |ui: &mut Ui| panes.show(ui, "references", context);
     let response = popup(ui, chip, [380.0, 420.0], show);
     let all = names.join(", ");
     let spoken = format!("References: {all}");
@@ -91,21 +90,20 @@ fn query(ui: &mut Ui, state: &AppState, commands: &Queue, panes: &mut Panes) {
     response.on_hover_text(format!("The references: {all}. Click to choose others"));
 }
 
-fn running(ui: &mut Ui, state: &AppState, commands: &Queue, panes: &mut Panes) {
-    let is_running = matches!(state.run_state(), RunState::Running | RunState::Loading);
-    let is_paused = matches!(state.run_state(), RunState::Paused { .. });
+fn running(ui: &mut Ui, context: &ViewContext<'_>, panes: &mut Panes) {
+    let is_running = matches!(context.state.run_state(), RunState::Running | RunState::Loading);
+    let is_paused = matches!(context.state.run_state(), RunState::Paused { .. });
     let text = if is_running { "Pause" } else { "▶ Run" };
     let run = ui.add_sized([64.0, 26.0], Button::new(text));
-    if run.on_hover_text(action::tooltip(ui.ctx(), "Run or pause")).clicked() {
-        commands.send(|app| app.state.run_or_pause());
-    }
+    run.on_hover_text(action::tooltip(ui.ctx(), "Run or pause"))
+        .sends(context, |app| app.state.run_or_pause());
     ui.add_enabled_ui(is_paused || is_running, |ui| {
-        button(ui, state, commands, "Stage", "Step over the stage");
-        button(ui, state, commands, "Step", "Step to the next event");
+        button(ui, context, "Stage", "Step over the stage");
+        button(ui, context, "Step", "Step to the next event");
     });
-    let count = state.setup.task.breakpoints.len();
+    let count = context.setup.task.breakpoints.len();
     let text = if count == 0 { "Break".to_owned() } else { format!("Break ({count})") };
-    let show = |ui: &mut Ui| panes.show(ui, "breakpoints", state, commands);
+    let show = |ui: &mut Ui| panes.show(ui, "breakpoints", context);
     let response = popup(ui, Button::new(text), [320.0, 260.0], show);
     response.on_hover_text("Where the run stops");
 }
@@ -122,23 +120,23 @@ fn popup(ui: &mut Ui, button: Button<'_>, size: [f32; 2], show: impl FnOnce(&mut
 }
 
 /// What is shown, and the layouts; from the right.
-fn shown(ui: &mut Ui, state: &AppState, commands: &Queue) {
-    button(ui, state, commands, "?", "All keys");
-    button(ui, state, commands, "Search", "Search for an action");
+fn shown(ui: &mut Ui, context: &ViewContext<'_>) {
+    button(ui, context, "?", "All keys");
+    button(ui, context, "Search", "Search for an action");
     ui.separator();
     for (layout, title, text) in Arrangement::ALL.into_iter().rev() {
-        let response = ui.add(Button::selectable(state.options.layout == layout, title));
-        if response.on_hover_text(action::tooltip(ui.ctx(), text)).clicked() {
-            commands.send(move |app| app.arrange(layout));
-        }
+        let response = ui.add(Button::selectable(context.options.layout == layout, title));
+        response
+            .on_hover_text(action::tooltip(ui.ctx(), text))
+            .sends(context, move |app| app.arrange(layout));
     }
     ui.separator();
-    compare(ui, state, commands);
-    button(ui, state, commands, "Truth", "Ground truth");
+    compare(ui, context);
+    button(ui, context, "Truth", "Ground truth");
 }
 
-fn compare(ui: &mut Ui, state: &AppState, commands: &Queue) {
-    let text = match (state.kept.is_some(), state.is_showing_kept()) {
+fn compare(ui: &mut Ui, context: &ViewContext<'_>) {
+    let text = match (context.state.kept.is_some(), context.state.is_showing_kept()) {
         (false, _) => RichText::new("Compare"),
         (true, true) => RichText::new("Run A").color(theme::accent(ui.visuals())),
         (true, false) => RichText::new("Run B").color(theme::accent(ui.visuals())),
@@ -146,7 +144,7 @@ fn compare(ui: &mut Ui, state: &AppState, commands: &Queue) {
     let button = Button::new(text).min_size(egui::vec2(72.0, 0.0));
     let (response, _) = MenuButton::from_button(button).ui(ui, |ui| {
         for action in ACTIONS.iter().filter(|action| action.group == Group::Compare) {
-            action.menu_item(ui, state, commands);
+            action.menu_item(ui, context);
         }
     });
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, "Compare"));

@@ -7,10 +7,9 @@ use egui::{
 use super::proof::elided;
 use super::storyboard::part_name;
 use crate::app::action;
-use crate::app::command::Queue;
 use crate::app::lecture;
-use crate::app::state::AppState;
 use crate::app::theme;
+use crate::app::{Sends, ViewContext};
 use crate::diagnosis::{Confidence, confidence};
 use crate::localize::QueryResult;
 use crate::session::{Part, RunState, Span};
@@ -25,27 +24,27 @@ const HINT: &str =
     "Space runs the query to its end, I steps into the next event, ? lists all keys.";
 
 /// Draws the cells, the sentence and the remedy.
-pub(crate) fn ui(ui: &mut Ui, state: &AppState, commands: &Queue) {
+pub(crate) fn ui(ui: &mut Ui, context: &ViewContext<'_>) {
     let area = ui.available_rect_before_wrap();
-    let methods = &state.setup.task.protocol.methods;
+    let methods = &context.setup.task.protocol.methods;
     let width = if methods.len() > 4 { NARROW_CELL } else { CELL };
     let mut left = area.left();
     for &method in methods {
         let rect = Rect::from_min_size(pos2(left, area.top()), vec2(width, area.height()));
-        let span = state.deciding_span(method);
+        let span = context.state.deciding_span(method);
         let part = span.map_or(Part::Reference(method, 0), |span| span.part);
-        cell(ui, state, commands, rect, part, span);
+        cell(ui, context, rect, part, span);
         left += width;
     }
     let rest = Rect::from_min_max(pos2(left + 12.0, area.top()), area.max);
     let (words, button) = rest.split_left_right_at_x(rest.right() - BUTTON);
-    let span = state.shown_span();
-    let result = span.and_then(|span| state.outcome(span));
+    let span = context.span();
+    let result = span.and_then(|span| context.state.outcome(span));
     let layout = Layout::top_down(Align::Min);
     ui.scope_builder(
         UiBuilder::new().max_rect(words.shrink2(vec2(0.0, 4.0))).layout(layout),
         |ui| {
-            let (first, second) = sentence(state, span, result.as_ref());
+            let (first, second) = sentence(context, span, result.as_ref());
             ui.spacing_mut().item_spacing.y = 1.0;
             let strong = ui.visuals().strong_text_color();
             let rows = lines(ui, &first, egui::FontId::proportional(15.0), strong, 2);
@@ -61,7 +60,7 @@ pub(crate) fn ui(ui: &mut Ui, state: &AppState, commands: &Queue) {
             .layout(Layout::right_to_left(Align::Center)),
         |ui| {
             if let Some(result) = result.filter(|result| result.grade.is_failure()) {
-                remedy(ui, state, commands, &result);
+                remedy(ui, context, &result);
             }
         },
     );
@@ -81,10 +80,10 @@ fn lines(ui: &mut Ui, text: &str, font: egui::FontId, color: egui::Color32, most
     rows
 }
 
-fn cell(ui: &Ui, state: &AppState, commands: &Queue, rect: Rect, part: Part, span: Option<&Span>) {
+fn cell(ui: &Ui, context: &ViewContext<'_>, rect: Rect, part: Part, span: Option<&Span>) {
     let response = ui.interact(rect, ui.scope_id().with(("verdict", part)), Sense::click());
-    let result = span.and_then(|span| state.shown_result(span));
-    let is_here = state.shown_span().is_some_and(|here| here.part.method() == part.method());
+    let result = span.and_then(|span| context.state.shown_result(span));
+    let is_here = context.span().is_some_and(|here| here.part.method() == part.method());
     let painter = ui.painter_at(rect);
     if is_here || response.hovered() {
         painter.rect_filled(rect, 0.0, ui.visuals().widgets.inactive.weak_bg_fill);
@@ -101,19 +100,17 @@ fn cell(ui: &Ui, state: &AppState, commands: &Queue, rect: Rect, part: Part, spa
     painter.galley(rect.min + vec2(10.0, 12.0), name, color);
     let (words, color) = match &result {
         Some(result) => worth(ui, result),
-        None => (waiting(state, part).to_owned(), ui.visuals().weak_text_color()),
+        None => (waiting(context, part).to_owned(), ui.visuals().weak_text_color()),
     };
     let galley = elided(ui, &words, color, rect.width() - 14.0);
     painter.galley(rect.min + vec2(10.0, 34.0), galley, color);
     let spoken = format!("{}: {words}", part_name(part));
     response.widget_info(|| WidgetInfo::selected(Role::Button, true, is_here, &spoken));
-    let help = match state.known_result(part).filter(|_| result.is_none()) {
+    let help = match context.state.known_result(part).filter(|_| result.is_none()) {
         Some(known) => format!("{spoken}. An earlier run found: {}", known.words()),
         None => spoken.clone(),
     };
-    if response.on_hover_text(help).clicked() {
-        commands.send(move |app| app.state.show_outcome(part));
-    }
+    response.on_hover_text(help).sends(context, move |app| app.state.show_outcome(part));
 }
 
 /// The grade with the error, or the confidence where there is no grade.
@@ -130,21 +127,21 @@ fn worth(ui: &Ui, result: &QueryResult) -> (String, egui::Color32) {
     (words, color)
 }
 
-fn waiting(state: &AppState, part: Part) -> &'static str {
-    match state.shown_run().span_of(part) {
-        Some(_) => state.run_state().of_what_has_begun(),
+fn waiting(context: &ViewContext<'_>, part: Part) -> &'static str {
+    match context.run.span_of(part) {
+        Some(_) => context.state.run_state().of_what_has_begun(),
         None => "not run yet",
     }
 }
 
 /// The sentence of what is selected, and the one below it.
 fn sentence(
-    state: &AppState,
+    context: &ViewContext<'_>,
     span: Option<&Span>,
     result: Option<&QueryResult>,
 ) -> (String, String) {
     let Some(span) = span else {
-        return match state.run_state() {
+        return match context.state.run_state() {
             RunState::Loading => {
                 ("The photos and the cloud are being read.".to_owned(), String::new())
             }
@@ -153,13 +150,16 @@ fn sentence(
         };
     };
     let Some(result) = result else {
-        let first =
-            format!("{} is {}.", part_name(span.part), state.run_state().of_what_has_begun());
-        let is_waiting = matches!(state.run_state(), RunState::Paused { .. });
-        if is_waiting && state.run().results().next().is_none() {
+        let first = format!(
+            "{} is {}.",
+            part_name(span.part),
+            context.state.run_state().of_what_has_begun()
+        );
+        let is_waiting = matches!(context.state.run_state(), RunState::Paused { .. });
+        if is_waiting && context.state.run().results().next().is_none() {
             return (first, HINT.to_owned());
         }
-        let latest = lecture::latest(state.shown_run(), span, state.shown_cursor());
+        let latest = lecture::latest(context.run, span, context.cursor);
         return (first, latest.unwrap_or_default());
     };
     split(&told(result))
@@ -209,13 +209,14 @@ fn fitted(ui: &Ui, words: &str, number: &str, width: f32) -> String {
 }
 
 /// The best of what helped, or the offer to look for it; always of the same width.
-fn remedy(ui: &mut Ui, state: &AppState, commands: &Queue, result: &QueryResult) {
+fn remedy(ui: &mut Ui, context: &ViewContext<'_>, result: &QueryResult) {
     let size = vec2(BUTTON - 16.0, 30.0);
-    let explaining = state.run().explaining.filter(|explaining| explaining.method == result.method);
+    let explaining =
+        context.state.run().explaining.filter(|explaining| explaining.method == result.method);
     let can_explain = result.error.or(result.initial_error).is_some();
     let mut whole = String::new();
     let mut args = None;
-    let is_offered = can_explain && state.setup.task.protocol.explain == 0;
+    let is_offered = can_explain && context.setup.task.protocol.explain == 0;
     let (text, help) = match (&result.explanation, explaining) {
         (Some(explanation), _) => match explanation.best() {
             Some(helped) => {
@@ -249,12 +250,10 @@ fn remedy(ui: &mut Ui, state: &AppState, commands: &Queue, result: &QueryResult)
     if !help.is_empty() {
         response = response.on_hover_text(help);
     }
-    if response.clicked() {
-        commands.send(move |app| match args {
-            Some(args) => app.state.try_again(&args),
-            None => app.state.switch_explaining(),
-        });
-    }
+    response.sends(context, move |app| match args {
+        Some(args) => app.state.try_again(&args),
+        None => app.state.switch_explaining(),
+    });
 }
 
 #[cfg(test)]

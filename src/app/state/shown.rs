@@ -10,7 +10,7 @@ use crate::app::view_options::CompareMode;
 use crate::diagnosis::Grade;
 use crate::event::Stage;
 use crate::localize::QueryResult;
-use crate::measure::{ConditionError, Migration};
+use crate::measure::ConditionError;
 use crate::method::Method;
 use crate::proof::ProofPicture;
 use crate::session::{Part, Run, Span, StageBar};
@@ -114,14 +114,9 @@ impl AppState {
         let wanted = Wanted {
             condition: self.options.results_filter.clone(),
             change: self.options.verdict_change.clone(),
-            only_changed: self.options.only_differences && self.results_before.is_some(),
+            only_changed: self.options.only_differences && self.results.has_before(),
         };
-        self.selection.rows(self.known(), wanted)
-    }
-
-    /// What became of the verdicts since the results A, also of those that stayed what they were.
-    pub(crate) fn migrations(&self) -> Rc<[Migration]> {
-        self.selection.migrations(self.known())
+        self.results.select(wanted)
     }
 
     /// Whether a record is known at the cursor: in a lecture what comes later is not.

@@ -7,8 +7,9 @@ use egui::{Button, RichText, ScrollArea, Sense, TextEdit, Ui};
 use egui_extras::{Column, TableBuilder, TableRow};
 
 use super::View;
+use crate::app::action::{button, toggle};
 use crate::app::memo::Memo;
-use crate::app::{ResultRow, ViewContext, theme};
+use crate::app::{ResultRow, Sends, ViewContext, theme};
 use crate::localize::QueryResult;
 use crate::measure::{Field, Order, select, verdict_name};
 use crate::method::Method;
@@ -73,9 +74,9 @@ impl View for BatchView {
         }
         // Clicks on the names of the columns sort from the next frame on.
         let mut order = self.order;
-        let key = (Rc::clone(&chosen), order, context.state.known().version);
+        let key = (Rc::clone(&chosen), order, context.state.results.version());
         let (rows, words) = self.shown.get(key, || {
-            let known = chosen.iter().filter_map(|row| context.state.known().result(*row));
+            let known = chosen.iter().filter_map(|row| context.state.results.result(*row));
             let sorted = select(&known.collect::<Vec<_>>(), None, order).into_iter();
             let rows: Vec<ResultRow> = sorted.map(|index| chosen[index]).collect();
             let words = words(context, &rows);
@@ -83,7 +84,7 @@ impl View for BatchView {
         });
         ui.weak(words);
         let (height, has_before) =
-            (ui.spacing().interact_size.y, context.state.known().before.is_some());
+            (ui.spacing().interact_size.y, context.state.results.has_before());
         // The names of the columns move sideways with the rows, and stay above them.
         ScrollArea::horizontal().auto_shrink(false).show(ui, |ui| {
             let mut table = TableBuilder::new(ui).striped(true).sense(Sense::click());
@@ -122,26 +123,16 @@ impl View for BatchView {
 fn changes(ui: &mut Ui, context: &ViewContext<'_>) {
     ui.horizontal_wrapped(|ui| {
         if let Some(change) = &context.options.verdict_change {
-            let button = ui.button(format!("{change} ×"));
-            if button.on_hover_text("Show all verdicts again").clicked() {
-                context.send(|app| app.state.options.verdict_change = None);
-            }
+            let button = ui.button(format!("{change} ×")).on_hover_text("Show all verdicts again");
+            button.sends(context, |app| app.state.options.verdict_change = None);
         }
         let keep = ui.button("Keep results as A");
-        let help = "Compare later results with these: change a setting, run all queries, and see Verdicts since A in Charts";
-        if keep.on_hover_text(help).clicked() {
-            context.send(|app| app.state.keep_results());
-        }
-        if context.state.known().before.is_some() {
-            let mut only = context.options.only_differences;
-            let toggle = ui.toggle_value(&mut only, "Only what changed");
-            if toggle.on_hover_text("Only results whose verdict differs from A (D)").clicked() {
-                context.send(move |app| app.state.options.only_differences = only);
-            }
-            let forget = ui.button("Forget A");
-            if forget.on_hover_text("Forget the results A").clicked() {
-                context.send(|app| app.state.set_results_before(None));
-            }
+        let help = "Compare later results with these: change a setting, run all queries, and see \
+                    Verdicts since A in Charts";
+        keep.on_hover_text(help).sends(context, |app| app.state.keep_results());
+        if context.state.results.has_before() {
+            toggle(ui, context, "Only what changed", "Differences only");
+            button(ui, context, "Forget A", "Forget the results A");
         }
     });
 }
@@ -150,7 +141,7 @@ fn changes(ui: &mut Ui, context: &ViewContext<'_>) {
 fn words(context: &ViewContext<'_>, rows: &[ResultRow]) -> String {
     let results: usize = context.state.results.values().map(Vec::len).sum();
     let mut failed: BTreeMap<Method, usize> = BTreeMap::new();
-    for result in rows.iter().filter_map(|row| context.state.known().result(*row)) {
+    for result in rows.iter().filter_map(|row| context.state.results.result(*row)) {
         let is_failed = result.grade.is_failure();
         *failed.entry(result.method).or_default() += usize::from(is_failed);
     }
@@ -177,7 +168,7 @@ fn header(ui: &mut Ui, name: &str, order: &mut Option<Order>) {
 }
 
 fn draw(row: &mut TableRow<'_, '_>, context: &ViewContext<'_>, at: ResultRow) {
-    let Some(result) = context.state.known().result(at) else {
+    let Some(result) = context.state.results.result(at) else {
         return;
     };
     let is_here = at.query == context.setup.query;
@@ -201,9 +192,9 @@ fn draw(row: &mut TableRow<'_, '_>, context: &ViewContext<'_>, at: ResultRow) {
             label(ui, text);
         });
     }
-    if context.state.known().before.is_some() {
+    if context.state.results.has_before() {
         let primary = |result: &QueryResult| Some(result.diagnosis.first()?.code);
-        let was = context.state.known().before_row(at);
+        let was = context.state.results.before_row(at);
         let was = was.map(|was| verdict_name(primary(was)));
         let text = RichText::new(was.unwrap_or("–"));
         let is_change = was.is_some_and(|was| was != verdict_name(primary(result)));
@@ -213,7 +204,5 @@ fn draw(row: &mut TableRow<'_, '_>, context: &ViewContext<'_>, at: ResultRow) {
     if let Some(finding) = result.diagnosis.first() {
         answer = answer.on_hover_text(&finding.text);
     }
-    if answer.clicked() {
-        context.send(move |app| app.state.open_result(at.query, at.place));
-    }
+    answer.sends(context, move |app| app.state.open_result(at.query, at.place));
 }

@@ -68,7 +68,7 @@ impl View for ChartsView {
         let results: Vec<Chosen<'_>> = match context.state.selected_results() {
             Ok(rows) => {
                 let rows = rows.iter();
-                rows.filter_map(|row| Some((*row, context.state.known().result(*row)?))).collect()
+                rows.filter_map(|row| Some((*row, context.state.results.result(*row)?))).collect()
             }
             Err(error) => {
                 ui.weak(error.to_string());

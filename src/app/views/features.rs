@@ -1,8 +1,10 @@
 //! What an estimator has reported up to the cursor about each query feature.
 
+use egui::Color32;
 use nalgebra::Point3;
 
-use crate::app::ViewContext;
+use super::mark_shape::MarkShape;
+use crate::app::{ViewContext, theme};
 use crate::camera::Intrinsics;
 use crate::depth::LiftedMatch;
 use crate::estimator::{self, Family};
@@ -19,11 +21,51 @@ pub(super) const UNDECIDED: usize = FeatureState::NAMES.len();
 /// The states and "undecided".
 pub(super) const KINDS: usize = UNDECIDED + 1;
 
+/// The states and "undecided": their names, what they mean, and their marks.
+const LOOKS: [(&str, &str, MarkShape); KINDS] = [
+    (
+        "ratio failed",
+        "The two nearest reference features are about equally similar",
+        MarkShape::Cross,
+    ),
+    (
+        "not unique",
+        "The nearest reference feature resembles another query feature more",
+        MarkShape::Triangle,
+    ),
+    ("no depth", "No LiDAR depth near the reference keypoint", MarkShape::Ring),
+    (
+        "outlier",
+        "The estimated pose does not explain the match, or there is no pose",
+        MarkShape::Diamond,
+    ),
+    ("inlier", "The estimated pose explains the match", MarkShape::Disc),
+    ("undecided", "Not decided at this step", MarkShape::Square),
+];
+
 /// The name of a state, or of none yet.
 pub(super) fn name(kind: usize) -> &'static str {
-    const NAMES: [&str; KINDS] =
-        ["ratio failed", "not unique", "no depth", "outlier", "inlier", "undecided"];
-    NAMES[kind]
+    LOOKS[kind].0
+}
+
+/// What a state means.
+pub(super) fn about(kind: usize) -> &'static str {
+    LOOKS[kind].1
+}
+
+/// The mark of a state, or of none yet.
+pub(super) fn mark(kind: usize) -> MarkShape {
+    LOOKS[kind].2
+}
+
+/// The colour of a state, or of none yet.
+pub(super) fn color(kind: usize) -> Color32 {
+    if kind == UNDECIDED { theme::CAMERA } else { theme::state(kind) }
+}
+
+/// Where a keypoint is \[px\].
+pub(super) fn position(keypoint: &Keypoint) -> [f32; 2] {
+    [keypoint.x, keypoint.y]
 }
 
 /// The features of both photos, and how far each has come.

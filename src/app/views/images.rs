@@ -2,7 +2,6 @@
 
 mod detail;
 mod funnel;
-mod marks;
 mod pair;
 mod truth;
 mod visible;
@@ -10,9 +9,8 @@ mod visible;
 use egui::{Rect, Response, Ui, UiBuilder, vec2};
 
 use self::detail::{Detail, Subject};
-use self::marks::draw_truth;
 pub(super) use self::pair::{PhotoPair, photo};
-use self::truth::TrueMatch;
+use self::truth::{TrueMatch, draw_truth};
 use self::visible::VisibleFeatures;
 use super::View;
 use super::canvas::PanZoom;

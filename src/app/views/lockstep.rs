@@ -8,7 +8,7 @@ use super::View;
 use super::images::ImagesView;
 use super::legend::method_name;
 use super::surface::SurfaceView;
-use crate::app::{ViewContext, lecture, theme};
+use crate::app::{Sends, ViewContext, lecture, theme};
 use crate::event::PoseScored;
 use crate::method::Method;
 use crate::session::Span;
@@ -63,9 +63,9 @@ fn axis(ui: &mut Ui, context: &ViewContext<'_>, step: usize, last: usize) {
     ui.label(format!("of {last}"));
     let is_on = context.options.lockstep.is_some();
     let leave = ui.add_enabled(is_on, egui::Button::new("Leave"));
-    if leave.on_hover_text("Back to the cursor of the run").clicked() {
-        context.send(|app| app.state.options.lockstep = None);
-    }
+    leave
+        .on_hover_text("Back to the cursor of the run")
+        .sends(context, |app| app.state.options.lockstep = None);
 }
 
 impl LockstepView {

@@ -5,7 +5,7 @@ use std::ops::RangeInclusive;
 use egui::{Align, Button, ComboBox, DragValue, Id, Layout, RichText, ScrollArea, TextEdit, Ui};
 
 use super::View;
-use crate::app::ViewContext;
+use crate::app::{Sends, ViewContext};
 use crate::describe::{Described, Domain, Value};
 use crate::image::Degradation;
 use crate::params::Params;
@@ -32,9 +32,9 @@ impl View for ParametersView {
                 context.send(|app| app.state.options.wants_filter = false);
             }
             let help = "All parameters to their defaults";
-            if ui.button("Reset all").on_hover_text(help).clicked() {
-                context.send(|app| app.state.reset_params());
-            }
+            ui.button("Reset all")
+                .on_hover_text(help)
+                .sends(context, |app| app.state.reset_params());
         });
         let area = ScrollArea::vertical().id_salt("list").auto_shrink(false);
         area.show(ui, |ui| {

@@ -2,11 +2,11 @@
 
 use std::collections::BTreeSet;
 
-use egui::{Color32, Rect, Role, ScrollArea, Sense, Ui, WidgetInfo, pos2, vec2};
+use egui::style::ScrollAnimation;
+use egui::{Align, Color32, Rect, Role, ScrollArea, Sense, Ui, WidgetInfo, pos2, vec2};
 
 use super::View;
-use super::in_sight::bring_to_the_middle;
-use crate::app::{ViewContext, theme};
+use crate::app::{Sends, ViewContext, theme};
 use crate::event::Side;
 use crate::localize::QueryResult;
 use crate::method::Method;
@@ -59,6 +59,17 @@ impl View for QueriesView {
     }
 }
 
+/// Scrolls the rows that are drawn from `first` on, so that one is in the middle, as far as there are rows on either
+/// side; `height` is that of a row alone \[points\].
+///
+/// An area may be told an offset too, but swings back from what is beyond the contents that it had before.
+fn bring_to_the_middle(ui: &Ui, first: usize, row: usize, height: f32) {
+    let step = height + ui.spacing().item_spacing.y;
+    let top = ui.max_rect().top() + (row as f32 - first as f32) * step;
+    let place = Rect::from_min_size(pos2(ui.max_rect().left(), top), vec2(1.0, height));
+    ui.scroll_to_rect_animation(place, Some(Align::Center), ScrollAnimation::none());
+}
+
 /// The thumbnail, below it the name and one mark for each method.
 fn row(ui: &mut Ui, context: &ViewContext<'_>, query: usize, height: f32) {
     let name = &context.setup.queries.frames()[query];
@@ -102,9 +113,7 @@ fn row(ui: &mut Ui, context: &ViewContext<'_>, query: usize, height: f32) {
         [] => response,
         words => response.on_hover_text(words.join("\n")),
     };
-    if response.clicked() {
-        context.send(move |app| app.state.select_query(query));
-    }
+    response.sends(context, move |app| app.state.select_query(query));
 }
 
 /// One mark for each result, with its colour and its words.

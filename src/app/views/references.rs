@@ -5,7 +5,7 @@ use egui::{ComboBox, DragValue, Image, RichText, ScrollArea, Sense, Ui, Vec2, ve
 use super::View;
 use super::queries::dots;
 use crate::app::memo::Memo;
-use crate::app::{ReferencePick, ViewContext};
+use crate::app::{Sends, ViewContext};
 use crate::event::Side;
 use crate::fusion::Fusion;
 use crate::geometry::PoseError;
@@ -57,8 +57,8 @@ impl View for ReferencesView {
 fn choice(ui: &mut Ui, context: &ViewContext<'_>) {
     let setup = context.setup;
     let (present, count) = match setup.pick() {
-        ReferencePick::ByHand => ("by hand", setup.chosen.frames.len()),
-        ReferencePick::By(selection) => {
+        None => ("by hand", setup.chosen.frames.len()),
+        Some(selection) => {
             let is_same = |(_, way): &&(&str, Selection)| *way == selection.with_count(1);
             let way = WAYS.iter().find(is_same);
             (way.map_or("", |(name, _)| name), selection.count())
@@ -67,20 +67,19 @@ fn choice(ui: &mut Ui, context: &ViewContext<'_>) {
     let label = ui.label("Choose");
     let ways = ComboBox::from_id_salt("way").selected_text(present);
     let ways = ways.show_ui(ui, |ui| {
-        let ways = WAYS.map(|(name, way)| (name, ReferencePick::By(way.with_count(count.max(1)))));
-        for (name, pick) in ways.into_iter().chain([("by hand", ReferencePick::ByHand)]) {
-            if ui.selectable_label(name == present, name).clicked() {
-                context.send(move |app| app.state.pick_references(pick));
-            }
+        let ways = WAYS.map(|(name, way)| (name, Some(way.with_count(count.max(1)))));
+        for (name, pick) in ways.into_iter().chain([("by hand", None)]) {
+            ui.selectable_label(name == present, name)
+                .sends(context, move |app| app.state.pick_references(pick));
         }
     });
     ways.response.labelled_by(label.id);
-    if let ReferencePick::By(selection) = setup.pick() {
+    if let Some(selection) = setup.pick() {
         let mut wanted = count;
         let drag = DragValue::new(&mut wanted).range(1..=20).update_while_editing(false);
         let response = ui.add(drag).on_hover_text("How many references");
         if wanted != count && (!response.dragged() || response.drag_stopped()) {
-            let pick = ReferencePick::By(selection.with_count(wanted));
+            let pick = Some(selection.with_count(wanted));
             context.send(move |app| app.state.pick_references(pick));
         }
     }

@@ -1,8 +1,6 @@
 //! The scene in 3-D: where reference, truth and estimates stand in the coloured cloud.
 
 mod cameras;
-mod cloud;
-mod ground;
 mod labels;
 mod orbit;
 mod picture;
@@ -84,7 +82,8 @@ impl SpaceView {
         let geometry = SceneGeometry::of(context)?;
         let (reference, params) = (&context.problem()?.reference, &context.run.params.render);
         let key = (Same(Arc::clone(reference)), geometry, params.clone());
-        let points = self.cloud.get(key, || Arc::new(cloud::points(&geometry, reference, params)));
+        let points =
+            self.cloud.get(key, || Arc::new(picture::points(&geometry, reference, params)));
         let points = Arc::clone(points);
         Some(SceneContent { geometry, cameras: cameras::cameras(context, &geometry), points })
     }
@@ -217,7 +216,7 @@ impl SpaceView {
         let painter = ui.painter_at(pane);
         painter.image(texture.id(), pane, whole, Color32::WHITE);
         let [pale, strong] = [0.25, 0.6].map(|share| visuals.text_color().gamma_multiply(share));
-        let mut lines = ground::grid(&content.geometry, pale, strong);
+        let mut lines = scene_geometry::grid(&content.geometry, pale, strong);
         for camera in &content.cameras {
             if self.eye != Eye::Through(camera.kind) {
                 lines.extend(camera.lines(&content.geometry.below(&camera.centre())));

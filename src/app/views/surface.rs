@@ -13,6 +13,7 @@ use egui::{ScrollArea, Ui};
 use super::View;
 use super::readout::Readout;
 use crate::app::ViewContext;
+use crate::app::action::toggle;
 use crate::geometry::Pose;
 use crate::grid::DenseSurface;
 
@@ -84,7 +85,7 @@ impl SurfaceView {
         let readout = ui.horizontal(|ui| {
             if !is_narrow {
                 self.map.switch(ui);
-                dense::switch(ui, context);
+                toggle(ui, context, "Dense", "Dense map of all positions and headings");
             }
             Readout::reserve(ui)
         });
@@ -137,6 +138,6 @@ impl SurfaceView {
 fn dense<'a>(context: &ViewContext<'a>, search: &Search<'_>) -> Option<&'a DenseSurface> {
     let wanted = dense::wanted(context, search)?;
     context.send(move |app| app.state.fill_dense_map(wanted));
-    let map = context.state.dense_map(search.method)?;
-    map.surface().ok().filter(|_| *map.ask() == wanted)
+    let map = context.state.scoring.dense_map(search.method)?;
+    map.surface.as_ref().ok().filter(|_| map.ask == wanted)
 }

@@ -11,6 +11,7 @@ use self::mode::Mode;
 use super::View;
 use super::canvas::{self, PanZoom};
 use super::legend::name_picture;
+use crate::app::action::toggle;
 use crate::app::textures::color_image;
 use crate::app::{ShownView, ViewContext};
 use crate::event::Side;
@@ -78,13 +79,8 @@ impl SynthesisView {
                     self.mode = mode;
                 }
             }
-            let mut blinks = context.options.blinking;
-            let blink = ui.toggle_value(&mut blinks, "Blink");
-            let help = "Query and picture in turn (B)";
-            let blink = blink.accessible_name("Blink pictures").on_hover_text(help);
-            if blink.clicked() {
-                context.send(move |app| app.state.options.blinking = blinks);
-            }
+            let blink = toggle(ui, context, "Blink", "Blink between query and synthetic view");
+            blink.accessible_name("Blink pictures");
         });
     }
 
@@ -201,7 +197,7 @@ fn caption(
 /// The place of the cost between that of shuffled pixels and that of the truth; for both methods
 /// where a pose of one's own was tried.
 fn costs(ui: &mut Ui, context: &ViewContext<'_>, method: Method, shown: &ShownView) {
-    match context.state.looking_at().and_then(|_| context.state.probe()) {
+    match context.state.looking_at().and_then(|_| context.state.scoring.probe()) {
         Some(probe) => {
             for (method, comparison) in &probe.comparisons {
                 cost_bar::ui(ui, context, *method, comparison.score.cost);

@@ -2,7 +2,7 @@
 
 use egui::{Grid, RichText, Ui, vec2};
 
-use crate::app::state::AppState;
+use crate::app::ViewContext;
 use crate::app::theme;
 use crate::app::view_options::CompareMode;
 use crate::localize::QueryResult;
@@ -12,19 +12,19 @@ use crate::measure::{Field, Value};
 const NAMES: [&str; 7] =
     ["query", "scene", "queries", "reference", "method", "fusion", "references"];
 
-pub(super) fn ui(ui: &mut Ui, state: &AppState) {
-    let Some(span) = state.shown_span() else {
+pub(super) fn ui(ui: &mut Ui, context: &ViewContext<'_>) {
+    let Some(span) = context.span() else {
         ui.weak("Nothing has run yet. Space runs the query.");
         return;
     };
-    let is_compared = state.kept.is_some();
+    let is_compared = context.state.kept.is_some();
     if is_compared {
-        settings(ui, state);
+        settings(ui, context);
     }
-    match state.outcome(span) {
+    match context.state.outcome(span) {
         Some(result) => {
-            let other = state.other_result(&result);
-            fields(ui, state, &result, other.as_ref(), is_compared);
+            let other = context.state.other_result(&result);
+            fields(ui, context, &result, other.as_ref(), is_compared);
         }
         None => {
             ui.weak("There is no result yet.");
@@ -45,9 +45,9 @@ pub(super) fn ui(ui: &mut Ui, state: &AppState) {
 }
 
 /// What the two runs were asked differently.
-fn settings(ui: &mut Ui, state: &AppState) {
-    let Some(kept) = &state.kept else { return };
-    let (a, b) = (kept.run.settings(), state.run().settings());
+fn settings(ui: &mut Ui, context: &ViewContext<'_>) {
+    let Some(kept) = &context.state.kept else { return };
+    let (a, b) = (kept.run.settings(), context.state.run().settings());
     let only = |these: &[String], those: &[String]| -> Vec<String> {
         these.iter().filter(|one| !those.contains(one)).cloned().collect()
     };
@@ -69,12 +69,12 @@ fn settings(ui: &mut Ui, state: &AppState) {
 
 fn fields(
     ui: &mut Ui,
-    state: &AppState,
+    context: &ViewContext<'_>,
     result: &QueryResult,
     other: Option<&QueryResult>,
     is_compared: bool,
 ) {
-    let shows_kept = state.options.compare_mode == CompareMode::Kept;
+    let shows_kept = context.options.compare_mode == CompareMode::Kept;
     const GAP: f32 = 10.0;
     let columns = if is_compared { 3 } else { 2 };
     let room = ui.available_width() - GAP * (columns - 1) as f32;
@@ -99,7 +99,8 @@ fn fields(
                 };
                 let (own, theirs) = (text(result), other.and_then(text));
                 let differs = is_compared && own != theirs;
-                if own.is_none() && theirs.is_none() || state.options.only_differences && !differs {
+                if own.is_none() && theirs.is_none() || context.options.only_differences && !differs
+                {
                     continue;
                 }
                 ui.label(field.name.replace('_', " ")).on_hover_text(field.about);

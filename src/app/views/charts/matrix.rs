@@ -57,14 +57,14 @@ pub(super) fn ui(ui: &mut Ui, context: &ViewContext<'_>, results: &[Chosen<'_>],
             .map(|(method, own)| (method.label(), tally(own.into_iter(), condition, ok)))
             .collect(),
         Columns::Now => {
-            if context.state.known().before.is_none() {
+            if !context.state.results.has_before() {
                 ui.weak(
                     "Nothing to compare with. Open two runs with --before, or click Keep results as A in Batch, \
                      change a setting and run all queries again",
                 );
                 return;
             }
-            let migrations = context.state.migrations();
+            let migrations = context.state.results.migrations();
             if migrations.is_empty() {
                 ui.weak("A has no result in common with these: scenes, queries, methods and settings differ");
                 return;

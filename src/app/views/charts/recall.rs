@@ -39,7 +39,7 @@ fn limits<'a>(results: impl Iterator<Item = &'a QueryResult>, right: Tolerance) 
 pub(super) fn ui(ui: &mut Ui, context: &ViewContext<'_>, results: &[Chosen<'_>], most_m: f64) {
     let right = context.setup.task.protocol.right;
     let now = limits(results.iter().map(|(_, result)| *result), right);
-    let before = results.iter().filter_map(|(row, _)| context.state.known().before_row(*row));
+    let before = results.iter().filter_map(|(row, _)| context.state.results.before_row(*row));
     let before = limits(before, right);
     let share = |(all, known): &(usize, Vec<f64>)| {
         let within = known.iter().filter(|limit| **limit <= right.translation_m).count();

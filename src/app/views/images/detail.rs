@@ -5,13 +5,14 @@ use std::sync::Arc;
 use egui::{Button, Color32, Grid, Painter, Rect, Sense, TextureHandle, Ui, UiBuilder, Vec2, vec2};
 use nalgebra::Point2;
 
-use super::marks::{color, draw_truth, mark, position};
-use super::truth::TrueMatch;
+use super::truth::{TrueMatch, draw_truth};
 use crate::app::memo::{Memo, Same};
 use crate::app::views::canvas::Placement;
-use crate::app::views::features::{FeatureProgress, UNDECIDED, error_px, name};
+use crate::app::views::features::{
+    FeatureProgress, UNDECIDED, color, error_px, mark, name, position,
+};
 use crate::app::views::legend::name_picture;
-use crate::app::{ViewContext, theme};
+use crate::app::{Sends, ViewContext, theme};
 use crate::features::{FeatureState, Keypoint};
 use crate::palette;
 use crate::problem::{Problem, ReferenceTuple};
@@ -165,16 +166,15 @@ fn numbers(ui: &mut Ui, context: &ViewContext<'_>, subject: &Subject<'_>) {
         mark(kind).paint(ui.painter(), rect.center(), 4.5, color(kind));
         ui.strong(format!("Feature {}: {}", subject.feature, name(kind)));
         let close = ui.add(Button::new("×").small()).on_hover_text("Close");
-        if close.accessible_name("Close feature").clicked() {
-            context.send(|app| app.state.options.selected_feature = None);
-        }
+        close
+            .accessible_name("Close feature")
+            .sends(context, |app| app.state.options.selected_feature = None);
     });
     if let Some(FeatureState::NotUnique { rival }) = state {
         let help = "The reference feature resembles this query feature more; click to select it";
         let link = ui.link(format!("Nearer to query feature {rival}"));
-        if link.on_hover_text(help).clicked() {
-            context.send(move |app| app.state.options.selected_feature = Some(rival));
-        }
+        link.on_hover_text(help)
+            .sends(context, move |app| app.state.options.selected_feature = Some(rival));
     }
     let grid = Grid::new("facts").num_columns(2).min_row_height(0.0);
     grid.spacing(vec2(10.0, 2.0)).show(ui, |ui| {

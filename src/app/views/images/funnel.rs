@@ -2,9 +2,8 @@
 
 use egui::{Align2, Role, Sense, Stroke, Ui, WidgetInfo, pos2, vec2};
 
-use super::marks::{color, mark};
 use crate::app::theme;
-use crate::app::views::features::{KINDS, UNDECIDED, name};
+use crate::app::views::features::{KINDS, UNDECIDED, about, color, mark, name};
 
 /// Height of the chips \[points\].
 pub(super) const HEIGHT: f32 = 38.0;
@@ -70,15 +69,4 @@ fn chip(ui: &mut Ui, kind: usize, count: usize, width: f32, is_shown: bool) -> e
         "{label}\n{}\nClick to show or hide, right-click to show these alone",
         about(kind)
     ))
-}
-
-fn about(kind: usize) -> &'static str {
-    match kind {
-        0 => "The two nearest reference features are about equally similar",
-        1 => "The nearest reference feature resembles another query feature more",
-        2 => "No LiDAR depth near the reference keypoint",
-        3 => "The estimated pose does not explain the match, or there is no pose",
-        4 => "The estimated pose explains the match",
-        _ => "Not decided at this step",
-    }
 }

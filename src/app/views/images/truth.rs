@@ -1,7 +1,11 @@
 //! What the true pose says about a match.
 
+use egui::{Color32, Painter};
 use nalgebra::{Point2, Point3, Vector3};
 
+use crate::app::theme;
+use crate::app::views::canvas::Placement;
+use crate::app::views::mark_shape::MarkShape;
 use crate::camera::Intrinsics;
 use crate::geometry::Pose;
 use crate::problem::Problem;
@@ -123,6 +127,25 @@ impl TrueMatch {
             (Some(false), false) => "false match",
             (None, _) => "unknown without a depth",
         }
+    }
+}
+
+/// The epipolar line, and where the true pose sees the lifted point.
+pub(super) fn draw_truth(
+    painter: &Painter,
+    at: &Placement,
+    camera: &Intrinsics,
+    truth: &TrueMatch,
+) {
+    let place = |pixel: &Point2<f64>| at.on_screen(pixel.cast::<f32>().into());
+    let shade = Color32::from_black_alpha(140);
+    if let Some([from, to]) = truth.line.and_then(|line| line.within(camera)) {
+        painter.line_segment([place(&from), place(&to)], (3.5, shade));
+        painter.line_segment([place(&from), place(&to)], (1.8, theme::TRUTH));
+    }
+    if let Some(pixel) = &truth.place {
+        painter.circle_filled(place(pixel), 8.0, shade);
+        MarkShape::Plus.paint(painter, place(pixel), 6.0, theme::TRUTH);
     }
 }
 

@@ -2,10 +2,11 @@
 
 use egui::{Color32, Painter, Pos2};
 
-use super::marks::{color, mark, position};
 use crate::app::theme;
 use crate::app::views::canvas::Placement;
-use crate::app::views::features::{FeatureProgress, INLIER, KINDS, UNDECIDED};
+use crate::app::views::features::{
+    FeatureProgress, INLIER, KINDS, UNDECIDED, color, mark, position,
+};
 use crate::app::views::mark_shape::MarkShape;
 
 /// How near the pointer must be \[points\].

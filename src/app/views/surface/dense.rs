@@ -27,14 +27,14 @@ pub(super) fn ui(ui: &mut Ui, context: &ViewContext<'_>, search: &Search<'_>) {
         ui.weak("The dense map is filled for the present run, B, only");
         return;
     }
-    let known = context.state.dense_map(search.method);
+    let known = context.state.scoring.dense_map(search.method);
     ui.horizontal_wrapped(|ui| {
         match known.map(progress) {
             Some(Ok(words)) => ui.weak(words),
             Some(Err(words)) => ui.colored_label(ui.visuals().error_fg_color, words),
             None => ui.weak("starting"),
         };
-        let surface = known.and_then(|map| map.surface().ok());
+        let surface = known.and_then(|map| map.surface.as_ref().ok());
         if let Some(words) = surface.and_then(|surface| lowest(context, search, surface)) {
             ui.label(words);
         }
@@ -43,14 +43,14 @@ pub(super) fn ui(ui: &mut Ui, context: &ViewContext<'_>, search: &Search<'_>) {
 
 /// How much of the map is filled, or why it cannot be.
 fn progress(map: &DenseMap) -> Result<String, String> {
-    let surface = map.surface().map_err(|error| {
+    let surface = map.surface.as_ref().map_err(|error| {
         format!(
             "{:.0} positions are too many (at most {MAX_CELLS}). Raise surface.step",
             error.cells
         )
     })?;
     let (tried, all) = (surface.tried() as f64, surface.hypotheses() as f64);
-    let seconds = map.took().as_secs_f64();
+    let seconds = map.took.as_secs_f64();
     Ok(if surface.is_complete() {
         format!("all {all} tried in {seconds:.1} s")
     } else {
@@ -74,15 +74,4 @@ fn lowest(
         words += &format!(", {distance} and {angle} from the truth");
     }
     Some(words)
-}
-
-/// Shows or hides the map.
-pub(super) fn switch(ui: &mut Ui, context: &ViewContext<'_>) {
-    let mut shown = context.options.shows_dense_map;
-    let help =
-        "Score every position with every heading, and show the lowest cost at each position (F)";
-    let switch = ui.toggle_value(&mut shown, "Dense").on_hover_text(help);
-    if switch.clicked() {
-        context.send(move |app| app.state.options.shows_dense_map = shown);
-    }
 }

@@ -6,7 +6,7 @@ use egui_plot::{Line, LineStyle, Plot, PlotPoint, Points, VLine};
 use super::scale::number;
 use super::search::Search;
 use crate::app::views::legend::{at_points, name_picture, plot_shape, result, stretches};
-use crate::app::{CostAlong, CostLine, ViewContext, theme};
+use crate::app::{CostAlong, CostLine, Sends, ViewContext, theme};
 use crate::geometry::Pose;
 use crate::proof::Thing;
 
@@ -34,7 +34,7 @@ pub(super) fn ui(
     search: &Search<'_>,
     line: CostLine,
 ) -> Option<Pose> {
-    let along = context.state.cost_along(line.method);
+    let along = context.state.scoring.along(line.method);
     let Some(along) = along.filter(|along| along.line == line) else {
         context.send(move |app| app.state.trace_line(line));
         ui.weak("Computing the cost from the result to the truth");
@@ -173,9 +173,7 @@ fn draw(
     }
     let PlotPoint { x: way, .. } = answer.transform.value_from_position(at);
     let pose = profile.line.pose(way / profile.length.max(f64::MIN_POSITIVE));
-    if answer.response.clicked() {
-        context.send(move |app| app.state.camera = Some(pose));
-    }
+    answer.response.sends(context, move |app| app.state.camera = Some(pose));
     Some(pose)
 }
 
