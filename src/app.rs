@@ -42,7 +42,7 @@ pub use action::{ACTIONS, Action, Group};
 pub use camera::NamedPose;
 pub use save::SaveTarget;
 pub use scoring::{CostAlong, CostLine, DenseAsk, DenseMap, Probe, Scoring};
-pub use selection::{KnownResults, ResultRow, Results, VerdictChange};
+pub use selection::{KnownResults, ResultRow, Results};
 pub use setup::Setup;
 pub use shot::{Moment, Shot, ShotError, shoot};
 pub use shown::{ShownReason, ShownView};

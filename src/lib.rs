@@ -33,6 +33,8 @@ pub mod app;
 #[cfg(feature = "cli")]
 mod chart;
 pub mod doctor;
+#[cfg(feature = "rerun")]
+pub mod feature_progress;
 #[cfg(feature = "cli")]
 pub mod lesson;
 pub mod measure;

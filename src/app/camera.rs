@@ -22,19 +22,15 @@ pub enum NamedPose {
 }
 
 impl NamedPose {
-    /// All named poses, in the order of the search.
-    pub const ALL: [Self; 6] =
-        [Self::Start, Self::Coarse, Self::Fine, Self::Estimate, Self::Truth, Self::Last];
-
-    /// The name on a button.
+    /// The name in a note.
     pub fn name(self) -> &'static str {
         match self {
-            Self::Start => "Start",
-            Self::Coarse => "Coarse",
-            Self::Fine => "Fine",
-            Self::Estimate => "Estimate",
-            Self::Truth => "Truth",
-            Self::Last => "Back",
+            Self::Start => "start",
+            Self::Coarse => "coarse",
+            Self::Fine => "fine",
+            Self::Estimate => "estimate",
+            Self::Truth => "truth",
+            Self::Last => "back",
         }
     }
 }

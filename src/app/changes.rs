@@ -1,7 +1,7 @@
 //! How commands change the state: the run, the cursor, the query, its references, the camera.
 
 use super::camera::{NamedPose, Nudge};
-use super::navigation::Navigation;
+use super::navigation::{Anchor, Navigation};
 use super::queries::Queries;
 use super::run_pictures::RunPictures;
 use super::selection::Results;
@@ -199,7 +199,7 @@ impl AppState {
         let moment = known.map(deciding);
         self.select_query(query);
         if let Some(moment) = moment {
-            self.navigation = Navigation::towards_moment(moment);
+            self.navigation = Navigation::towards(Anchor::Moment(moment));
         }
     }
 
@@ -393,8 +393,7 @@ impl AppState {
     /// Takes the camera to a place of the search.
     pub fn jump_camera(&mut self, target: NamedPose) {
         let Some(pose) = self.named_pose(target) else {
-            let name = target.name().to_lowercase();
-            self.note(format!("There is no pose for {name} here"), false);
+            self.note(format!("There is no pose for {} here", target.name()), false);
             return;
         };
         self.camera_before = self.camera.or_else(|| self.named_pose(NamedPose::Start));
@@ -404,9 +403,8 @@ impl AppState {
     /// The pose of a place of the search (`world_from_camera`).
     pub(super) fn named_pose(&self, target: NamedPose) -> Option<Pose> {
         let run = self.run();
-        let loaded = run.loaded.as_deref()?;
         let span = run.span_at(self.cursor());
-        let problem = loaded.problems.get(run.reference_at(self.cursor()))?;
+        let problem = run.problem_at(self.cursor())?;
         let minimum = |wanted: Phase| {
             let events = run.all_until::<PhaseSearched>(self.cursor());
             let mut latest = events.rev();
@@ -421,7 +419,7 @@ impl AppState {
                 let span = span.filter(|span| self.has_come(span))?;
                 span.result.as_ref()?.pose.as_ref()?.to_pose()
             }
-            NamedPose::Truth => loaded.truth.filter(|_| self.options.shows_truth),
+            NamedPose::Truth => run.truth().copied().filter(|_| self.options.shows_truth),
             NamedPose::Last => self.camera_before,
         }
     }

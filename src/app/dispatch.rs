@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 use super::App;
 use super::action;
 use super::frame::help::ActionSearch;
-use super::navigation::Navigation;
+use super::lesson::Given;
+use super::navigation::{Anchor, Navigation};
 use super::save::{Asking, SaveTarget};
 use super::saved::SavedSession;
 use super::view_options::Arrangement;
@@ -67,18 +68,17 @@ impl App {
         }
     }
 
-    /// Answers the lesson's question by a choice, counted from 0.
-    pub(super) fn answer(&mut self, choice: usize) {
-        if self.lesson.as_mut().is_some_and(|open| open.choose(choice)) {
+    /// Answers the lesson's question.
+    pub(super) fn answer(&mut self, given: Given) {
+        if self.lesson.as_mut().is_some_and(|open| open.answer(given)) {
             self.show_page();
         }
     }
 
     /// Answers it by where the camera in hand is.
     pub(super) fn guess(&mut self) {
-        let camera = self.state.camera;
-        if self.lesson.as_mut().is_some_and(|open| open.guess(camera)) {
-            self.show_page();
+        if let Some(camera) = self.state.camera {
+            self.answer(Given::Place(camera));
         }
     }
 
@@ -93,7 +93,7 @@ impl App {
         let Some(open) = &mut self.lesson else { return };
         match open.other_setup(&self.state.setup) {
             Ok(Some(setup)) => {
-                let navigation = Navigation::towards_moment(open.moment().clone());
+                let navigation = Navigation::towards(Anchor::Moment(open.moment().clone()));
                 self.state.change_setup(setup, navigation);
             }
             Ok(None) => self.state.seek(open.moment().clone()),

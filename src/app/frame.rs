@@ -22,19 +22,14 @@ use crate::session::Part;
 /// The views with what they remember: a zoom, a filter. Both runs that are compared share it.
 pub(super) struct Panes {
     views: BTreeMap<&'static str, Box<dyn View>>,
-    /// The small panel of the proof that was made large, and the part that the proof is about.
-    swapped: Option<usize>,
-    proof_of: Option<Part>,
+    /// The part whose proof has a small panel that was made large, and that panel.
+    swapped: Option<(Part, usize)>,
 }
 
 impl Panes {
     pub(super) fn new() -> Self {
         let views = views::ALL.iter();
-        Self {
-            views: views.map(|entry| (entry.name, (entry.new)())).collect(),
-            swapped: None,
-            proof_of: None,
-        }
+        Self { views: views.map(|entry| (entry.name, (entry.new)())).collect(), swapped: None }
     }
 
     /// Draws a view of the run that is shown.

@@ -2,11 +2,13 @@
 
 use std::time::Duration;
 
+use eframe::egui_wgpu::capture::CaptureState;
 use eframe::egui_wgpu::{RenderState, RendererOptions, ScreenDescriptor};
-use egui::FullOutput;
+use egui::{FullOutput, ScreenshotCallback};
 use image::RgbImage;
 
 use super::adapter;
+use super::textures::rgb_image;
 use super::window::{WindowError, one_line};
 
 /// Beyond this a graphics adapter that does not answer is taken for lost.
@@ -62,17 +64,19 @@ impl Painter {
         output: FullOutput,
     ) -> Result<RgbImage, String> {
         let (device, queue) = (&self.state.device, &self.state.queue);
+        let [width, height] = self.size_px;
         let screen = ScreenDescriptor {
             size_in_pixels: self.size_px,
             pixels_per_point: output.pixels_per_point,
         };
+        let size = wgpu::Extent3d { width, height, depth_or_array_layers: 1 };
+        let mut capture = CaptureState::new(device, size, self.state.target_format);
+        let view = capture.texture.create_view(&wgpu::TextureViewDescriptor::default());
         let shapes = ctx.tessellate(output.shapes, output.pixels_per_point);
         let mut encoder = device
             .create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("window") });
         let mut renderer = self.state.renderer.write();
         let prepared = renderer.update_buffers(device, queue, &mut encoder, &shapes, &screen);
-        let texture = self.texture();
-        let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
         let pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some("window"),
             color_attachments: &[Some(wgpu::RenderPassColorAttachment {
@@ -87,74 +91,20 @@ impl Painter {
             ..wgpu::RenderPassDescriptor::default()
         });
         renderer.render(&mut pass.forget_lifetime(), &shapes, &screen);
-        queue.submit(prepared.into_iter().chain([encoder.finish()]));
-        self.read(&texture)
-    }
-
-    fn texture(&self) -> wgpu::Texture {
-        let [width, height] = self.size_px;
-        self.state.device.create_texture(&wgpu::TextureDescriptor {
-            label: Some("window"),
-            size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
-            mip_level_count: 1,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D2,
-            format: self.state.target_format,
-            usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC,
-            view_formats: &[],
-        })
-    }
-
-    /// The pixels of a texture.
-    fn read(&self, texture: &wgpu::Texture) -> Result<RgbImage, String> {
-        const BYTES: u32 = 4;
-        let (device, queue) = (&self.state.device, &self.state.queue);
-        let [width, height] = self.size_px;
-        let row = (width * BYTES).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
-        let buffer = device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some("picture"),
-            size: u64::from(row) * u64::from(height),
-            usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
-            mapped_at_creation: false,
-        });
-        let mut encoder = device
-            .create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("picture") });
-        encoder.copy_texture_to_buffer(
-            texture.as_image_copy(),
-            wgpu::TexelCopyBufferInfo {
-                buffer: &buffer,
-                layout: wgpu::TexelCopyBufferLayout {
-                    offset: 0,
-                    bytes_per_row: Some(row),
-                    rows_per_image: None,
-                },
-            },
-            texture.size(),
-        );
-        let submitted = queue.submit([encoder.finish()]);
+        let buffer = capture.copy_textures(device, None, &mut encoder);
+        let submitted = queue.submit(prepared.into_iter().chain([encoder.finish()]));
         let (tell, told) = std::sync::mpsc::channel();
-        let all = buffer.slice(..);
-        all.map_async(wgpu::MapMode::Read, move |mapped| {
+        let take = ScreenshotCallback::new(move |image| {
             // Nobody listens any more where the device was lost meanwhile.
-            let _ = tell.send(mapped);
+            let _ = tell.send(image);
         });
+        capture.read_screen_rgba(buffer, vec![take]);
         let lost =
             |why: &dyn std::fmt::Display| format!("the graphics adapter gave no picture: {why}");
         let wait =
             wgpu::PollType::Wait { submission_index: Some(submitted), timeout: Some(PATIENCE) };
         device.poll(wait).map_err(|why| lost(&why))?;
-        let mapped = told.recv().map_err(|why| lost(&why))?;
-        mapped.map_err(|why| lost(&why))?;
-        let bytes = all.get_mapped_range().map_err(|why| lost(&why))?;
-        let is_blue_first = matches!(
-            self.state.target_format,
-            wgpu::TextureFormat::Bgra8Unorm | wgpu::TextureFormat::Bgra8UnormSrgb
-        );
-        let picture = RgbImage::from_fn(width, height, |x, y| {
-            let at = (y * row + x * BYTES) as usize;
-            let [a, b, c] = [bytes[at], bytes[at + 1], bytes[at + 2]];
-            image::Rgb(if is_blue_first { [c, b, a] } else { [a, b, c] })
-        });
-        Ok(picture)
+        let image = told.recv().map_err(|why| lost(&why))?;
+        rgb_image(&image).ok_or_else(|| lost(&"it has another size"))
     }
 }

@@ -37,7 +37,7 @@ pub(super) struct OpenLesson {
 
 /// An answer.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Given {
+pub(super) enum Given {
     /// Position of the choice.
     Choice(usize),
     /// Where the camera was put (`world_from_camera`).
@@ -112,28 +112,17 @@ impl OpenLesson {
         (!self.given.contains_key(&self.page)).then_some(question)
     }
 
-    /// Answers by a choice; whether that was asked for.
-    pub(super) fn choose(&mut self, choice: usize) -> bool {
-        let is_one = self.asked().is_some_and(|question| {
-            matches!(&question.answer, Answer::Choice { choices, .. } if choice < choices.len())
-        });
-        if is_one {
-            self.given.insert(self.page, Given::Choice(choice));
-        }
-        is_one
-    }
-
-    /// Answers by the place of the camera in hand; whether that was asked for.
-    pub(super) fn guess(&mut self, camera: Option<Pose>) -> bool {
-        let is_asked =
-            self.asked().is_some_and(|question| matches!(question.answer, Answer::Place(_)));
-        match camera {
-            Some(pose) if is_asked => {
-                self.given.insert(self.page, Given::Place(pose));
-                true
-            }
+    /// Answers what is asked, if this can be an answer to it; whether it can.
+    pub(super) fn answer(&mut self, given: Given) -> bool {
+        let fits = self.asked().is_some_and(|question| match (&question.answer, given) {
+            (Answer::Choice { choices, .. }, Given::Choice(choice)) => choice < choices.len(),
+            (Answer::Place(_), Given::Place(_)) => true,
             _ => false,
+        });
+        if fits {
+            self.given.insert(self.page, given);
         }
+        fits
     }
 
     /// Takes the keys that answer what is asked; others keep their meaning.
@@ -148,7 +137,7 @@ impl OpenLesson {
             Answer::Choice { choices, .. } => {
                 for (choice, key) in DIGITS.into_iter().take(choices.len()).enumerate() {
                     if taken(key) {
-                        commands.send(move |app| app.answer(choice));
+                        commands.send(move |app| app.answer(Given::Choice(choice)));
                     }
                 }
             }
@@ -223,7 +212,7 @@ fn asked_ui(ui: &mut Ui, context: &ViewContext<'_>, question: &Question, given: 
                 let Some(given) = given else {
                     let size = [ui.available_width(), 0.0];
                     let button = egui::Button::new(text).wrap().min_size(size.into());
-                    ui.add(button).sends(context, move |app| app.answer(index));
+                    ui.add(button).sends(context, move |app| app.answer(Given::Choice(index)));
                     continue;
                 };
                 ui.label(match (index == *right, given == Given::Choice(index)) {
@@ -257,7 +246,7 @@ fn asked_ui(ui: &mut Ui, context: &ViewContext<'_>, question: &Question, given: 
 /// Where a camera is, seen from the reference.
 fn place(context: &ViewContext<'_>, camera: &Pose) -> Option<String> {
     let run = context.state.run();
-    let problem = run.loaded.as_deref()?.problems.first()?;
+    let problem = run.problems().first()?;
     let offset = Offset::of(&problem.reference_from_query(camera));
     let side = if offset.right_m < 0.0 { "left" } else { "right" };
     Some(format!(
@@ -281,7 +270,7 @@ fn outcome(context: &ViewContext<'_>, method: Method, guess: &Pose) -> Vec<Strin
         }
         None => words.push(format!("{} is at work", method.label())),
     }
-    let truth = run.loaded.as_deref().and_then(|loaded| loaded.truth);
-    words.extend(truth.map(|truth| format!("The truth is {:.2} m from your guess", apart(&truth))));
+    let truth = run.truth();
+    words.extend(truth.map(|truth| format!("The truth is {:.2} m from your guess", apart(truth))));
     words
 }

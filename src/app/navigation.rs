@@ -23,21 +23,15 @@ impl Default for Navigation {
 }
 
 impl Navigation {
-    /// In a new run, towards the record of a number.
-    pub(super) fn towards_record(record: usize) -> Self {
-        Self { follows: false, anchor: Some(Anchor::Record(record)), ..Self::default() }
-    }
-
-    /// In a new run, towards a moment.
-    pub(super) fn towards_moment(moment: Moment) -> Self {
-        Self { follows: false, anchor: Some(Anchor::Moment(moment)), ..Self::default() }
+    /// In a new run, towards a place.
+    pub(super) fn towards(anchor: Anchor) -> Self {
+        Self { follows: false, anchor: Some(anchor), ..Self::default() }
     }
 
     /// In this run, to a moment, as soon as the run has come so far.
-    pub(super) fn seeking(&self, moment: Moment, run: &Run, is_alive: bool) -> Self {
-        let mut navigation = Self { cursor: self.cursor, ..Self::towards_moment(moment) };
-        navigation.on_records(run, is_alive);
-        navigation
+    pub(super) fn seek(&mut self, moment: Moment, run: &Run, is_alive: bool) {
+        *self = Self { cursor: self.cursor, ..Self::towards(Anchor::Moment(moment)) };
+        self.on_records(run, is_alive);
     }
 
     /// In a new run, towards the place that the cursor has in `run`, in meaning.
@@ -73,20 +67,12 @@ impl Navigation {
 
     /// Moves the cursor after records have come in.
     pub(super) fn on_records(&mut self, run: &Run, is_alive: bool) {
-        if let Some(anchor) = &self.anchor {
-            match anchor.find(run) {
-                Some(at) => {
-                    self.cursor = at;
-                    self.anchor = None;
-                }
-                None if !is_alive => {
-                    self.cursor = last_of(run);
-                    self.anchor = None;
-                }
-                None => self.cursor = last_of(run),
-            }
-        } else if self.follows {
-            self.cursor = last_of(run);
+        let found = self.anchor.as_ref().and_then(|anchor| anchor.find(run));
+        if self.anchor.is_some() || self.follows {
+            self.cursor = found.unwrap_or(last_of(run));
+        }
+        if found.is_some() || !is_alive {
+            self.anchor = None;
         }
     }
 
@@ -102,7 +88,7 @@ fn last_of(run: &Run) -> usize {
 
 /// A place in a run for the cursor, which can be found again in another run.
 #[derive(Clone, Debug, PartialEq)]
-enum Anchor {
+pub(super) enum Anchor {
     /// The place by what the estimator was doing there.
     Stage(StagePosition),
     /// The place by the number of its record.
@@ -123,7 +109,7 @@ impl Anchor {
 
 /// What an estimator was doing at a record.
 #[derive(Clone, Debug, PartialEq)]
-struct StagePosition {
+pub(super) struct StagePosition {
     part: Part,
     /// The stages around it, by name, the outermost first.
     stages: Vec<&'static str>,

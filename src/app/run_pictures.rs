@@ -54,15 +54,12 @@ impl RunPictures {
             self.shows_truth = shows_truth;
         }
         self.proofs.poll();
-        let Some(loaded) = run.loaded.as_deref() else {
-            return;
-        };
         for span in run.spans() {
             let Some(result) = &span.result else { continue };
             self.proofs.ask(span.part, || {
                 let problem = match span.part.reference() {
-                    Some(reference) => loaded.problems.get(reference)?,
-                    None => proof::problem_of(result, &loaded.problems)?,
+                    Some(reference) => run.problems().get(reference)?,
+                    None => proof::problem_of(result, run.problems())?,
                 };
                 // The ranking of the references belongs to no method, and proves that the right one was not found.
                 let ranking = run.span_of(Part::Retrieval).map(|span| span.records.clone());
@@ -72,7 +69,7 @@ impl RunPictures {
                 let records: Vec<Record> = records.cloned().collect();
                 let (problem, params) = (problem.clone(), run.params.clone());
                 let result = result.shown(shows_truth);
-                let truth = loaded.truth.filter(|_| shows_truth);
+                let truth = run.truth().copied().filter(|_| shows_truth);
                 Some(move || {
                     let (problem, records, result) = (&problem, &*records, &result);
                     let (truth, params) = (truth.as_ref(), &params);
@@ -148,7 +145,7 @@ struct Drawn {
 impl Drawn {
     /// What there is to draw of a record, for a part of the run that begins at `start`.
     fn of(run: &Run, start: usize, record: usize) -> Option<Self> {
-        let problem = run.loaded.as_deref()?.problems.get(run.reference_at(record))?;
+        let problem = run.problem_at(record)?;
         let records = run.records().get(start..=record)?;
         let keypoints = records.iter().rev().find_map(|record| match &record.event {
             Event::FeaturesDetected(event) if event.side == Side::Query => Some(event.clone()),

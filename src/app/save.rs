@@ -6,10 +6,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 use super::command::Queue;
 use super::setup::Setup;
 use super::state::AppState;
-use crate::localize::LocalizeObserver as _;
-use crate::session::Part;
+use super::textures::rgb_image;
 use crate::sink::rerun::{Identity, RecordError, Recorder, Targets};
-use crate::trace::Sink as _;
 
 /// Something that leaves the window for a file, or comes from one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -119,11 +117,10 @@ impl Asking {
 impl AppState {
     /// Tells the run to a recording, from the history: nothing is computed anew.
     fn record(&self, targets: &Targets) -> Result<(), RecordError> {
-        let run = self.run();
-        let Some(loaded) = run.loaded.as_deref() else {
+        let (run, setup) = (self.run(), &self.setup);
+        if run.loaded.is_none() {
             return Ok(());
-        };
-        let setup = &self.setup;
+        }
         let identity = Identity {
             scene: setup.references.name().to_owned(),
             query_scene: (!setup.is_one_drive()).then(|| setup.queries.name().to_owned()),
@@ -134,24 +131,7 @@ impl AppState {
             seed: setup.task.protocol.seed,
         };
         let mut recorder = Recorder::open(targets, &identity, &setup.task.protocol.methods)?;
-        recorder.begin_query(0, &loaded.problems, loaded.truth.as_ref());
-        for span in run.spans() {
-            match span.part {
-                Part::Reference(method, reference) => recorder.begin_method(reference, method),
-                Part::Fusion(method) => recorder.begin_fusion(method),
-                Part::Retrieval => {}
-            }
-            for record in &run.records()[span.records.clone()] {
-                if recorder.accept(record).is_err() {
-                    break;
-                }
-            }
-            match (&span.result, &span.times) {
-                (Some(result), Some(times)) => recorder.end_method(result, times),
-                (Some(result), None) => recorder.end_fusion(result),
-                (None, _) => {}
-            }
-        }
+        run.replay(&mut recorder);
         recorder.close()
     }
 
@@ -219,12 +199,9 @@ impl Pictures {
 }
 
 fn write(image: &egui::ColorImage, path: &Path) -> Result<(), Box<dyn std::error::Error>> {
-    let [width, height] = image.size.map(|side| side as u32);
-    let bytes: Vec<u8> = image.pixels.iter().flat_map(|p| [p.r(), p.g(), p.b()]).collect();
-    let picture = image::RgbImage::from_raw(width, height, bytes);
     if let Some(folder) = path.parent() {
         std::fs::create_dir_all(folder)?;
     }
-    picture.ok_or("the window gave no picture")?.save(path)?;
+    rgb_image(image).ok_or("the window gave no picture")?.save(path)?;
     Ok(())
 }

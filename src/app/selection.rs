@@ -9,7 +9,6 @@ use super::memo::Memo;
 use crate::diagnosis::Code;
 use crate::localize::QueryResult;
 use crate::measure::{Condition, ConditionError, Migration, migrations, verdict_name};
-use crate::method::Method;
 
 /// Results by query.
 pub type Results = BTreeMap<usize, Vec<QueryResult>>;
@@ -38,31 +37,13 @@ pub struct ResultRow {
     pub place: usize,
 }
 
-/// What became of a method's verdicts from the results A to those of now.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct VerdictChange {
-    /// The method.
-    pub method: Method,
-    /// The primary verdict before, `ok` where nothing was found.
-    pub before: String,
-    /// The primary verdict now.
-    pub after: String,
-}
-
-impl std::fmt::Display for VerdictChange {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let name = self.method.name().to_uppercase();
-        write!(f, "{name} {} → {}", self.before, self.after)
-    }
-}
-
 /// What is asked of results to be looked at.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Wanted {
     /// A condition as it was typed; none where it is empty.
     pub(super) condition: String,
     /// What became of the verdict.
-    pub(super) change: Option<VerdictChange>,
+    pub(super) change: Option<Migration>,
     /// Whether the verdict has to be another one than before.
     pub(super) only_changed: bool,
 }

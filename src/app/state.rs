@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use egui::TextureHandle;
 
-use super::navigation::Navigation;
+use super::navigation::{Anchor, Navigation};
 use super::queries::Queries;
 use super::run_pictures::RunPictures;
 use super::scoring::{CostLine, DenseAsk, Scoring};
@@ -89,7 +89,12 @@ impl AppState {
             ctx,
             navigation: Navigation::default(),
             kept: None,
-            options: ViewOptions::default(),
+            options: ViewOptions {
+                shows_queries: true,
+                shows_inspector: true,
+                shows_truth: true,
+                ..ViewOptions::default()
+            },
             hovered: None,
             camera: None,
             camera_before: None,
@@ -191,7 +196,7 @@ impl AppState {
             }
         }
         if let Some((pose, _)) = self.looking_at()
-            && let Some(problem) = self.problem().cloned()
+            && let Some(problem) = self.run().problem_at(self.cursor()).cloned()
         {
             let methods = self.setup.direct_methods();
             self.scoring.ask(&problem, methods, &self.session.run().params, pose);
@@ -223,7 +228,7 @@ impl AppState {
 
     /// Has the cost along a line worked out for the problem at the cursor.
     pub(super) fn trace_line(&mut self, line: CostLine) {
-        if let Some(problem) = self.problem().cloned() {
+        if let Some(problem) = self.run().problem_at(self.cursor()).cloned() {
             self.scoring.trace(&problem, &self.session.run().params, line);
         }
     }
@@ -231,15 +236,9 @@ impl AppState {
     /// Has a dense map filled, as long as somebody looks at it.
     pub(super) fn fill_dense_map(&mut self, ask: DenseAsk) {
         let run = self.session.run();
-        let loaded = run.loaded.as_deref();
-        if let Some(problem) = loaded.and_then(|loaded| loaded.problems.get(ask.reference)) {
+        if let Some(problem) = run.problems().get(ask.reference) {
             self.scoring.fill(problem, &run.params, ask);
         }
-    }
-
-    fn problem(&self) -> Option<&crate::problem::Problem> {
-        let loaded = self.run().loaded.as_deref()?;
-        loaded.problems.get(self.run().reference_at(self.cursor()))
     }
 
     /// Goes to the first method that is wrong and shows why; where all are right, to the end of the first. The fused
@@ -361,7 +360,7 @@ impl AppState {
     /// Another setup altogether; the cursor goes to a record as soon as the run has come so far.
     pub(super) fn restore(&mut self, setup: Setup, cursor: usize) {
         self.queries = Queries::new(self.ctx.clone());
-        self.change_setup(setup, Navigation::towards_record(cursor));
+        self.change_setup(setup, Navigation::towards(Anchor::Record(cursor)));
         self.results.set(self.first_results.clone());
     }
 
@@ -381,7 +380,7 @@ impl AppState {
     /// Takes the cursor to a moment of the present run, as soon as the run has come so far.
     pub(super) fn seek(&mut self, moment: Moment) {
         let is_alive = self.session.is_alive();
-        self.navigation = self.navigation.seeking(moment, self.session.run(), is_alive);
+        self.navigation.seek(moment, self.session.run(), is_alive);
     }
 
     /// Other settings for the same query: what does not depend on them is reused, and the cursor

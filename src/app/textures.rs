@@ -6,6 +6,7 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use egui::{ColorImage, TextureFilter, TextureHandle, TextureOptions};
+use image::RgbImage;
 
 use super::theme::rgb;
 
@@ -65,4 +66,11 @@ pub fn color_image(image: &image::DynamicImage) -> ColorImage {
     // Not `ColorImage::from_rgb`, which is third-party code and slow where that is not optimised.
     let pixels = pixels.pixels().map(|pixel| rgb(pixel.0)).collect();
     ColorImage::new(size, pixels)
+}
+
+/// A picture of the window's pixels; `None` where they are not as many as its size says.
+pub(super) fn rgb_image(image: &ColorImage) -> Option<RgbImage> {
+    let [width, height] = image.size.map(|side| side as u32);
+    let bytes = image.pixels.iter().flat_map(|p| [p.r(), p.g(), p.b()]).collect();
+    RgbImage::from_raw(width, height, bytes)
 }

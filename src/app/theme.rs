@@ -133,33 +133,21 @@ pub fn contrast(a: Color32, b: Color32) -> f32 {
 /// A theme: egui's own, with pale words that can be read.
 fn visuals(theme: egui::Theme) -> Visuals {
     let mut visuals = theme.default_visuals();
-    let pale = match theme {
-        egui::Theme::Dark => Color32::from_gray(170),
-        egui::Theme::Light => Color32::from_gray(88),
-    };
-    visuals.weak_text_color = Some(pale);
     // What is not to be pressed is read as well as what is.
-    let plain = match theme {
-        egui::Theme::Dark => Color32::from_gray(190),
-        egui::Theme::Light => Color32::from_gray(60),
+    let ([pale, plain], ground, words) = match theme {
+        egui::Theme::Dark => ([170, 190], [0x3A, 0x37, 0x70], [0xE8, 0xE6, 0xFF]),
+        egui::Theme::Light => ([88, 60], [0xCD, 0xCB, 0xFA], [0x1E, 0x1B, 0x50]),
     };
-    visuals.widgets.noninteractive.fg_stroke.color = plain;
+    visuals.weak_text_color = Some(Color32::from_gray(pale));
+    visuals.widgets.noninteractive.fg_stroke.color = Color32::from_gray(plain);
+    visuals.selection.bg_fill = rgb(ground);
+    visuals.selection.stroke.color = rgb(words);
     if theme == egui::Theme::Dark {
         visuals.panel_fill = Color32::from_rgb(0x1B, 0x1D, 0x22);
         visuals.window_fill = visuals.panel_fill;
         visuals.extreme_bg_color = Color32::from_rgb(0x10, 0x11, 0x14);
         visuals.widgets.inactive.weak_bg_fill = Color32::from_rgb(0x2A, 0x2D, 0x34);
     }
-    let (ground, words) = match theme {
-        egui::Theme::Dark => {
-            (Color32::from_rgb(0x3A, 0x37, 0x70), Color32::from_rgb(0xE8, 0xE6, 0xFF))
-        }
-        egui::Theme::Light => {
-            (Color32::from_rgb(0xCD, 0xCB, 0xFA), Color32::from_rgb(0x1E, 0x1B, 0x50))
-        }
-    };
-    visuals.selection.bg_fill = ground;
-    visuals.selection.stroke.color = words;
     visuals.warn_fg_color = text(&visuals, visuals.warn_fg_color);
     visuals.error_fg_color = text(&visuals, visuals.error_fg_color);
     visuals.hyperlink_color = text(&visuals, visuals.hyperlink_color);

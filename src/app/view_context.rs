@@ -70,16 +70,12 @@ impl<'a> ViewContext<'a> {
 
     /// The problem at the cursor.
     pub fn problem(&self) -> Option<&'a Problem> {
-        let loaded = self.run.loaded.as_deref()?;
-        loaded.problems.get(self.reference())
+        self.run.problem_at(self.cursor)
     }
 
     /// The true pose of the query, if it is known and shown.
     pub fn truth(&self) -> Option<&'a Pose> {
-        if !self.options.shows_truth {
-            return None;
-        }
-        self.run.loaded.as_deref()?.truth.as_ref()
+        self.run.truth().filter(|_| self.options.shows_truth)
     }
 
     /// The latest event of a type at or before the cursor, told by the estimator there.

@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::selection::VerdictChange;
 use crate::event::Stage;
+use crate::measure::Migration;
 
 /// What the window is arranged for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -61,8 +61,8 @@ impl Tab {
     ];
 }
 
-/// What is switched on and selected.
-#[derive(Clone, Debug)]
+/// What is switched on and selected; nothing by default.
+#[derive(Clone, Debug, Default)]
 pub struct ViewOptions {
     /// What the window is arranged for.
     pub layout: Arrangement,
@@ -93,7 +93,7 @@ pub struct ViewOptions {
     /// Which results of queries are shown, as a condition.
     pub results_filter: String,
     /// What the verdicts of the shown results have changed to.
-    pub verdict_change: Option<VerdictChange>,
+    pub verdict_change: Option<Migration>,
     /// Whether only what differs is shown.
     pub only_differences: bool,
     /// Whether the cost surface shows every position with every heading.
@@ -104,31 +104,4 @@ pub struct ViewOptions {
     pub wants_filter: bool,
     /// The selected query feature.
     pub selected_feature: Option<usize>,
-}
-
-impl Default for ViewOptions {
-    fn default() -> Self {
-        Self {
-            layout: Arrangement::default(),
-            shows_why: false,
-            large: None,
-            presented: None,
-            is_alone: false,
-            alone: None,
-            shows_queries: true,
-            shows_inspector: true,
-            tab: Tab::default(),
-            compare_mode: CompareMode::default(),
-            shows_truth: true,
-            hides_future: false,
-            lockstep: None,
-            results_filter: String::new(),
-            verdict_change: None,
-            only_differences: false,
-            shows_dense_map: false,
-            blinking: false,
-            wants_filter: false,
-            selected_feature: None,
-        }
-    }
 }

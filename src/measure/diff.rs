@@ -2,6 +2,7 @@
 
 use std::cmp::Reverse;
 use std::collections::BTreeMap;
+use std::fmt;
 
 use super::metrics::Group;
 use crate::diagnosis::{Code, Tolerance};
@@ -187,6 +188,18 @@ impl Migration {
     /// Whether the verdict changed.
     pub fn is_change(&self) -> bool {
         self.before != self.after
+    }
+
+    /// Whether another one counts the same change.
+    pub fn is_like(&self, other: &Self) -> bool {
+        (self.method, &self.before, &self.after) == (other.method, &other.before, &other.after)
+    }
+}
+
+/// `MI D2 → ok`.
+impl fmt::Display for Migration {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} {} → {}", self.method.label(), self.before, self.after)
     }
 }
 

@@ -9,10 +9,9 @@ use super::places::from_above;
 use super::{Panel, ProofCase, ProofPicture, Thing};
 use crate::camera::Intrinsics;
 use crate::diagnosis::true_match_px;
-use crate::event::{
-    DepthsLifted, FeaturesClassified, FeaturesDetected, MatchesDecided, MatchesGuided, Side,
-};
-use crate::features::{FeatureState, Features, Keypoint};
+use crate::event::{FeaturesDetected, Side};
+use crate::feature_progress::{FeatureProgress, residual_px};
+use crate::features::{FeatureState, Keypoint};
 use crate::geometry::Pose;
 use crate::image::Photo;
 use crate::palette::{self, Rgb as Color};
@@ -58,32 +57,25 @@ struct Matches<'a> {
 
 impl<'a> Matches<'a> {
     fn of(case: &ProofCase<'a>) -> Option<Self> {
-        let of_side = |side: Side| -> Option<&'a Features> {
-            let mut detected = case.all::<FeaturesDetected>();
-            let found = detected.rfind(|event| event.side == side)?;
-            Some(&*found.features)
-        };
-        let (query, reference) = (of_side(Side::Query)?, of_side(Side::Reference)?);
-        let decisions = &case.latest::<MatchesDecided>()?.decisions;
-        let states: &'a [FeatureState] = &case.latest::<FeaturesClassified>()?.states;
-        let guided = case.latest::<MatchesGuided>().map(|event| &event.matches);
-        let lifted = guided.or_else(|| case.latest::<DepthsLifted>().map(|event| &event.matches));
-        let threshold_px = true_match_px(case.params.fb.mlesac.inlier_threshold_px);
-        let query_from_reference = case.query_from_reference();
         let camera = &case.problem.query.intrinsics;
+        let inlier_px = case.params.fb.mlesac.inlier_threshold_px;
+        let progress = FeatureProgress::of(case.records, Some(camera), inlier_px);
+        let states = progress.states?;
+        let threshold_px = true_match_px(inlier_px);
+        let query_from_reference = case.query_from_reference();
         let matched = states.iter().enumerate().filter_map(|(at, &state)| {
-            let own = lifted.and_then(|lifted| lifted.iter().find(|one| one.query == at));
-            let decided = decisions.get(at).copied().flatten();
-            let other = own.map(|one| one.reference).or(decided.map(|one| one.reference))?;
-            let keypoint = query.keypoints.get(at)?;
+            let own = progress.lifted(at);
+            let decided = progress.matched(at).map(|one| one.reference);
+            let other = own.map(|one| one.reference).or(decided)?;
+            let keypoint = progress.query.get(at)?;
             let point = own.and_then(|one| one.point);
             let is_true = query_from_reference.zip(point).map(|(pose, point)| {
-                let seen = camera.project(&(pose * point));
-                seen.is_some_and(|seen| (seen - pixel(keypoint)).norm() <= threshold_px)
+                let off_px = residual_px(camera, &pose, &point, keypoint);
+                off_px.is_some_and(|off_px| off_px <= threshold_px)
             });
             Some(Matched {
                 query: keypoint,
-                reference: reference.keypoints.get(other)?,
+                reference: progress.reference.get(other)?,
                 state,
                 point,
                 depth_range_m: own.and_then(|one| one.depth_range_m),
@@ -267,7 +259,7 @@ impl ScanPixels {
 
     /// How far from a match's keypoint the nearest of them is.
     fn nearest_px(&self, one: &Matched<'_>) -> f64 {
-        let at = pixel(one.reference);
+        let at = one.reference.pixel();
         let distances = self.0.iter().map(|seen| (seen - at).norm());
         distances.fold(f64::INFINITY, f64::min)
     }
@@ -450,10 +442,6 @@ fn cloud_picture(
         }
     }
     (canvas, count)
-}
-
-fn pixel(keypoint: &Keypoint) -> Point2<f64> {
-    Point2::new(f64::from(keypoint.x), f64::from(keypoint.y))
 }
 
 /// The place of a keypoint in a picture, whose first pixel has its centre at (0.5, 0.5).

@@ -10,7 +10,7 @@ use crate::event::{DebugEvent, Event, ReferencesFused, Stage};
 use crate::geometry::Pose;
 use crate::history::History;
 use crate::image::Degradation;
-use crate::localize::{QueryResult, References, StageTimes};
+use crate::localize::{LocalizeObserver, QueryResult, References, StageTimes};
 use crate::method::Method;
 use crate::params::Params;
 use crate::problem::Problem;
@@ -194,6 +194,29 @@ impl Run {
         settings
     }
 
+    /// Tells an observer what happened, as if the run went on now. Nothing is computed again.
+    pub fn replay(&self, observer: &mut dyn LocalizeObserver) {
+        let Some(loaded) = self.loaded.as_deref() else { return };
+        observer.begin_query(0, &loaded.problems, loaded.truth.as_ref());
+        for span in self.spans() {
+            match span.part {
+                Part::Reference(method, reference) => observer.begin_method(reference, method),
+                Part::Fusion(method) => observer.begin_fusion(method),
+                Part::Retrieval => {}
+            }
+            for record in &self.records()[span.records.clone()] {
+                if observer.accept(record).is_err() {
+                    break;
+                }
+            }
+            match (&span.result, &span.times) {
+                (Some(result), Some(times)) => observer.end_method(result, times),
+                (Some(result), None) => observer.end_fusion(result),
+                (None, _) => {}
+            }
+        }
+    }
+
     pub(super) fn begin(&mut self, part: Part) {
         let start = self.len();
         self.open.clear();
@@ -306,6 +329,21 @@ impl Run {
     /// The latest records of a part.
     pub fn span_of(&self, part: Part) -> Option<&Span> {
         self.spans.iter().rev().find(|span| span.part == part)
+    }
+
+    /// The query with each of its references; none before they are read.
+    pub fn problems(&self) -> &[Problem] {
+        self.loaded.as_deref().map_or(&[], |loaded| &loaded.problems)
+    }
+
+    /// The query with the reference to show at a cursor.
+    pub fn problem_at(&self, cursor: usize) -> Option<&Problem> {
+        self.problems().get(self.reference_at(cursor))
+    }
+
+    /// The true pose of the query, if it is known (`world_from_camera`).
+    pub fn truth(&self) -> Option<&Pose> {
+        self.loaded.as_deref()?.truth.as_ref()
     }
 
     /// The reference to show at a cursor, by position in the run: that of the part there, or in a fusion the one of the

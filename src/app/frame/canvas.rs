@@ -32,7 +32,7 @@ pub(crate) fn scene(context: &ViewContext<'_>) -> Vec<&'static str> {
 }
 
 pub(crate) fn ui(ui: &mut Ui, context: &ViewContext<'_>, panes: &mut Panes, most: usize) {
-    if context.options.shows_why && !context.state.is_presenting() {
+    if context.options.shows_why && context.options.presented.is_none() {
         why(ui, context, panes);
         return;
     }
@@ -98,14 +98,11 @@ pub(super) fn why(ui: &mut Ui, context: &ViewContext<'_>, panes: &mut Panes) {
         proof::empty(ui, "Nothing has run yet. Space runs the query.");
         return;
     };
-    match context.state.proof(part) {
+    match context.state.shown_pictures().proof(part) {
         Some(picture) => {
-            if panes.proof_of != Some(part) {
-                panes.proof_of = Some(part);
-                panes.swapped = None;
-            }
-            let picture = std::sync::Arc::clone(picture);
-            proof::ui(ui, &context.state.textures, &picture, &mut panes.swapped);
+            let swapped = panes.swapped.filter(|(of, _)| *of == part).map(|(_, small)| small);
+            let swapped = proof::ui(ui, &context.state.textures, picture, swapped);
+            panes.swapped = swapped.map(|small| (part, small));
         }
         None if context.state.is_proving() => proof::empty(ui, "The picture is being made."),
         None => proof::empty(ui, "This method left nothing that a picture could show."),

@@ -13,15 +13,16 @@ use crate::proof::{
     ColorScale, MARK, Mark, Panel, Place, ProofPicture, Thing, free_corner, label_place, title_end,
 };
 
-/// Draws a proof into the room there is. The large panel takes the place of a small one that is clicked.
+/// Draws a proof into the room there is. The large panel takes the place of a small one that is clicked, which is
+/// returned.
 pub(super) fn ui(
     ui: &mut Ui,
     textures: &Textures,
     proof: &ProofPicture,
-    swapped: &mut Option<usize>,
-) {
+    mut swapped: Option<usize>,
+) -> Option<usize> {
     let area = ui.available_rect_before_wrap();
-    let shown = match *swapped {
+    let shown = match swapped {
         Some(small) => proof.swapped(small),
         None => proof.clone(),
     };
@@ -42,11 +43,12 @@ pub(super) fn ui(
             }
             if response.clicked() {
                 // The one that was large before stands in the place of the one that is large now.
-                *swapped = if *swapped == Some(small) { None } else { Some(small) };
+                swapped = Some(small).filter(|_| swapped != Some(small));
             }
         }
     }
     ui.advance_cursor_after_rect(area);
+    swapped
 }
 
 /// The picture of a panel on the graphics card.

@@ -105,7 +105,7 @@ fn draw(ui: &mut Ui, context: &ViewContext<'_>, row: &Row<'_>, size: egui::Vec2)
             _ => records.clone(),
         };
         let caption = stage::caption(bar.stage, has_failed, &run.records()[shown.clone()]);
-        let picture = context.state.thumbnail(&span.records, &shown);
+        let picture = context.state.shown_pictures().stage(run, &span.records, &shown);
         let cell = Cell {
             caption,
             spoken: format!("{} {}", part_name(row.part), stage::name(bar.stage)),
@@ -129,7 +129,7 @@ fn why(ui: &mut Ui, context: &ViewContext<'_>, row: &Row<'_>, size: egui::Vec2, 
     let result = context.state.outcome(span).filter(|result| result.grade != Grade::Right);
     let Some(result) = result else { return };
     let caption = if result.grade.is_failure() { "why" } else { "what decided" };
-    let picture = context.state.proof(span.part).map(|picture| {
+    let picture = context.state.shown_pictures().proof(span.part).map(|picture| {
         let texture = proof::texture(ui, &context.state.textures, &picture.large);
         (texture.id(), texture.size_vec2())
     });
@@ -229,7 +229,7 @@ pub(crate) fn part_name(part: Part) -> String {
 fn name(ui: &mut Ui, context: &ViewContext<'_>, row: &Row<'_>, height: f32) {
     let (rect, response) = ui.allocate_exact_size(vec2(NAME, height), Sense::click());
     let run = context.run;
-    let references = run.loaded.as_deref().map_or(0, |loaded| loaded.problems.len());
+    let references = run.problems().len();
     let of = match row.part.reference() {
         Some(reference) if references > 1 => format!("  ref {} of {references}", reference + 1),
         _ => String::new(),

@@ -1,7 +1,8 @@
 //! The verdict bar: what each method's result is worth, and the selected one in one sentence.
 
 use egui::{
-    Align, Button, Layout, Rect, Role, Sense, Stroke, Ui, UiBuilder, WidgetInfo, pos2, vec2,
+    Align, AtomExt as _, Button, Layout, Rect, Role, Sense, Stroke, Ui, UiBuilder, WidgetInfo,
+    pos2, vec2,
 };
 
 use super::proof::elided;
@@ -187,46 +188,23 @@ pub(super) fn short(args: &[String]) -> String {
     told.collect::<Vec<_>>().join(" ")
 }
 
-/// `Try WORDS NUMBER` in a width: the words end with an ellipsis where they do not fit, the number never does.
-fn fitted(ui: &Ui, words: &str, number: &str, width: f32) -> String {
-    let fits = |text: &str| {
-        let text = text.to_owned();
-        let galley = ui.painter().layout_no_wrap(text, theme::BODY, ui.visuals().text_color());
-        galley.size().x <= width
-    };
-    let whole = format!("Try {words}{number}");
-    if fits(&whole) {
-        return whole;
-    }
-    let mut kept = words.to_owned();
-    while kept.pop().is_some() {
-        let text = format!("Try {kept}…{number}");
-        if fits(&text) {
-            return text;
-        }
-    }
-    format!("Try{number}")
-}
-
-/// The best of what helped, or the offer to look for it; always of the same width.
+/// The best of what helped, or the offer to look for it; always of the same width. Where it does not fit, the words end
+/// with an ellipsis, and the number stays.
 fn remedy(ui: &mut Ui, context: &ViewContext<'_>, result: &QueryResult) {
     let size = vec2(BUTTON - 16.0, 30.0);
-    let explaining =
-        context.state.run().explaining.filter(|explaining| explaining.method == result.method);
+    let explaining = context.state.run().explaining;
+    let explaining = explaining.filter(|explaining| explaining.method == result.method);
     let can_explain = result.error.or(result.initial_error).is_some();
-    let mut whole = String::new();
-    let mut args = None;
     let is_offered = can_explain && context.setup.task.protocol.explain == 0;
+    let (mut number, mut args) = (String::new(), None);
     let (text, help) = match (&result.explanation, explaining) {
         (Some(explanation), _) => match explanation.best() {
             Some(helped) => {
-                let (words, number) =
-                    (short(&helped.args), format!(" → {}", helped.error.translation()));
-                whole = format!("Try {words}{number}");
+                number = format!(" → {}", helped.error.translation());
                 args = Some(helped.args.clone());
                 let all = helped.args.join(" ");
                 let help = format!("Keeps this run as A and runs the query with {all}");
-                (fitted(ui, &words, &number, size.x - 16.0), help)
+                (format!("Try {}", short(&helped.args)), help)
             }
             None => (format!("None of {} remedies helped", explanation.runs), String::new()),
         },
@@ -240,13 +218,10 @@ fn remedy(ui: &mut Ui, context: &ViewContext<'_>, result: &QueryResult) {
         ),
         (None, None) => return,
     };
-    let button =
-        Button::new(text.as_str()).truncate().min_size(size).fill(theme::selected(ui.visuals()));
-    let button = button.wrap_mode(egui::TextWrapMode::Truncate);
-    let mut response = ui.add_enabled(!help.is_empty(), button);
-    if !whole.is_empty() {
-        response.widget_info(|| WidgetInfo::labeled(Role::Button, true, &whole));
-    }
+    let whole = format!("{text}{number}");
+    let button = Button::new((text.atom_shrink(true), number)).gap(0.0).truncate();
+    let button = button.min_size(size).fill(theme::selected(ui.visuals()));
+    let mut response = ui.add_enabled(!help.is_empty(), button).accessible_name(whole);
     if !help.is_empty() {
         response = response.on_hover_text(help);
     }
@@ -254,22 +229,4 @@ fn remedy(ui: &mut Ui, context: &ViewContext<'_>, result: &QueryResult) {
         Some(args) => app.state.try_again(&args),
         None => app.state.switch_explaining(),
     });
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Of a remedy that is too long, words go and the number stays.
-    #[test]
-    fn a_number_is_never_cut() {
-        egui::__run_test_ui(|ui| {
-            theme::install(ui.ctx());
-            let text = |width| fitted(ui, "grid.coarse_step_m=0.5", " → 0.12 m", width);
-            assert_eq!(text(1000.0), "Try grid.coarse_step_m=0.5 → 0.12 m");
-            let cut = text(150.0);
-            assert!(cut.starts_with("Try grid") && cut.ends_with("… → 0.12 m"), "{cut}");
-            assert_eq!(text(1.0), "Try → 0.12 m");
-        });
-    }
 }

@@ -1,7 +1,6 @@
 //! What is shown of the state: the run, the cursor in it, its results, with nothing in them that is hidden.
 
 use std::rc::Rc;
-use std::sync::Arc;
 
 use super::AppState;
 use crate::app::run_pictures::RunPictures;
@@ -12,7 +11,6 @@ use crate::event::Stage;
 use crate::localize::QueryResult;
 use crate::measure::ConditionError;
 use crate::method::Method;
-use crate::proof::ProofPicture;
 use crate::session::{Part, Run, Span, StageBar};
 
 impl AppState {
@@ -124,30 +122,12 @@ impl AppState {
         !self.options.hides_future || record <= self.shown_cursor()
     }
 
-    /// Whether a page of a lesson chooses what the canvas shows.
-    pub(crate) fn is_presenting(&self) -> bool {
-        self.options.presented.is_some()
-    }
-
-    fn shown_pictures(&self) -> &RunPictures {
+    /// The pictures of the run that is shown.
+    pub(in crate::app) fn shown_pictures(&self) -> &RunPictures {
         match &self.kept {
             Some(kept) if self.is_showing_kept() => &kept.pictures,
             _ => &self.pictures,
         }
-    }
-
-    /// The small picture of a stage of the run that is shown, once it is made.
-    pub(crate) fn thumbnail(
-        &self,
-        part: &std::ops::Range<usize>,
-        stage: &std::ops::Range<usize>,
-    ) -> Option<egui::TextureHandle> {
-        self.shown_pictures().stage(self.shown_run(), part, stage)
-    }
-
-    /// The picture that proves the result of a part, once it is made.
-    pub(crate) fn proof(&self, part: Part) -> Option<&Arc<ProofPicture>> {
-        self.shown_pictures().proof(part)
     }
 
     /// Whether proofs are still being made.

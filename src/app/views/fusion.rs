@@ -105,12 +105,8 @@ fn table(ui: &mut Ui, context: &ViewContext<'_>, fused: &[&ReferencesFused]) {
 /// Seen from above, in the frame of the first reference: references, what each gives alone (larger with more
 /// weight), the fused pose, the truth.
 fn map(ui: &mut Ui, context: &ViewContext<'_>, fused: &[&ReferencesFused], height: f32) {
-    let Some(loaded) = context.run.loaded.as_deref() else {
-        return;
-    };
-    let Some(first) = loaded.problems.first() else {
-        return;
-    };
+    let problems = context.run.problems();
+    let Some(first) = problems.first() else { return };
     let camera_from_world = first.reference.world_from_camera.inverse();
     let strong = ui.visuals().strong_text_color();
     let mark = |plot: &mut PlotUi<'_>, name: &str, pose: &Pose, thing: Thing, radius: f32| {
@@ -134,7 +130,7 @@ fn map(ui: &mut Ui, context: &ViewContext<'_>, fused: &[&ReferencesFused], heigh
         .y_axis_label("ahead [m]")
         .legend(Legend::default())
         .show(ui, |plot| {
-            for problem in &loaded.problems {
+            for problem in problems {
                 let pose = &problem.reference.world_from_camera;
                 mark(plot, "○ references", pose, Thing::Reference, 5.0);
             }

@@ -14,9 +14,10 @@ use self::truth::{TrueMatch, draw_truth};
 use self::visible::VisibleFeatures;
 use super::View;
 use super::canvas::PanZoom;
-use super::features::{FeatureProgress, INLIER, KINDS};
+use super::features::{self, INLIER, KINDS};
 use crate::app::ViewContext;
 use crate::diagnosis::true_match_px;
+use crate::feature_progress::FeatureProgress;
 use crate::problem::Problem;
 
 /// How strong features are drawn while the pointer is on another one.
@@ -47,8 +48,8 @@ impl View for ImagesView {
             ui.weak("Reading the photos");
             return;
         };
-        let progress = FeatureProgress::at(context);
-        let kinds = progress.kinds();
+        let progress = features::at(context);
+        let kinds = features::kinds(&progress);
         let selected = context.options.selected_feature.filter(|&feature| feature < kinds.len());
         let textures = [&problem.query.photo, &problem.reference.photo]
             .map(|source| photo(ui, context, source));
@@ -165,7 +166,7 @@ fn point_at(
     }
     if let Some(feature) = hovered {
         ui.ctx().set_cursor_icon(egui::CursorIcon::PointingHand);
-        let words = format!("Query feature {feature}, {}", progress.words(feature));
+        let words = format!("Query feature {feature}, {}", features::words(progress, feature));
         over.clone().on_hover_text_at_pointer(words);
     }
     hovered

@@ -1,8 +1,9 @@
-//! What colours and marks of a picture mean: one bar and one mark for one thing in every view.
+//! What colours and marks of a picture mean, one bar and one mark for one thing in every view; and what is under the
+//! pointer.
 
 use egui::{
-    Align2, Color32, FontId, Mesh, Painter, Pos2, Rect, Response, RichText, Role, Sense, Shape,
-    Stroke, StrokeKind, TextStyle, Ui, Vec2, WidgetInfo, pos2, vec2,
+    Align, Align2, Color32, FontId, Label, Mesh, Painter, Pos2, Rect, Response, RichText, Role,
+    Sense, Shape, Stroke, StrokeKind, TextStyle, Ui, UiBuilder, Vec2, WidgetInfo, pos2, vec2,
 };
 use egui_plot::{HoverPosition, MarkerShape, PlotPoint};
 
@@ -160,5 +161,78 @@ pub(super) fn plot_shape(thing: Thing) -> MarkerShape {
         Thing::Truth => MarkerShape::Plus,
         Thing::Result(_) => MarkerShape::Diamond,
         Thing::Reference | Thing::Dot(_) | Thing::Words => MarkerShape::Circle,
+    }
+}
+
+/// A mark for a place in a photo; the shape tells the state as the colour does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum MarkShape {
+    /// A cross of two diagonals.
+    Cross,
+    /// A cross of an upright and a level line.
+    Plus,
+    /// An open triangle.
+    Triangle,
+    /// An open circle.
+    Ring,
+    /// An open diamond.
+    Diamond,
+    /// A filled circle.
+    Disc,
+    /// An open square.
+    Square,
+}
+
+impl MarkShape {
+    /// Paints the mark with a radius \[points\].
+    pub(super) fn paint(self, painter: &Painter, at: Pos2, radius: f32, color: Color32) {
+        let thin = Stroke::new(1.3, color);
+        let cross = |arms: [egui::Vec2; 2], stroke: Stroke| {
+            for arm in arms {
+                painter.line_segment([at - radius * arm, at + radius * arm], stroke);
+            }
+        };
+        // A regular polygon; its first corner is on top for a turn of 0 sides.
+        let outline = |sides: u16, turn: f32, size: f32| {
+            let corner = |side: u16| {
+                let angle = std::f32::consts::TAU * (f32::from(side) + turn) / f32::from(sides);
+                at + size * radius * vec2(angle.sin(), -angle.cos())
+            };
+            painter.add(Shape::closed_line((0..sides).map(corner).collect(), thin));
+        };
+        match self {
+            Self::Cross => cross([vec2(0.75, 0.75), vec2(0.75, -0.75)], thin),
+            Self::Plus => cross([vec2(1.0, 0.0), vec2(0.0, 1.0)], Stroke::new(2.0, color)),
+            Self::Triangle => outline(3, 0.0, 1.25),
+            Self::Diamond => outline(4, 0.0, 1.2),
+            Self::Square => outline(4, 0.5, 1.2),
+            Self::Ring => {
+                painter.circle_stroke(at, radius, thin);
+            }
+            Self::Disc => {
+                painter.circle_filled(at, radius, color);
+            }
+        }
+    }
+}
+
+/// Room for the line. What is under the pointer is known only when the picture is drawn, but it is
+/// written above it, where it stays in its place.
+pub(super) struct Readout(Rect);
+
+impl Readout {
+    pub(super) fn reserve(ui: &mut Ui) -> Self {
+        let size = vec2(ui.available_width(), ui.text_style_height(&TextStyle::Body));
+        Self(ui.allocate_space(size).1)
+    }
+
+    /// Writes what is under the pointer, or else what could be done.
+    pub(super) fn say(self, ui: &mut Ui, words: Option<&str>, otherwise: &str) -> Response {
+        let text = match words {
+            Some(words) => RichText::new(words).strong(),
+            None => RichText::new(otherwise).weak(),
+        };
+        let mut line = ui.new_child(UiBuilder::new().max_rect(self.0));
+        line.add(Label::new(text).truncate().halign(Align::LEFT))
     }
 }

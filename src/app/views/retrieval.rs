@@ -5,8 +5,7 @@ use egui::{Grid, RichText, ScrollArea, Ui};
 use super::View;
 use super::canvas::PanZoom;
 use super::images::{PhotoPair, photo};
-use super::legend::from_truth;
-use super::mark_shape::MarkShape;
+use super::legend::{MarkShape, from_truth};
 use crate::app::{ViewContext, theme};
 use crate::event::ReferencesRanked;
 use crate::retrieval::{Criterion, Geometry, RankedReference};
@@ -100,10 +99,7 @@ impl RetrievalView {
         event: &ReferencesRanked,
         frame: &RankedReference,
     ) {
-        let loaded = context.run.loaded.as_deref();
-        let Some(problem) = loaded.and_then(|loaded| loaded.problems.first()) else {
-            return;
-        };
+        let Some(problem) = context.run.problems().first() else { return };
         let Some(Some(of_frame)) = event.photos.get(self.selected) else {
             ui.weak("There is no picture of this frame");
             return;

@@ -1,7 +1,6 @@
 //! The scene in 3-D: where reference, truth and estimates stand in the coloured cloud.
 
 mod cameras;
-mod labels;
 mod orbit;
 mod picture;
 mod scene_geometry;
@@ -96,8 +95,8 @@ impl SpaceView {
         let view_camera = self.view_camera(size, content);
         self.draw(ui, pane, content, &view_camera);
         let headline = self.headline(content);
-        labels::headline(ui, pane, &headline);
-        if let Some(kind) = labels::cameras(ui, pane, &view_camera, &content.cameras) {
+        cameras::headline(ui, pane, &headline);
+        if let Some(kind) = cameras::labels(ui, pane, &view_camera, &content.cameras) {
             self.eye = Eye::Through(kind);
         }
         self.menu(ui, pane, content);

@@ -11,7 +11,7 @@ mod slices;
 use egui::{ScrollArea, Ui};
 
 use super::View;
-use super::readout::Readout;
+use super::legend::Readout;
 use crate::app::ViewContext;
 use crate::app::action::toggle;
 use crate::geometry::Pose;

@@ -6,7 +6,7 @@ use egui::{Button, Color32, Grid, RichText, ScrollArea, Ui};
 
 use super::Chosen;
 use crate::app::command::Command;
-use crate::app::{VerdictChange, ViewContext, theme};
+use crate::app::{ViewContext, theme};
 use crate::diagnosis::Code;
 use crate::localize::QueryResult;
 use crate::measure::{Migration, verdict_name};
@@ -33,10 +33,15 @@ impl Columns {
     ];
 }
 
+/// The name of a row or a column, behind its place among the verdicts: `ok`, which is none, comes first, and what is no
+/// verdict is in the order of the alphabet.
+type Name = (Option<usize>, String);
+
+/// The numbers of a matrix, by row and column.
+type Cells = BTreeMap<(Name, Name), Cell>;
+
 /// A number of the matrix, and what a click on it does.
 struct Cell {
-    row: String,
-    column: String,
     text: RichText,
     /// What it counts.
     words: String,
@@ -118,7 +123,7 @@ fn tally<'a>(
     results: impl Iterator<Item = &'a QueryResult>,
     column: impl Fn(&QueryResult) -> (String, String),
     ok: Color32,
-) -> Vec<Cell> {
+) -> Cells {
     let mut counts: BTreeMap<_, usize> = BTreeMap::new();
     let mut sums: BTreeMap<String, usize> = BTreeMap::new();
     for result in results {
@@ -132,31 +137,33 @@ fn tally<'a>(
         (Option<Code>, String, Method, String),
         usize,
     )| {
-        let row = verdict_name(code).to_owned();
+        let row = verdict_name(code);
         let all = sums[&column];
         let text = format!("{count} ({:.0} %)", 100.0 * count as f64 / all as f64);
         let text = RichText::new(text);
         let filter = code.map_or("\"\"", Code::name);
         let place = if scenes.is_empty() { String::new() } else { format!(", {column}") };
-        Cell {
+        let cell = Cell {
             words: format!("{} {row}{place}: {count} of {all}", method.label()),
             text: if code.is_none() { text.color(ok) } else { text },
-            row,
-            column,
             is_chosen: false,
             command: Box::new(move |app| {
                 app.state.options.results_filter =
                     format!("method = {method} and code = {filter}{scenes}");
             }),
-        }
+        };
+        ((name_of(row), name_of(&column)), cell)
     };
     cells.map(cell).collect()
 }
 
-fn migration(context: &ViewContext<'_>, one: &Migration, [ok, wrong]: [Color32; 2]) -> Cell {
-    let change =
-        VerdictChange { method: one.method, before: one.before.clone(), after: one.after.clone() };
-    let is_chosen = context.options.verdict_change.as_ref() == Some(&change);
+fn migration(
+    context: &ViewContext<'_>,
+    one: &Migration,
+    [ok, wrong]: [Color32; 2],
+) -> ((Name, Name), Cell) {
+    let is_chosen = context.options.verdict_change.as_ref().is_some_and(|other| one.is_like(other));
+    let change = one.clone();
     let name = verdict_name(None);
     let text = RichText::new(one.count.to_string());
     let text = match (one.is_change(), is_chosen) {
@@ -166,16 +173,15 @@ fn migration(context: &ViewContext<'_>, one: &Migration, [ok, wrong]: [Color32; 
         (true, _) if one.before == name => text.strong().color(wrong),
         (true, _) => text.strong(),
     };
-    Cell {
-        row: one.before.clone(),
-        column: one.after.clone(),
+    let cell = Cell {
         text,
-        words: format!("{change}: {}", one.count),
+        words: format!("{one}: {}", one.count),
         is_chosen,
         command: Box::new(move |app| {
             app.state.options.verdict_change = (!is_chosen).then_some(change);
         }),
-    }
+    };
+    ((name_of(&one.before), name_of(&one.after)), cell)
 }
 
 /// Such as `12 of 160 verdicts changed: MI ok → D2 3, FB R3 → ok 2`.
@@ -186,44 +192,32 @@ fn changes(migrations: &[Migration]) -> String {
     if changed.is_empty() {
         return format!("None of {all} verdicts changed");
     }
-    let each = changed.iter().map(|one| {
-        let name = one.method.label();
-        format!("{name} {} → {} {}", one.before, one.after, one.count)
-    });
+    let each = changed.iter().map(|one| format!("{one} {}", one.count));
     let each: Vec<String> = each.collect();
     format!("{count} of {all} verdicts changed: {}", each.join(", "))
 }
 
-/// Names in the order of the verdicts, `ok` first; those that are none stay in the order of the alphabet.
-fn in_order<'a>(names: impl Iterator<Item = &'a String>) -> Vec<&'a String> {
-    let place = |name: &str| Code::all().iter().position(|code| code.name() == name);
-    let names: BTreeSet<_> = names.map(|name| (place(name), name)).collect();
-    names.into_iter().map(|(_, name)| name).collect()
+fn name_of(name: &str) -> Name {
+    (Code::all().iter().position(|code| code.name() == name), name.to_owned())
 }
 
-fn table(ui: &mut Ui, context: &ViewContext<'_>, corner: &str, cells: Vec<Cell>) {
-    let rows: Vec<String> =
-        in_order(cells.iter().map(|cell| &cell.row)).into_iter().cloned().collect();
-    let columns = in_order(cells.iter().map(|cell| &cell.column)).into_iter();
-    let columns: Vec<String> = columns.cloned().collect();
+fn table(ui: &mut Ui, context: &ViewContext<'_>, corner: &str, mut cells: Cells) {
     let header = |ui: &mut Ui, name: &str| {
         let answer = ui.strong(name);
         if let Ok(code) = name.parse::<Code>() {
             answer.on_hover_text(code.title());
         }
     };
-    let mut places: BTreeMap<(String, String), Cell> = BTreeMap::new();
-    for cell in cells {
-        places.insert((cell.row.clone(), cell.column.clone()), cell);
-    }
+    let rows: BTreeSet<Name> = cells.keys().map(|(row, _)| row.clone()).collect();
+    let columns: BTreeSet<Name> = cells.keys().map(|(_, column)| column.clone()).collect();
     Grid::new("matrix").striped(true).show(ui, |ui| {
         ui.weak(corner);
-        columns.iter().for_each(|column| header(ui, column));
+        columns.iter().for_each(|(_, column)| header(ui, column));
         ui.end_row();
         for row in rows {
-            header(ui, &row);
+            header(ui, &row.1);
             for column in &columns {
-                match places.remove(&(row.clone(), column.clone())) {
+                match cells.remove(&(row.clone(), column.clone())) {
                     Some(cell) => number(ui, context, cell),
                     None => {
                         ui.weak("·");
@@ -252,11 +246,11 @@ mod tests {
 
     #[test]
     fn verdicts_are_in_the_order_of_the_codes_after_ok() {
-        let codes: Vec<String> = Code::all().iter().map(|code| code.name().to_owned()).collect();
-        let ok = "ok".to_owned();
-        let ordered = in_order(codes.iter().rev().chain([&ok]));
-        assert_eq!(ordered[0], &ok);
-        assert!(ordered[1..].iter().copied().eq(&codes));
+        let codes: Vec<Name> = Code::all().iter().map(|code| name_of(code.name())).collect();
+        let mut ordered: Vec<Name> = codes.iter().rev().cloned().chain([name_of("ok")]).collect();
+        ordered.sort();
+        assert_eq!(ordered[0].1, "ok");
+        assert_eq!(ordered[1..], codes);
     }
 
     #[test]

@@ -6,8 +6,7 @@ use egui::{Color32, Rect, Stroke, Ui};
 use egui_plot::{GridInput, GridMark, Plot, PlotImage, PlotPoint};
 
 use crate::app::ViewContext;
-use crate::app::views::legend::name_picture;
-use crate::app::views::readout::Readout;
+use crate::app::views::legend::{Readout, name_picture};
 use crate::cost::JointHistogram;
 use crate::cost::Similarity;
 use crate::estimator::{self, Entry};
@@ -81,20 +80,19 @@ pub(super) fn ui(
         let point = answer.transform.value_from_position(at);
         bin_at(histogram, point.x, point.y)
     });
-    if let Some(bin) = &pointed_at {
+    if let Some(([row, column], _)) = pointed_at {
         let width = GREYS / histogram.bins as f64;
         let corner = |column: usize, row: usize| {
             let point = PlotPoint::new(column as f64 * width, row as f64 * width);
             answer.transform.position_from_point(&point)
         };
-        let (row, column) = (bin.row, bin.column);
         let rect = Rect::from_two_pos(corner(column, row), corner(column + 1, row + 1));
         for (width, color) in [(3.0, Color32::BLACK), (1.5, Color32::WHITE)] {
             let stroke = Stroke::new(width, color);
             ui.painter().rect_stroke(rect, 0.0, stroke, egui::StrokeKind::Outside);
         }
     }
-    let words = pointed_at.as_ref().map(|bin| bin.words.as_str());
+    let words = pointed_at.as_ref().map(|(_, words)| words.as_str());
     readout.say(ui, words, "Point at a bin (bright: many pairs)");
     if !is_small {
         numbers(ui, method, shown, histogram);
@@ -108,15 +106,8 @@ fn grey_marks(_: GridInput) -> Vec<GridMark> {
     quarters.collect()
 }
 
-/// A bin under the pointer.
-struct Bin {
-    row: usize,
-    column: usize,
-    words: String,
-}
-
-/// The bin at a place of the plot.
-fn bin_at(histogram: &JointHistogram, synthetic: f64, query: f64) -> Option<Bin> {
+/// The row and the column of the bin at a place of the plot, and what is in it.
+fn bin_at(histogram: &JointHistogram, synthetic: f64, query: f64) -> Option<([usize; 2], String)> {
     let bins = histogram.bins;
     let bin = |value: f64| {
         let bin = (value * bins as f64 / GREYS) as usize;
@@ -128,7 +119,7 @@ fn bin_at(histogram: &JointHistogram, synthetic: f64, query: f64) -> Option<Bin>
     let share = 100.0 * f64::from(count) / f64::from(pairs.max(1));
     let (in_query, in_view) = (greys(row, bins), greys(column, bins));
     let words = format!("{count} pairs ({share:.2} %): query {in_query}, synthetic {in_view}");
-    Some(Bin { row, column, words })
+    Some(([row, column], words))
 }
 
 /// The grey values of a bin in words; whole ones where the bins hold whole ones.
@@ -178,7 +169,7 @@ mod tests {
         let pairs = [(0.0, 255.0), (10.0, 250.0), (200.0, 3.0)]
             .map(|(query, synthetic)| IntensityPair { query, synthetic });
         let histogram = JointHistogram::of(&pairs, 16);
-        let words = |x, y| bin_at(&histogram, x, y).map(|bin| bin.words);
+        let words = |x, y| bin_at(&histogram, x, y).map(|(_, words)| words);
         assert_eq!(
             words(250.0, 5.0).as_deref(),
             Some("2 pairs (66.67 %): query 0 to 15, synthetic 240 to 255")

@@ -8,11 +8,10 @@ use nalgebra::Point2;
 use super::truth::{TrueMatch, draw_truth};
 use crate::app::memo::{Memo, Same};
 use crate::app::views::canvas::Placement;
-use crate::app::views::features::{
-    FeatureProgress, UNDECIDED, color, error_px, mark, name, position,
-};
+use crate::app::views::features::{UNDECIDED, color, error_px, mark, name, position};
 use crate::app::views::legend::name_picture;
 use crate::app::{Sends, ViewContext, theme};
+use crate::feature_progress::FeatureProgress;
 use crate::features::{FeatureState, Keypoint};
 use crate::palette;
 use crate::problem::{Problem, ReferenceTuple};

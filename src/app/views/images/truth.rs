@@ -1,11 +1,11 @@
 //! What the true pose says about a match.
 
 use egui::{Color32, Painter};
-use nalgebra::{Point2, Point3, Vector3};
+use nalgebra::{Point2, Point3, Vector2, Vector3};
 
 use crate::app::theme;
 use crate::app::views::canvas::Placement;
-use crate::app::views::mark_shape::MarkShape;
+use crate::app::views::legend::MarkShape;
 use crate::camera::Intrinsics;
 use crate::geometry::Pose;
 use crate::problem::Problem;
@@ -41,25 +41,13 @@ impl ImageLine {
         self.normal.dot(&pixel.to_homogeneous()).abs()
     }
 
-    /// The part of the line inside a camera's image.
-    pub(super) fn within(&self, camera: &Intrinsics) -> Option<[Point2<f64>; 2]> {
-        let foot = -self.normal.z * self.normal.xy();
-        let along = Vector3::new(-self.normal.y, self.normal.x, 0.0).xy();
-        let size = [f64::from(camera.width), f64::from(camera.height)];
-        let (mut start, mut end) = (f64::NEG_INFINITY, f64::INFINITY);
-        for axis in [0, 1] {
-            let (least, greatest) = (-0.5 - foot[axis], size[axis] - 0.5 - foot[axis]);
-            if along[axis].abs() < 1e-12 {
-                if least > 0.0 || greatest < 0.0 {
-                    return None;
-                }
-                continue;
-            }
-            let (enters, leaves) = (least / along[axis], greatest / along[axis]);
-            start = start.max(enters.min(leaves));
-            end = end.min(enters.max(leaves));
-        }
-        (start < end).then(|| [start, end].map(|step| Point2::from(foot + step * along)))
+    /// Two pixels of the line, with all between them that a camera's image may show.
+    pub(super) fn across(&self, camera: &Intrinsics) -> [Point2<f64>; 2] {
+        let (width, height) = (f64::from(camera.width), f64::from(camera.height));
+        let middle = Point2::new(0.5 * width, 0.5 * height);
+        let foot = middle - self.normal.dot(&middle.to_homogeneous()) * self.normal.xy();
+        let along = Vector2::new(-self.normal.y, self.normal.x);
+        [-1.0, 1.0].map(|side| foot + side * width.hypot(height) * along)
     }
 }
 
@@ -139,7 +127,7 @@ pub(super) fn draw_truth(
 ) {
     let place = |pixel: &Point2<f64>| at.on_screen(pixel.cast::<f32>().into());
     let shade = Color32::from_black_alpha(140);
-    if let Some([from, to]) = truth.line.and_then(|line| line.within(camera)) {
+    if let Some([from, to]) = truth.line.map(|line| line.across(camera)) {
         painter.line_segment([place(&from), place(&to)], (3.5, shade));
         painter.line_segment([place(&from), place(&to)], (1.8, theme::TRUTH));
     }
@@ -165,21 +153,12 @@ mod tests {
         let line = ImageLine::epipolar(&CAMERA, &CAMERA, &sideways, &pixel).expect("a line");
         assert!(line.distance_px(&Point2::new(900.0, 100.0)) < 1e-9);
         assert!((line.distance_px(&Point2::new(900.0, 107.0)) - 7.0).abs() < 1e-9);
-        let [from, to] = line.within(&CAMERA).expect("in the image");
-        let mut ends = [from.x, to.x];
+        let mut ends = line.across(&CAMERA).map(|end| end.x);
         ends.sort_by(f64::total_cmp);
-        assert!((ends[0] + 0.5).abs() < 1e-9 && (ends[1] - 1240.5).abs() < 1e-9);
+        assert!(ends[0] < -0.5 && ends[1] > 1240.5);
 
         let turned = Pose::rotation(Vector3::new(0.0, 0.1, 0.0));
         assert_eq!(ImageLine::epipolar(&CAMERA, &CAMERA, &turned, &pixel), None);
-    }
-
-    #[test]
-    fn a_line_beside_the_image_has_no_part_in_it() {
-        let sideways = Pose::translation(-1.0, 0.0, 0.0);
-        let above = Point2::new(300.0, -40.0);
-        let line = ImageLine::epipolar(&CAMERA, &CAMERA, &sideways, &above).expect("a line");
-        assert_eq!(line.within(&CAMERA), None);
     }
 
     #[test]
@@ -219,13 +198,14 @@ mod tests {
             };
             prop_assume!(seen.coords.norm() < 1e5);
             prop_assert!(line.distance_px(&seen) < 1e-5);
-            if let Some(ends) = line.within(&CAMERA) {
-                for end in ends {
-                    prop_assert!(line.distance_px(&end) < 1e-6);
-                    prop_assert!(end.x > -0.51 && end.x < 1240.51 && end.y > -0.51 && end.y < 375.51);
-                }
-            } else {
-                prop_assert!(!CAMERA.contains(&seen));
+            let [from, to] = line.across(&CAMERA);
+            for end in [from, to] {
+                prop_assert!(line.distance_px(&end) < 1e-6);
+                prop_assert!(!CAMERA.contains(&end));
+            }
+            if CAMERA.contains(&seen) {
+                let share = (seen - from).dot(&(to - from)) / (to - from).norm_squared();
+                prop_assert!((0.0..=1.0).contains(&share));
             }
         }
     }

@@ -4,10 +4,9 @@ use egui::{Color32, Painter, Pos2};
 
 use crate::app::theme;
 use crate::app::views::canvas::Placement;
-use crate::app::views::features::{
-    FeatureProgress, INLIER, KINDS, UNDECIDED, color, mark, position,
-};
-use crate::app::views::mark_shape::MarkShape;
+use crate::app::views::features::{INLIER, KINDS, UNDECIDED, color, mark, position};
+use crate::app::views::legend::MarkShape;
+use crate::feature_progress::FeatureProgress;
 
 /// How near the pointer must be \[points\].
 const REACH: f32 = 6.0;

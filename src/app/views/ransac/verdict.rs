@@ -4,9 +4,10 @@ use egui::{Grid, RichText, Ui};
 
 use super::trials::Trials;
 use crate::app::ViewContext;
-use crate::app::views::features::{FeatureProgress, residual_px};
+use crate::app::views::features;
 use crate::depth::LiftedMatch;
 use crate::event::{ConsensusJudged, DepthsLifted, PoseRefined};
+use crate::feature_progress::{FeatureProgress, residual_px};
 use crate::features::Keypoint;
 use crate::localize::Status;
 use crate::robust::{AcceptanceRule, Counted, Hypothesis, Trial};
@@ -62,7 +63,7 @@ fn sample(ui: &mut Ui, context: &ViewContext<'_>, span: &Span, cursor: usize, tr
     };
     let correspondences: Vec<&LiftedMatch> =
         lifted.matches.iter().filter(|lifted| lifted.point.is_some()).collect();
-    let features = FeatureProgress::of(context, span, cursor);
+    let features = features::of(context, span, cursor);
     Grid::new("sample").striped(true).show(ui, |ui| {
         let columns =
             ["sample", "query [px]", "reference [px]", "depth [m]", "here [px]", "best [px]"];

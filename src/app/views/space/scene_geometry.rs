@@ -26,7 +26,7 @@ pub(super) struct SceneGeometry {
 impl SceneGeometry {
     /// The geometry of a run's scene; `None` before its frames are read.
     pub(super) fn of(context: &ViewContext<'_>) -> Option<Self> {
-        let first = context.run.loaded.as_deref()?.problems.first()?;
+        let first = context.run.problems().first()?;
         let here = context.problem()?;
         let scene_from_world = first.reference.world_from_camera.inverse();
         Some(Self {

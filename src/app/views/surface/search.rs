@@ -43,8 +43,7 @@ impl<'a> Search<'a> {
     /// The search of `method` on the reference at the cursor; `None` before its first view.
     pub(super) fn at(context: &ViewContext<'a>, method: Method) -> Option<Self> {
         let (span, cursor) = part_with::<PoseScored>(context, method)?;
-        let problems = &context.run.loaded.as_deref()?.problems;
-        let problem = problems.get(span.part.reference()?)?;
+        let problem = context.run.problems().get(span.part.reference()?)?;
         let mut events = context.run.until(span, cursor).iter().map(|record| &record.event);
         let start = events.find_map(|event| match event {
             Event::ViewRendered(view) if view.moment == Moment::Start => Some(view),
