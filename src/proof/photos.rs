@@ -60,7 +60,8 @@ impl<'a> Matches<'a> {
         let camera = &case.problem.query.intrinsics;
         let inlier_px = case.params.fb.mlesac.inlier_threshold_px;
         let progress = FeatureProgress::of(case.records, Some(camera), inlier_px);
-        let states = progress.states?;
+        // Of a photo without keypoints the states are known, but nothing was matched.
+        let states = progress.states.filter(|_| !progress.is_unmatched())?;
         let threshold_px = true_match_px(inlier_px);
         let query_from_reference = case.query_from_reference();
         let matched = states.iter().enumerate().filter_map(|(at, &state)| {
