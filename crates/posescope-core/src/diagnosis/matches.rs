@@ -306,25 +306,24 @@ impl Pairs {
         })
     }
 
-    /// How many there are.
-    pub(super) fn count(&self) -> usize {
-        self.pixels.len()
-    }
-
-    /// How many matches the truth explains with the depths of the cloud, if both photos are of this camera.
-    pub(super) fn explained_by(&self, camera: &Intrinsics) -> usize {
+    /// How many matches the truth explains with the depths of the cloud, if both photos are of this camera; and how many
+    /// have a depth then.
+    pub(super) fn explained_by(&self, camera: &Intrinsics) -> (usize, usize) {
         let radius_px = self.radius_px * self.wide.fx / camera.fx;
-        let is_explained = |[pixel, seen]: &&[Point2<f64>; 2]| {
-            let point = self
-                .wide
-                .project(&camera.unproject(seen, 1.0))
-                .and_then(|at| self.cloud.read(&at, radius_px).within)
-                .map(|depths| camera.unproject(seen, depths.nearest));
-            let there =
-                point.and_then(|point| camera.project(&(self.query_from_reference * point)));
-            there.is_some_and(|there| (there - pixel).norm() <= self.threshold_px)
+        let point = |seen: &Point2<f64>| {
+            let at = self.wide.project(&camera.unproject(seen, 1.0))?;
+            let depths = self.cloud.read(&at, radius_px).within?;
+            Some(camera.unproject(seen, depths.nearest))
         };
-        self.pixels.iter().filter(is_explained).count()
+        let (mut explained, mut with_depth) = (0, 0);
+        for [pixel, seen] in &self.pixels {
+            let Some(point) = point(seen) else { continue };
+            let there = camera.project(&(self.query_from_reference * point));
+            with_depth += 1;
+            let is_near = there.is_some_and(|there| (there - pixel).norm() <= self.threshold_px);
+            explained += usize::from(is_near);
+        }
+        (explained, with_depth)
     }
 }
 

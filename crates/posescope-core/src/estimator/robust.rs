@@ -6,7 +6,11 @@
 //! the answer. That features agree beyond chance earns their pose a small credit; that they do not costs
 //! it nothing. An unlikely pose gets the penalty of `mi6`.
 
+mod params;
+
 use std::sync::Arc;
+
+pub use params::RobustParams;
 
 use super::feature::Proposal;
 use super::mi6::{self, JUDGED, shown};
@@ -15,7 +19,6 @@ use super::{
     CostSummary, Entry, Estimator, Failure, Family, FeatureBased, Halt, Outcome, SixFreedoms, fb2,
     separate_failure,
 };
-use crate::describe::parameters;
 use crate::event::{BranchTaken, CandidatesJudged, JudgedPose, Stage};
 use crate::geometry::Pose;
 use crate::judge::Refined;
@@ -24,21 +27,6 @@ use crate::params::Params;
 use crate::problem::Problem;
 use crate::render::{Comparison, leave_out};
 use crate::trace::{Cancelled, Trace};
-
-parameters! {
-    /// Parameters of the decision between the poses of several methods.
-    #[derive(Clone, Debug, PartialEq)]
-    pub struct RobustParams {
-        /// How far below the costs of the coarse positions the answer's cost must be, in robust standard
-        /// deviations of those costs; 0 answers always, as the direct methods do.
-        pub deviations: f64 = 0.0 => number("deviations", "", 0.0..=100.0),
-        /// What the pose of features that agree beyond chance is worth, in the same standard deviations:
-        /// it is taken where it costs at most so much more than the search's.
-        pub credit: f64 = 3.0 => number("credit", "", 0.0..=100.0),
-        /// The least probability of being within 1 m with which the answer is accepted; 0 answers always.
-        pub least_probability: f64 = 0.0 => number("least_probability", "", 0.0..=1.0),
-    }
-}
 
 /// The method.
 const METHOD: Method = Method::named("robust");

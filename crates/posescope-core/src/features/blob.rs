@@ -7,12 +7,25 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::Keypoint;
 use super::hessian::BoxFilter;
-use super::octave::Octave;
+use super::integral::IntegralImage;
 use super::responses::Responses;
+
+/// Where filters are applied, and what a maximum exceeds.
+#[derive(Clone, Copy)]
+pub(super) struct Sampling<'a> {
+    pub(super) integral: &'a IntegralImage,
+    /// Distance between samples \[px\].
+    pub(super) step: usize,
+    /// Distance to which a maximum exceeds all other responses of its filter, and between those through which
+    /// its peak is interpolated \[samples\].
+    pub(super) reach: usize,
+    /// What a blob's response exceeds.
+    pub(super) threshold: f32,
+}
 
 /// Three layers with filters of successive sizes, the middle one searched for maxima.
 pub(super) struct Neighbourhood<'a> {
-    pub(super) octave: &'a Octave<'a>,
+    pub(super) sampling: Sampling<'a>,
     pub(super) filters: &'a [BoxFilter; 3],
     pub(super) responses: &'a Responses,
     /// The place of the first filter among the responses.
@@ -22,7 +35,7 @@ pub(super) struct Neighbourhood<'a> {
 impl Neighbourhood<'_> {
     /// The samples along `extent` pixels that have all neighbours: where the largest filter still fits.
     pub(super) fn inside(&self, extent: usize) -> Range<usize> {
-        let &Octave { step, reach, .. } = self.octave;
+        let Sampling { step, reach, .. } = self.sampling;
         let margin = self.filters[2].margin();
         let last = extent.saturating_sub(margin + 1) / step;
         margin.div_ceil(step) + reach..(last + 1).saturating_sub(reach)
@@ -31,9 +44,9 @@ impl Neighbourhood<'_> {
     /// Finds the maxima along a row of samples that is [`Self::inside`].
     pub(super) fn find(&self, row: usize, peaks: &mut Vec<bool>, found: &mut Vec<Keypoint>) {
         let rows = [row - 1, row, row + 1].map(|row| self.layer(1, row));
-        dispatch!(Level::new(), _simd => mark_peaks(rows, self.octave.threshold, peaks));
+        dispatch!(Level::new(), _simd => mark_peaks(rows, self.sampling.threshold, peaks));
         let maxima = self
-            .inside(self.octave.integral.width)
+            .inside(self.sampling.integral.width)
             .filter(|&column| peaks[column])
             .filter(|&column| self.is_maximum(column, row))
             .filter_map(|column| self.localise(column, row));
@@ -49,7 +62,7 @@ impl Neighbourhood<'_> {
     /// counts.
     fn is_maximum(&self, column: usize, row: usize) -> bool {
         let value = self.layer(1, row)[column];
-        for (index, radius) in [1, self.octave.reach, 1].into_iter().enumerate() {
+        for (index, radius) in [1, self.sampling.reach, 1].into_iter().enumerate() {
             for y in row - radius..=row + radius {
                 let around = column - radius..=column + radius;
                 let samples = &self.layer(index, y)[around.clone()];
@@ -68,7 +81,7 @@ impl Neighbourhood<'_> {
     /// scale (Brown and Lowe, BMVC 2002, equations 2 and 3). None where the peak is further
     /// away than those samples are, and so not supported by any.
     fn localise(&self, column: usize, row: usize) -> Option<Keypoint> {
-        let &Octave { integral, step, reach, .. } = self.octave;
+        let Sampling { integral, step, reach, .. } = self.sampling;
         let spacing = (reach * step) as f32;
         let reach = reach as isize;
         let value = |dx: isize, dy: isize, ds: isize| {

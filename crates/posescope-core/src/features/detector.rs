@@ -1,5 +1,6 @@
 //! The Fast-Hessian detector (sections 3.2 to 3.4): blobs as maxima over position and scale.
 
+use super::blob::Sampling;
 use super::hessian::BoxFilter;
 use super::integral::IntegralImage;
 use super::octave::{Known, Octave};
@@ -38,11 +39,13 @@ pub(super) fn detect<E>(
         checkpoint()?;
         let lobes = |octave| (0..params.intervals).map(move |interval| lobe(octave, interval));
         let octave = Octave {
-            integral,
+            sampling: Sampling {
+                integral,
+                step: initial_step << index,
+                reach: (REACH / initial_step).max(1),
+                threshold: params.threshold as f32,
+            },
             filters: lobes(index).map(BoxFilter::new).collect(),
-            step: initial_step << index,
-            reach: (REACH / initial_step).max(1),
-            threshold: params.threshold as f32,
             known,
         };
         let next: Vec<usize> = lobes(index + 1).collect();

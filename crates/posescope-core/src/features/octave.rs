@@ -8,9 +8,8 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use super::Keypoint;
-use super::blob::Neighbourhood;
+use super::blob::{Neighbourhood, Sampling};
 use super::hessian::{BoxFilter, Room};
-use super::integral::IntegralImage;
 use super::responses::Responses;
 
 /// Fewer rows in a band are not worth the rows that it shares with its neighbours.
@@ -20,15 +19,8 @@ const BANDS_PER_THREAD: usize = 2;
 
 /// The filters of one octave and where they are applied.
 pub(super) struct Octave<'a> {
-    pub(super) integral: &'a IntegralImage,
+    pub(super) sampling: Sampling<'a>,
     pub(super) filters: Vec<BoxFilter>,
-    /// Distance between samples \[px\].
-    pub(super) step: usize,
-    /// Distance to which a maximum exceeds all other responses of its filter, and between those through which
-    /// its peak is interpolated \[samples\].
-    pub(super) reach: usize,
-    /// What a blob's response exceeds.
-    pub(super) threshold: f32,
     /// Half of the sizes of an octave occur in the one below it already.
     pub(super) known: Known,
 }
@@ -50,8 +42,8 @@ struct BandRoom {
 impl Octave<'_> {
     /// Finds the blobs, and keeps the responses of those filters that the next octave has too, by their lobes.
     pub(super) fn search(&self, next: &[usize]) -> (Vec<Keypoint>, Known) {
-        let columns = self.integral.width.div_ceil(self.step);
-        let rows = self.integral.height.div_ceil(self.step);
+        let columns = self.sampling.integral.width.div_ceil(self.sampling.step);
+        let rows = self.sampling.integral.height.div_ceil(self.sampling.step);
         let layers = 0..self.filters.len();
         let shared = layers.filter(|&layer| next.contains(&self.filters[layer].lobe));
         let shared: Vec<usize> = shared.collect();
@@ -66,7 +58,7 @@ impl Octave<'_> {
         let kept_of_bands = kept_of_bands.chain(std::iter::repeat_with(<&mut [f32]>::default));
         let bands: Vec<(usize, &mut [f32])> = firsts.zip(kept_of_bands).collect();
         let room = || BandRoom {
-            responses: Responses::new(self.filters.len(), columns, 2 * self.reach + 1),
+            responses: Responses::new(self.filters.len(), columns, 2 * self.sampling.reach + 1),
             room: Room::default(),
             peaks: Vec::new(),
         };
@@ -93,15 +85,17 @@ impl Octave<'_> {
         room: &mut BandRoom,
         mut keep: impl FnMut(usize, &Responses),
     ) -> Vec<Keypoint> {
-        let rows = self.integral.height.div_ceil(self.step);
+        let rows = self.sampling.integral.height.div_ceil(self.sampling.step);
         let mut found = Vec::new();
-        for row in band.start.saturating_sub(self.reach)..(band.end + self.reach).min(rows) {
+        for row in band.start.saturating_sub(self.sampling.reach)
+            ..(band.end + self.sampling.reach).min(rows)
+        {
             self.respond(row, room);
             if row % 2 == 0 && band.contains(&row) {
                 keep(row, &room.responses);
             }
             // What is found on a row exceeds rows down to the newest.
-            let middle = row.checked_sub(self.reach);
+            let middle = row.checked_sub(self.sampling.reach);
             if let Some(middle) = middle.filter(|middle| band.contains(middle)) {
                 self.find(middle, room, &mut found);
             }
@@ -117,8 +111,14 @@ impl Octave<'_> {
             match known {
                 Some(known) => samples.copy_from_slice(self.known.responses.row(known, row)),
                 None => {
-                    let y = row * self.step;
-                    filter.respond(self.integral, y, self.step, &mut room.room, samples);
+                    let y = row * self.sampling.step;
+                    filter.respond(
+                        self.sampling.integral,
+                        y,
+                        self.sampling.step,
+                        &mut room.room,
+                        samples,
+                    );
                 }
             }
         }
@@ -128,8 +128,9 @@ impl Octave<'_> {
     fn find(&self, row: usize, room: &mut BandRoom, found: &mut Vec<Keypoint>) {
         for (below, filters) in self.filters.array_windows().enumerate() {
             let responses = &room.responses;
-            let neighbourhood = Neighbourhood { octave: self, filters, responses, below };
-            if neighbourhood.inside(self.integral.height).contains(&row) {
+            let neighbourhood =
+                Neighbourhood { sampling: self.sampling, filters, responses, below };
+            if neighbourhood.inside(self.sampling.integral.height).contains(&row) {
                 neighbourhood.find(row, &mut room.peaks, found);
             }
         }

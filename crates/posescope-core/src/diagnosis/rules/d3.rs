@@ -15,7 +15,9 @@ pub(super) const RULE: Rule = Rule {
         _ => None,
     },
     advice_on: |found| {
-        found.get("fine_range_m").map(|_| "raise grid.fine_range to half of grid.coarse_step at least")
+        found
+            .get("fine_range_m")
+            .map(|_| "raise grid.fine_range to half of grid.coarse_step at least")
     },
     applies_to: Family::COSTED,
     is_conclusive: true,

@@ -88,7 +88,9 @@ mod tests {
     #[test]
     fn blur_takes_sharpness_and_haze_takes_contrast() {
         let stripes = |low: u8, high: u8, wide: u32| {
-            GrayImage::from_fn(64, 8, |x, _| image::Luma([if x / wide % 2 == 0 { low } else { high }]))
+            GrayImage::from_fn(64, 8, |x, _| {
+                image::Luma([if x / wide % 2 == 0 { low } else { high }])
+            })
         };
         let sharp = look(&stripes(0, 200, 2));
         let hazy = look(&stripes(90, 110, 2));

@@ -276,7 +276,7 @@ fn camera_of_both(case: &Case<'_>, matches: &TrueMatches) -> Option<Diagnosis> {
         }
     };
     let count = |(exponent, with_centre): (f64, bool)| {
-        (pairs.explained_by(&scaled(exponent, with_centre)), exponent, with_centre)
+        (pairs.explained_by(&scaled(exponent, with_centre)).0, exponent, with_centre)
     };
     let most = |candidates: &mut dyn Iterator<Item = (f64, bool)>| {
         candidates.map(count).max_by(|a, b| a.0.cmp(&b.0).then(b.1.abs().total_cmp(&a.1.abs())))
@@ -290,7 +290,7 @@ fn camera_of_both(case: &Case<'_>, matches: &TrueMatches) -> Option<Diagnosis> {
     let (after, exponent, _) = most(fine)?;
     let camera = scaled(exponent, with_centre);
     // Things that look alike agree on some camera too; of a real one, most matches do.
-    let is_most = 2 * after >= pairs.count();
+    let is_most = 2 * after >= pairs.explained_by(&camera).1;
     let is_more = after >= before + 2 * FEW_MATCHES && 5 * after >= 8 * before && is_most;
     let is_other = (camera.fx / reference.fx - 1.0).abs() > 2.0 * SAME_FOCAL_LENGTH;
     (is_more && is_other).then(|| {
