@@ -115,7 +115,7 @@ fn agreed(of: String, votes: &[Vote<'_>], results: &[&QueryResult]) -> Option<Fi
     // A mistake of a whole scene is seen in many of its queries; chance agrees in a few of many.
     let is_common = 3 * queries.len() >= all.len() && claim.is_common(queries.len(), results);
     let (text, evidence) = claim.words(&of, queries.len());
-    (queries.len() >= MIN_QUERIES && is_common).then(|| Finding {
+    (queries.len() >= MIN_QUERIES && is_common).then_some(Finding {
         code: Code::X1,
         of,
         queries: queries.len(),

@@ -154,3 +154,51 @@ fn a_focal_length_that_is_wrong_for_both_photos_is_named() {
         assert!((camera.cx / stated.cx - 1.0).abs() < 0.04, "{scale}: {camera:?}");
     }
 }
+
+/// Where poses are inverted, the reference seems to see something else. One query says no more; its suspicion comes behind.
+#[test]
+fn what_one_query_says_of_poses_comes_after_a_reference_that_sees_something_else() {
+    let street = scene::open("street", None).expect("is built in");
+    let truth = street.pose(30).expect("is known").inverse();
+    let (query, reference) =
+        (street.query(30).expect("a photo"), street.reference(24).expect("a cloud"));
+    let problem = Problem::new(query, reference, 15.0).expect("a radius");
+    let (params, mut evidence) = (Params::default(), Evidence::default());
+    let mut trace = Trace::to(&mut evidence);
+    let outcome = localize_traced(&problem, Method::FB, &params, &mut trace);
+    let outcome = outcome.expect("nobody cancels");
+    let subject = Subject::new(&problem, Method::FB, &params, &outcome, &evidence);
+    let found = diagnose(&subject.against(Some(&truth), Tolerance::default()));
+    let codes: Vec<&str> = found.iter().map(|one| one.code.name()).collect();
+    assert_eq!(codes[0], "R1", "{found:?}");
+    let suspicion = found.iter().find(|one| one.code.name() == "X1").expect("is listed");
+    assert!(suspicion.text.contains("read as camera_from_world (inverted)"), "{suspicion:?}");
+}
+
+/// A room has other defaults than a street, and a model without metres keeps its own unit.
+#[test]
+fn a_room_is_searched_at_its_own_scale() {
+    let Some(data) = std::env::var_os("POSESCOPE_DATA") else {
+        println!("skipped: no data (POSESCOPE_DATA)");
+        return;
+    };
+    let sequence = SmallSequence::write();
+    let room = std::path::Path::new(&data).join("7scenes/redkitchen");
+    let asked = format!("run {} --query 25 --reference 50 --method mi", room.display());
+    let ran = sequence.run(&format!("{asked} --json result.jsonl"));
+    crate::binary::has(
+        &ran.err,
+        "search radius 1 m, steps 0.1 m and 0.02 m, right within 0.1 m and 5°",
+    );
+    let result: QueryResult =
+        serde_json::from_str(sequence.text("result.jsonl").trim()).expect("a result");
+    assert_eq!(result.scale, 0.1);
+    assert_eq!(result.confidence, None);
+    let ran = sequence.run(&format!("{asked} --set grid.coarse_step=1"));
+    crate::binary::has(&ran.err, "--set grid.coarse_step=0.1 fits");
+    let model = std::path::Path::new(&data).join("colmap/lund_door");
+    let asked =
+        format!("run {} --query DSC_0003 --reference DSC_0002 --method fb", model.display());
+    sequence.run(&format!("{asked} --right 0.1,5deg --json model.jsonl"));
+    crate::binary::has(&sequence.text("model.jsonl"), r#""unit":null"#);
+}

@@ -27,8 +27,8 @@ impl Scale {
         const STREET_DEPTH_M: f64 = 10.0;
         let exact = if depth.is_finite() { depth / STREET_DEPTH_M } else { 1.0 };
         let powers = (-3..=3).map(|power| 10_f64.powi(power));
-        let steps = powers.flat_map(|power| [1.0, 2.0, 5.0].map(|digit| short(digit * power)));
-        let below = steps.filter(|step| *step <= exact).last();
+        let mut steps = powers.flat_map(|power| [1.0, 2.0, 5.0].map(|digit| short(digit * power)));
+        let below = steps.rfind(|step| *step <= exact);
         // Beyond that, the unit is wrong.
         Self { metre: below.unwrap_or(1e-3), is_metric }
     }

@@ -55,7 +55,7 @@ impl SceneSize {
             let is_seen = |point: &nalgebra::Point3<f64>| {
                 camera.project(point).is_some_and(|pixel| camera.contains(&pixel))
             };
-            let Cloud { points, .. } = scene.cloud(frame).ok()?;
+            let Cloud { points } = scene.cloud(frame).ok()?;
             let seen = points.iter().map(|point| point.cast()).filter(is_seen);
             median(&mut seen.map(|point| point.z).collect::<Vec<f64>>())
         });

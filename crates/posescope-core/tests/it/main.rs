@@ -12,6 +12,7 @@ mod one_answer;
 mod own_cost;
 mod ranking;
 mod robust_pose;
+mod scene_size;
 mod stopping;
 mod surf_warp;
 mod two_walls;

@@ -89,7 +89,7 @@ mod tests {
     fn blur_takes_sharpness_and_haze_takes_contrast() {
         let stripes = |low: u8, high: u8, wide: u32| {
             GrayImage::from_fn(64, 8, |x, _| {
-                image::Luma([if x / wide % 2 == 0 { low } else { high }])
+                image::Luma([if (x / wide).is_multiple_of(2) { low } else { high }])
             })
         };
         let sharp = look(&stripes(0, 200, 2));
