@@ -155,26 +155,6 @@ fn a_focal_length_that_is_wrong_for_both_photos_is_named() {
     }
 }
 
-/// Where poses are inverted, the reference seems to see something else. One query says no more; its suspicion comes behind.
-#[test]
-fn what_one_query_says_of_poses_comes_after_a_reference_that_sees_something_else() {
-    let street = scene::open("street", None).expect("is built in");
-    let truth = street.pose(30).expect("is known").inverse();
-    let (query, reference) =
-        (street.query(30).expect("a photo"), street.reference(24).expect("a cloud"));
-    let problem = Problem::new(query, reference, 15.0).expect("a radius");
-    let (params, mut evidence) = (Params::default(), Evidence::default());
-    let mut trace = Trace::to(&mut evidence);
-    let outcome = localize_traced(&problem, Method::FB, &params, &mut trace);
-    let outcome = outcome.expect("nobody cancels");
-    let subject = Subject::new(&problem, Method::FB, &params, &outcome, &evidence);
-    let found = diagnose(&subject.against(Some(&truth), Tolerance::default()));
-    let codes: Vec<&str> = found.iter().map(|one| one.code.name()).collect();
-    assert_eq!(codes[0], "R1", "{found:?}");
-    let suspicion = found.iter().find(|one| one.code.name() == "X1").expect("is listed");
-    assert!(suspicion.text.contains("read as camera_from_world (inverted)"), "{suspicion:?}");
-}
-
 /// A room has other defaults than a street, and a model without metres keeps its own unit.
 #[test]
 fn a_room_is_searched_at_its_own_scale() {

@@ -1,6 +1,5 @@
 //! The size of a scene follows from its clouds and poses.
 
-use posescope_core::scale::Scale;
 use posescope_core::scene::{Lengths, Scene, SceneSize};
 
 use crate::walls_scene::Walls;
@@ -21,14 +20,13 @@ fn a_scene_is_measured_unless_it_is_a_street() {
     assert_eq!(SceneSize::of(&Walls::new()), SceneSize::PAPER);
     let size = SceneSize::of(&Measured(Walls::new(), Lengths::Metres));
     let depth_m = size.depth_m.expect("there are clouds");
-    assert!((1.0..10.0).contains(&depth_m), "{depth_m}");
-    assert_eq!(size.scale, Scale::of_depth(depth_m, true));
-    assert!(size.scale.metre() < 1.0);
+    assert!((16.0..17.0).contains(&depth_m), "{depth_m}");
+    assert!(size.scale.is_paper());
     // Consecutive frames are 1, 0.5, 0.3 and 0.6 m apart, all with one heading.
     let spacing_m = size.spacing_m.expect("there are poses");
     assert!((0.5..=0.6).contains(&spacing_m), "{spacing_m}");
     assert_eq!((size.turn_deg, size.extent_m), (Some(0.0), Some(1.0)));
-    assert_eq!(size.radius_m(), size.scale.radius());
+    assert_eq!(size.radius_m(), 15.0);
     let model = SceneSize::of(&Measured(Walls::new(), Lengths::Model));
     assert!(!model.scale.is_metric());
 }
