@@ -139,3 +139,36 @@ pub fn open(args: &TaskArgs, scene: &str, queries: &[String]) -> Result<OpenedTa
     };
     Ok(OpenedTask { task, scenes, queries, size })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_setting_that_does_not_suit_the_scene_is_named_with_one_that_does() {
+        let camera =
+            Intrinsics { fx: 585.0, fy: 585.0, cx: 320.0, cy: 240.0, width: 640, height: 480 };
+        let size = |turn_deg: f64| SceneSize {
+            depth_m: Some(12.0),
+            spacing_m: Some(1.0),
+            turn_deg: Some(turn_deg),
+            extent_m: Some(30.0),
+            ..SceneSize::PAPER
+        };
+        let misfit = |radius_m: f64, step: &str, turn_deg: f64| {
+            let protocol = Protocol { radii_m: vec![radius_m], ..Protocol::default() };
+            let mut params = Params::default();
+            params.assign(&format!("grid.coarse_step={step}")).expect("a good value");
+            misfit(&size(turn_deg), &protocol, &params, &camera)
+        };
+        let has = |said: Option<String>, words: &str| {
+            let said = said.expect("does not suit");
+            assert!(said.contains(words), "{said}");
+        };
+        assert_eq!(misfit(15.0, "1", 3.0), None);
+        assert_eq!(misfit(40.0, "1", 3.0), None);
+        has(misfit(15.0, "3", 3.0), "--set grid.coarse_step=1 fits");
+        has(misfit(43.0, "1", 3.0), "--radius 15 fits");
+        has(misfit(15.0, "1", 12.0), "--set grid.yaw_range=18 fits");
+    }
+}

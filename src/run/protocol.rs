@@ -503,6 +503,8 @@ fn word(value: toml::Value) -> String {
 
 #[cfg(test)]
 mod tests {
+    use posescope_core::scale::Scale;
+
     use super::*;
 
     #[test]
@@ -567,5 +569,17 @@ mod tests {
         assert_eq!(large("kitti/00"), (Some(200.0), Some(10.0)));
         assert_eq!(large("robotcar/a"), (Some(50.0), Some(20.0)));
         assert!("small".parse::<Preset>().is_err());
+    }
+
+    #[test]
+    fn all_lengths_of_a_protocol_follow_the_size_of_the_scene() {
+        let room = SceneSize { scale: Scale::of_depth(1.8, true), ..SceneSize::PAPER };
+        let own = defaults(None, "room").at_size(&room);
+        assert_eq!((own.radii_m, own.failure_radius_m), (vec![1.0], Some(1.0)));
+        assert_eq!(own.right.to_string(), "0.1m,5deg");
+        let large = defaults("large".parse().ok(), "room").at_size(&room);
+        assert_eq!((large.radii_m, large.prior_m), (vec![1.5], Some(20.0)));
+        let street = defaults(None, "street");
+        assert_eq!(street.clone().at_size(&SceneSize::PAPER), street);
     }
 }

@@ -113,6 +113,13 @@ fn an_inverted_pose_is_told_by_its_convention() {
         assert_eq!(first.code, Code::X1, "{}: {}", result.query, first.text);
         assert!(first.text.contains(reading), "{}", first.text);
     }
+    let eval = "eval sequences/42 --reference nearest:1 --radius 3 --method other --estimates other=poses.txt --out run";
+    let said = sequence.run(eval);
+    let finding =
+        "The poses of other are in another convention: read as camera_from_world (inverted)";
+    has(&said.out, &format!("Finding: {finding}"));
+    has(&sequence.text("run/summary.json"), finding);
+    has(&sequence.text("run/report.html"), finding);
 }
 
 /// Axes forward, left and up. The place is right, so the heading alone tells.

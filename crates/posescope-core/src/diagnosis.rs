@@ -186,13 +186,45 @@ fn tried(case: &Case<'_>, grade: Grade) -> Vec<Diagnosis> {
             found.push(verdict);
         }
     }
-    // What yields goes behind the last of those that it yields to.
+    in_order(found, case.family)
+}
+
+/// The verdicts with each that yields to others behind the last of those.
+fn in_order(mut found: Vec<Diagnosis>, family: Family) -> Vec<Diagnosis> {
     for at in (0..found.len()).rev() {
-        let yields_to = (found[at].code.rule().yields_to)(&found[at].evidence);
+        let yields_to = (found[at].code.rule().yields_to)(family, &found[at].evidence);
         let last = found.iter().rposition(|other| yields_to.contains(&other.code));
         if let Some(last) = last.filter(|&last| last > at) {
             found[at..=last].rotate_left(1);
         }
     }
     found
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::*;
+
+    #[test]
+    fn what_one_query_says_of_a_scene_comes_behind_what_needs_no_suspicion() {
+        let order = |evidence: Value, family: Family, others: [Code; 2]| {
+            let found =
+                |code: Code, evidence: Value| Diagnosis { code, text: String::new(), evidence };
+            let [first, second] = others.map(|code| found(code, json!({})));
+            let all = vec![found(Code::X1, evidence), first, second];
+            in_order(all, family).iter().map(|one| one.code).collect::<Vec<_>>()
+        };
+        use Code::{D3, D7, R1, R3, X1};
+        let camera = || json!({ "camera": {} });
+        assert_eq!(order(camera(), Family::Features, [R1, R3]), [R1, X1, R3]);
+        assert_eq!(order(camera(), Family::Grid, [D3, D7]), [D3, D7, X1]);
+        assert_eq!(order(camera(), Family::Grid, [D3, R3]), [X1, D3, R3]);
+        // Another system's poses in another convention, units and the truth are no suspicion of a scene.
+        let poses = || json!({ "reading": "inverted" });
+        assert_eq!(order(poses(), Family::Features, [R1, R3]), [R1, X1, R3]);
+        assert_eq!(order(poses(), Family::Given, [D3, D7]), [X1, D3, D7]);
+        assert_eq!(order(json!({ "unit": "mm" }), Family::Grid, [D3, D7]), [X1, D3, D7]);
+    }
 }

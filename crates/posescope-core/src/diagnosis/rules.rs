@@ -125,7 +125,7 @@ pub struct Rule {
     /// Whether no later rule is tried once this one fired.
     pub is_conclusive: bool,
     /// The verdicts that come before this one if they fire too, for what was found.
-    pub yields_to: fn(&serde_json::Value) -> &'static [Code],
+    pub yields_to: fn(Family, &serde_json::Value) -> &'static [Code],
     /// The test.
     pub test: Test,
     /// The stage that decided it.
@@ -150,7 +150,7 @@ impl Rule {
             applies_to: &[],
             needs_truth: true,
             is_conclusive: false,
-            yields_to: |_| &[],
+            yields_to: |_, _| &[],
             test: Test::Reported,
             decided_at: DecidedAt::End,
             proof: Proof::DecidingStage,

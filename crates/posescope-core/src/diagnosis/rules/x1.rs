@@ -17,10 +17,12 @@ pub(super) const RULE: Rule = Rule {
     applies_to: Family::ALL,
     needs_truth: false,
     test: Test::Method(test),
-    // What one query says of a camera, of poses or of a cloud may be chance, and these need none of it. Units are
-    // read off the cloud.
-    yields_to: |found| {
-        if found.get("unit").is_some() { &[] } else { &[Code::R1, Code::D4, Code::D7] }
+    // What one query says of a whole scene may be chance, and these verdicts need no suspicion.
+    yields_to: |family, found| {
+        let has = |key: &str| found.get(key).is_some();
+        let is_of_the_scene =
+            has("camera") || has("wrong_depth") || has("reading") && family != Family::Given;
+        if is_of_the_scene { &[Code::R1, Code::D4, Code::D7] } else { &[] }
     },
     proof: Proof::CloudOnPhoto,
     ..Rule::new(Code::X1)
