@@ -8,7 +8,7 @@ use std::rc::Rc;
 use super::memo::Memo;
 use crate::diagnosis::Code;
 use crate::localize::QueryResult;
-use crate::measure::{Condition, ConditionError, Migration, migrations, verdict_name};
+use crate::measure::{Condition, ConditionError, Migration, Overview, migrations, verdict_name};
 
 /// Results by query.
 pub type Results = BTreeMap<usize, Vec<QueryResult>>;
@@ -62,6 +62,7 @@ pub struct BatchResults {
     version: u64,
     rows: RefCell<Memo<(u64, Wanted), Found>>,
     migrations: RefCell<Memo<u64, Rc<[Migration]>>>,
+    overview: RefCell<Memo<(u64, bool), Rc<Overview>>>,
 }
 
 impl Deref for BatchResults {
@@ -137,6 +138,15 @@ impl BatchResults {
     pub(super) fn select(&self, wanted: Wanted) -> Found {
         let mut rows = self.rows.borrow_mut();
         rows.get((self.version, wanted.clone()), || wanted.find(self)).clone()
+    }
+
+    /// What all results came to, with what the truth says of them or without.
+    pub(super) fn overview(&self, shows_truth: bool) -> Rc<Overview> {
+        let make = || {
+            let shown: Vec<_> = self.all().map(|(_, result)| result.shown(shows_truth)).collect();
+            Rc::new(Overview::of(&shown.iter().collect::<Vec<_>>()))
+        };
+        Rc::clone(self.overview.borrow_mut().get((self.version, shows_truth), make))
     }
 
     /// What became of the verdicts since the results A, also of those that stayed what they were.

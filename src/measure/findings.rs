@@ -107,7 +107,14 @@ fn agreed(of: String, votes: &[Vote<'_>], results: &[&QueryResult]) -> Option<Fi
     let queries_for = |claim: &Claim| -> BTreeSet<&str> {
         votes.iter().filter(|vote| claim.agrees(&vote.claim)).map(|vote| vote.query).collect()
     };
-    let candidates = votes.iter().map(|vote| (queries_for(&vote.claim), &vote.claim));
+    // Claims that are equal are asked once.
+    let mut claims: Vec<&Claim> = Vec::new();
+    for vote in votes {
+        if !claims.contains(&&vote.claim) {
+            claims.push(&vote.claim);
+        }
+    }
+    let candidates = claims.into_iter().map(|claim| (queries_for(claim), claim));
     // Of equal ones the first.
     let (queries, claim) =
         candidates.reduce(|best, next| if next.0.len() > best.0.len() { next } else { best })?;

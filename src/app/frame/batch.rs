@@ -12,7 +12,6 @@ use crate::app::App;
 use crate::app::theme;
 use crate::app::{Sends, ViewContext};
 use crate::diagnosis::Grade;
-use crate::localize::QueryResult;
 use crate::measure::Overview;
 use crate::palette;
 
@@ -22,14 +21,7 @@ const BAR: f32 = 22.0;
 const MAX: usize = 8;
 
 pub(crate) fn left(ui: &mut Ui, context: &ViewContext<'_>, panes: &mut Panes) {
-    let results: Vec<QueryResult> = context
-        .state
-        .results
-        .values()
-        .flatten()
-        .map(|result| result.shown(context.options.shows_truth))
-        .collect();
-    let overview = Overview::of(&results.iter().collect::<Vec<_>>());
+    let overview = context.state.results.overview(context.options.shows_truth);
     ui.add_space(4.0);
     for finding in &overview.findings {
         let color = theme::text(ui.visuals(), theme::ESTIMATE);
