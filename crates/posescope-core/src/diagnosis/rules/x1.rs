@@ -446,7 +446,7 @@ fn truth_by_matches(case: &Case<'_>, matches: &TrueMatches) -> Option<Diagnosis>
     let is_fixed =
         || case.deviation_m(matches).is_some_and(|m| m < case.length(super::r5::FIXED_M));
     let is_certain =
-        judged.acceptance.log10_nfa <= NEARLY_CERTAIN && 3 * inliers >= 2 * total && is_fixed();
+        judged.acceptance.log10_nfa <= NEARLY_CERTAIN && 2 * inliers >= total && is_fixed();
     let supports_truth = matches.funnel.lifted;
     // What the truth explains beyond chance is there: then both are, and the truth is not suspect.
     let is_supported = || case.would_accept(matches, &matches.true_ones());
