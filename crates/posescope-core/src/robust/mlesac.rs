@@ -1,5 +1,6 @@
 //! MLESAC: the pose under which all residuals are likeliest, found among random samples.
 
+use arrayvec::ArrayVec;
 use rand::SeedableRng;
 use rand::seq::index;
 use rand_pcg::Pcg64;
@@ -9,7 +10,8 @@ use super::likelihood::Likelihood;
 use super::local::{LocalOptimum, inliers, locally_optimized, residuals};
 use super::params::{MlesacParams, NEEDED, SAMPLE};
 use crate::camera::Intrinsics;
-use crate::solver::{Correspondence, p3p};
+use crate::geometry::Pose;
+use crate::solver::{Correspondence, MAX_SOLUTIONS, p3p};
 
 /// The pose `camera_from_points` that makes the reprojection errors of all `correspondences`
 /// likeliest.
@@ -26,8 +28,9 @@ use crate::solver::{Correspondence, p3p};
 /// 4. The inliers found say how many trials make it likely, at the wanted confidence, that a
 ///    sample of true matches was among them (Fischler, Bolles 1981).
 ///
-/// Where others draw a fourth correspondence to choose among the poses, the likelihood chooses
-/// with all of them: at 90 % false matches the fourth would be false nine times out of ten.
+/// The paper draws a fourth correspondence to choose among the poses. Here the likelihood of all of
+/// them chooses, because at 90 % false matches the fourth is false nine times out of ten.
+/// [`MlesacParams::fourth`] does as the paper.
 ///
 /// The outcome is a function of the input and the seed. The observer hears every trial, in order,
 /// and ends the run with an error.
@@ -56,11 +59,14 @@ pub fn mlesac<C>(
     let mut trials = 0;
     let mut trials_needed = params.max_trials;
     while trials < trials_needed {
-        let Some(sample) = index::sample_array::<_, SAMPLE>(&mut rng, found) else {
+        let Some((sample, fourth)) = draw(&mut rng, found, params) else {
             break;
         };
-        let solutions =
+        let mut solutions =
             p3p(&sample.map(|i| bearings[i]), &sample.map(|i| correspondences[i].point));
+        if let Some(fourth) = fourth {
+            solutions = nearest(&solutions, &correspondences[fourth], intrinsics);
+        }
         let hypothesis = likeliest(
             solutions.into_iter().map(|pose| Hypothesis { pose, score: likelihood.score(&pose) }),
         );
@@ -68,9 +74,13 @@ pub fn mlesac<C>(
         let old = best.map_or(f64::NEG_INFINITY, |best| best.hypothesis.score.log_likelihood);
         let improved = hypothesis.filter(|new| new.score.log_likelihood > old);
         if let Some(hypothesis) = improved {
-            let optimum =
-                locally_optimized(hypothesis, correspondences, intrinsics, params, &mut likelihood);
-            let wanted = trials_for(optimum.hypothesis.score.inliers, found, params.confidence);
+            let optimum = if params.local {
+                locally_optimized(hypothesis, correspondences, intrinsics, params, &mut likelihood)
+            } else {
+                LocalOptimum { hypothesis, refinement: None }
+            };
+            let inliers = optimum.hypothesis.score.inliers;
+            let wanted = trials_for(drawn(params), inliers, found, params.confidence);
             trials_needed = wanted.max(params.min_trials).min(params.max_trials);
             best = Some(optimum);
         }
@@ -104,6 +114,38 @@ pub fn mlesac<C>(
     })
 }
 
+/// Correspondences that a trial draws.
+fn drawn(params: &MlesacParams) -> usize {
+    SAMPLE + usize::from(params.fourth)
+}
+
+/// A random sample of `found` correspondences, and the fourth where it chooses; `None` where there are too few.
+fn draw(
+    rng: &mut Pcg64,
+    found: usize,
+    params: &MlesacParams,
+) -> Option<([usize; SAMPLE], Option<usize>)> {
+    if !params.fourth {
+        return Some((index::sample_array(rng, found)?, None));
+    }
+    let [a, b, c, fourth] = index::sample_array(rng, found)?;
+    Some(([a, b, c], Some(fourth)))
+}
+
+/// The solution that shows the fourth correspondence nearest to its pixel (the paper, appendix A.4); none where
+/// all have it behind the camera.
+fn nearest(
+    solutions: &[Pose],
+    fourth: &Correspondence,
+    intrinsics: &Intrinsics,
+) -> ArrayVec<Pose, MAX_SOLUTIONS> {
+    let error =
+        |pose: &&Pose| residuals(std::slice::from_ref(fourth), intrinsics, pose).first().copied();
+    let errors = solutions.iter().filter_map(|pose| Some((error(&pose)?, *pose)));
+    let in_front = errors.filter(|(error, _)| error.is_finite());
+    in_front.min_by(|a, b| f64::total_cmp(&a.0, &b.0)).map(|(_, pose)| pose).into_iter().collect()
+}
+
 /// The likeliest of the solutions of one sample, of equally likely ones the last.
 ///
 /// One whose likelihood is not a number says nothing about the others.
@@ -117,9 +159,9 @@ fn likeliest(solutions: impl Iterator<Item = Hypothesis>) -> Option<Hypothesis> 
 /// if `inliers` of `total` matches are true.
 ///
 /// `ln(1 − confidence) / ln(1 − P)`, `P` for drawing without putting back.
-fn trials_for(inliers: usize, total: usize, confidence: f64) -> usize {
+fn trials_for(drawn: usize, inliers: usize, total: usize, confidence: f64) -> usize {
     let all_true: f64 =
-        (0..SAMPLE).map(|k| inliers.saturating_sub(k) as f64 / (total - k) as f64).product();
+        (0..drawn).map(|k| inliers.saturating_sub(k) as f64 / (total - k) as f64).product();
     // An `as` cast saturates: no inliers ask for usize::MAX trials.
     ((1.0 - confidence).ln() / (-all_true).ln_1p()).ceil() as usize
 }
@@ -127,7 +169,6 @@ fn trials_for(inliers: usize, total: usize, confidence: f64) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::Pose;
     use crate::robust::LikelihoodScore;
     use nalgebra::{Point2, Point3, Vector2, Vector3};
     use rand::RngExt;
@@ -208,6 +249,31 @@ mod tests {
     }
 
     #[test]
+    fn a_fourth_correspondence_chooses_the_pose_that_shows_it_nearest() {
+        let [one, other] = [0.0, 1.0].map(|x| Pose::translation(x, 0.0, 0.0));
+        let behind = Pose::translation(0.0, 0.0, -9.0);
+        let point = Point3::new(0.0, 0.0, 5.0);
+        let pixel = KITTI.project(&(one * point)).expect("in front");
+        let fourth = Correspondence { pixel, point };
+        assert_eq!(nearest(&[other, one, behind], &fourth, &KITTI).as_slice(), [one]);
+        assert!(nearest(&[behind], &fourth, &KITTI).is_empty());
+        assert!(nearest(&[], &fourth, &KITTI).is_empty());
+    }
+
+    #[test]
+    fn as_the_paper_writes_it_the_pose_is_that_of_a_sample() {
+        let scene = scene(100, 50);
+        let params = MlesacParams { fourth: true, local: false, ..MlesacParams::default() };
+        let found = mlesac(&scene, &KITTI, &params, 1, |_| Ok::<_, ()>(())).expect("a consensus");
+        assert!(found.refinement.is_none());
+        let refined = run(&scene, 1).0.expect("a consensus");
+        let error = |pose: &Pose| (*pose * truth().inverse()).translation.vector.norm();
+        assert!(error(&found.pose) < 0.5, "{}", error(&found.pose));
+        assert!(error(&refined.pose) < error(&found.pose));
+        assert!(found.trials > refined.trials);
+    }
+
+    #[test]
     fn a_sample_has_no_index_twice_and_the_best_only_gets_better() {
         let (outcome, trials) = run(&scene(6, 2), 3);
         assert_eq!(outcome.expect("a consensus").trials, trials.len());
@@ -285,11 +351,13 @@ mod tests {
     #[test]
     fn trials_by_hand() {
         // All true: the first sample will do. None: never.
-        assert_eq!(trials_for(10, 10, 0.999), 0);
-        assert_eq!(trials_for(2, 10, 0.999), usize::MAX);
+        assert_eq!(trials_for(3, 10, 10, 0.999), 0);
+        assert_eq!(trials_for(3, 2, 10, 0.999), usize::MAX);
         // 5 of 10 are true: P = 5·4·3 / (10·9·8) = 1/12; ln 0.001 / ln (11/12) = 79.4.
-        assert_eq!(trials_for(5, 10, 0.999), 80);
+        assert_eq!(trials_for(3, 5, 10, 0.999), 80);
+        // With a fourth: P = 5·4·3·2 / (10·9·8·7) = 1/42; ln 0.001 / ln (41/42) = 286.7.
+        assert_eq!(trials_for(4, 5, 10, 0.999), 287);
         // One in ten of many: about 7,000.
-        assert!((6_900..7_000).contains(&trials_for(100_000, 1_000_000, 0.999)));
+        assert!((6_900..7_000).contains(&trials_for(3, 100_000, 1_000_000, 0.999)));
     }
 }

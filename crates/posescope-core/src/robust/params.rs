@@ -33,6 +33,11 @@ parameters! {
         pub min_trials: usize = 100 => count("min_trials", "", 1..=10_000_000),
         /// MLESAC: rounds of expectation–maximisation for the mixing weight of a hypothesis.
         pub em_iterations: usize = 3 => count("em_iterations", "", 1..=1000),
+        /// MLESAC: whether a fourth correspondence chooses among the poses of a sample of three, as in the paper;
+        /// otherwise the likelihood of all correspondences chooses.
+        pub fourth: bool = false => flag("fourth"),
+        /// MLESAC: whether a hypothesis that is better than all before is refined on its inliers.
+        pub local: bool = true => flag("local"),
         /// Refinement: loss of a residual.
         pub loss: LossShape = LossShape::Huber => choice("loss"),
         /// Refinement: residual from which the loss grows more slowly than quadratically; not used by least
