@@ -23,7 +23,7 @@ pub use feature::{
     DepthRule, FeatureBased, FeatureParams, GuidedParams, count_matches, projected_cloud,
 };
 pub use given::Given;
-pub use hybrid::{Hybrid, HybridParts, hybrid_outcome};
+pub use hybrid::{Hybrid, HybridParams, HybridParts, hybrid_outcome};
 pub(crate) use joint::{JointReference, estimate_jointly};
 pub use mi6::SixFreedoms;
 pub use robust::{Robust, RobustParams};

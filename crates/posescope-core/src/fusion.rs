@@ -157,7 +157,7 @@ pub struct Candidate<'a> {
 /// back.
 ///
 /// HY falls back for the query, not for each reference: if any weighted reference has an FB pose, MI poses are
-/// ignored.
+/// ignored. With `hy.per_reference`, no candidate is called a fallback, and all poses are averaged.
 ///
 /// Returns the share of each candidate too, in their order.
 ///

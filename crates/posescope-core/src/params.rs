@@ -14,7 +14,9 @@ use crate::scale::Scale;
 
 pub use crate::descent::DescentParams;
 pub use crate::describe::{About, Described, Domain, ParamError, Value};
-pub use crate::estimator::{DepthRule, FeatureParams, GuidedParams, RobustParams, SixParams};
+pub use crate::estimator::{
+    DepthRule, FeatureParams, GuidedParams, HybridParams, RobustParams, SixParams,
+};
 pub use crate::judge::{Channels, JudgeParams};
 pub use crate::render::RenderParams;
 
@@ -35,6 +37,8 @@ pub struct Params {
     /// `pm`, `mi` and so on: a group for each registered cost.
     #[doc(hidden)]
     pub costs: CostSettings,
+    /// `hy`: FB's and MI's poses of several references.
+    pub hy: HybridParams,
     /// `descent`: going down by derivatives, where `search` of a cost says so.
     pub descent: DescentParams,
     /// `fb2`: matching twice.
@@ -96,6 +100,7 @@ impl Params {
         for (group, params) in self.costs.groups() {
             visit(group, params);
         }
+        visit("hy", &mut self.hy);
         visit("descent", &mut self.descent);
         visit("fb2", &mut self.fb2);
         visit("judge", &mut self.judge);

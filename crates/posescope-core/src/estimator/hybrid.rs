@@ -3,6 +3,10 @@
 //! HY, that of the paper (section 2.4), is FB and MI: FB is the more accurate where it finds enough
 //! matches, MI still gives a moderate pose where FB finds none.
 
+mod params;
+
+pub use params::HybridParams;
+
 use super::{Estimator, Outcome, entry};
 use crate::event::{BranchTaken, Stage};
 use crate::geometry::Pose;

@@ -118,6 +118,34 @@ fn a_fused_hybrid_takes_the_first_methods_poses_alone_where_a_reference_has_one(
 }
 
 #[test]
+fn with_hy_per_reference_a_fused_hybrid_averages_the_poses_of_both_methods() {
+    let scene = Walls::new();
+    let mut params = Params::default();
+    params.hy.per_reference = true;
+    let localizer = Localizer::new(&scene, &scene, &params, 7);
+    let request = Request {
+        radius_m: 0.7,
+        references: vec![0, 2].into(),
+        fusions: vec!["avg".parse().expect("a fusion")],
+        setting: None,
+    };
+    let mut results = Vec::new();
+    let keep = |result: QueryResult, _| {
+        results.push(result);
+        Ok::<(), LocalizeError>(())
+    };
+    localizer.localize(0, 1, &[request], &[Method::HY], &mut NoObserver, keep).expect("good data");
+    let hybrid = results.pop().expect("a result");
+    let alone = hybrid.per_reference.as_deref().expect("two references");
+    let position = |result: &QueryResult| result.pose.as_ref().expect("a pose").position_m;
+    let [fused, first, second] = [position(&hybrid), position(&alone[0]), position(&alone[1])];
+    for axis in 0..3 {
+        let mean = (first[axis] + second[axis]) / 2.0;
+        assert!((fused[axis] - mean).abs() < 1e-9, "{fused:?} {mean}");
+    }
+}
+
+#[test]
 fn the_cost_at_the_truth_is_that_of_the_true_pose_and_absent_without_one() {
     let problem = solvable();
     let params = Params::default();

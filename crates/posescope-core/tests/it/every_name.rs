@@ -37,7 +37,7 @@ use posescope_core::image::{
 use posescope_core::nalgebra::{Matrix3x4, Point2, Point3};
 use posescope_core::params::{
     About, Channels, DepthRule, DescentParams, Described, Domain, FeatureParams, GuidedParams,
-    JudgeParams, ParamError, RenderParams, RobustParams, SixParams, Value,
+    HybridParams, JudgeParams, ParamError, RenderParams, RobustParams, SixParams, Value,
 };
 use posescope_core::retrieval::{
     Affine, BuildError, BuildProgress, BuildRequest, BuildStep, BuildSummary, Clustering,
@@ -277,6 +277,8 @@ fn parameters_are_set_by_name_or_field() {
     );
     let (surf, grid): (&SurfParams, &GridParams) = (&params.surf, &params.grid);
     let (fb, fb2): (&FeatureParams, &GuidedParams) = (&params.fb, &params.fb2);
+    let hy: &HybridParams = &params.hy;
+    assert!(!hy.per_reference);
     let (mi6, robust): (&SixParams, &RobustParams) = (&params.mi6, &params.robust);
     let (judge, render): (&JudgeParams, &RenderParams) = (&params.judge, &params.render);
     let (descent, surface): (&DescentParams, &SurfaceParams) = (&params.descent, &params.surface);

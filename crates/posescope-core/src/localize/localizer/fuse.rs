@@ -68,7 +68,7 @@ impl Localizer<'_> {
                 reference: &problem.reference.name,
                 matches: *matches,
                 pose: candidate.outcome.pose.as_ref(),
-                fell_back: candidate.outcome.fell_back,
+                fell_back: candidate.outcome.fell_back && !self.params.hy.per_reference,
             })
             .collect();
         observer.begin_fusion(method);
