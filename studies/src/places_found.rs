@@ -2,9 +2,11 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use posescope::features::{Features, surf};
-use posescope::geometry::PoseError;
+use posescope::geometry::{Pose, PoseError};
+use posescope::image::Photo;
 use posescope::params::Params;
 use posescope::retrieval::{Index, Ranked};
+use posescope::scene::street::{Condition, Size, Traversal, WORLD_SEED};
 use posescope::scene::{self, IndexOptions, Retriever, Scene};
 use rayon::prelude::*;
 
@@ -14,11 +16,16 @@ use crate::numbers::{median, percent, print_table};
 /// A retrieved frame shows the place of the query within this distance \[m\].
 const PLACE_M: f64 = 5.0;
 
+/// Numbers of inliers that could be asked for.
+const INLIERS: [usize; 9] = [6, 8, 10, 12, 14, 16, 20, 25, 30];
+
 /// How often does retrieval find the place of a photo, from photos of the same or of other weather?
 ///
 /// The first scene is indexed but for some frames, evenly spread, which are its queries; of the other scenes, evenly
 /// spread frames are asked for. A query counts as found in the top K if one of the first K frames was taken within 5 m
 /// of it. Nothing restricts the search to a part of the scene.
+///
+/// A second table says, for a number of inliers, how many first frames have as many, and how many of these are right.
 #[derive(clap::Args)]
 pub struct Options {
     #[arg(required = true)]
@@ -29,6 +36,9 @@ pub struct Options {
     /// Queries of each other scene.
     #[arg(long, default_value_t = 100)]
     queries: usize,
+    /// Queries of another town of the street, which no frame shows.
+    #[arg(long, default_value_t = 0)]
+    elsewhere: usize,
     #[arg(long, default_value_t = 10_000)]
     words: usize,
     #[arg(long, default_value_t = 0)]
@@ -66,44 +76,58 @@ pub fn run(options: &Options) -> Result<(), Failure> {
         Retriever::build(references.as_ref(), &path, &request, &params, |_| {})?;
     }
     let index = Index::open(&path, params.retrieval.checks)?;
-    let mut rows = Vec::new();
+    let mut of_all: Vec<(String, Vec<Answer>)> = Vec::new();
     for (number, argument) in options.scenes.iter().enumerate() {
         let queries = scene::open(argument, None)?;
         let frames = match number {
             0 => held_out.clone(),
             _ => evenly_spread(queries.frames().len(), options.queries),
         };
-        let answers = ask(&index, &params, references.as_ref(), queries.as_ref(), &frames)?;
-        rows.push(row(queries.name(), &answers));
+        let asked = frames.into_par_iter().map(|frame| {
+            let photo = queries.photo(frame)?.gray;
+            Ok((queries.pose(frame), surf(&photo, &params.retrieval.surf(&params.surf))))
+        });
+        let asked: Result<Vec<_>, scene::SceneError> = asked.collect();
+        let answers = ask(&index, &params, references.as_ref(), asked?);
+        of_all.push((queries.name().to_owned(), answers));
+    }
+    if options.elsewhere > 0 {
+        let town = Traversal::new(WORLD_SEED + 1, Condition::Overcast, Size::Full);
+        let frames = evenly_spread(town.frame_count(), options.elsewhere).into_par_iter();
+        let asked = frames.map(|frame| {
+            let photo = Photo::from_color(town.image(frame)).gray;
+            (None, surf(&photo, &params.retrieval.surf(&params.surf)))
+        });
+        let answers = ask(&index, &params, references.as_ref(), asked.collect());
+        of_all.push(("another town".to_owned(), answers));
     }
     const HEAD: &str =
         "query,queries,top 1,top 5,verified: top 1,top 5,first is verified,its inliers,time (ms)";
+    let rows: Vec<_> = of_all.iter().map(|(name, answers)| row(name, answers)).collect();
     print_table(HEAD, &rows);
+    let names: Vec<&str> = of_all.iter().map(|(name, _)| name.as_str()).collect();
+    let rows: Vec<_> = INLIERS.iter().map(|&inliers| accepted(inliers, &of_all)).collect();
+    print_table(&format!("inliers,{},all", names.join(",")), &rows);
     let counts = index.description().counts;
     println!("{} frames of {}, {} words", counts.documents, references.name(), counts.words);
     Ok(())
 }
 
+/// Asks for the places of features. A query without a pose shows none of them.
 fn ask(
     index: &Index,
     params: &Params,
     references: &dyn Scene,
-    queries: &dyn Scene,
-    frames: &[usize],
-) -> Result<Vec<Answer>, Failure> {
-    let detector = params.retrieval.surf(&params.surf);
+    queries: Vec<(Option<Pose>, Features)>,
+) -> Vec<Answer> {
     let mut unverified = params.retrieval;
     unverified.verify = 0;
-    let features = frames.par_iter().map(|&frame| Ok(surf(&queries.photo(frame)?.gray, &detector)));
-    let features: Result<Vec<Features>, scene::SceneError> = features.collect();
-    let known = frames
-        .iter()
-        .zip(features?)
-        .filter_map(|(&frame, features)| Some((queries.pose(frame)?, features)));
-    let answers = known.map(|(truth, features)| {
+    let answers = queries.into_iter().map(|(truth, features)| {
         let is_there = |ranked: &Ranked| {
-            let pose = references.pose(ranked.frame);
-            pose.is_some_and(|pose| PoseError::between(&truth, &pose).translation_m <= PLACE_M)
+            let poses = truth.zip(references.pose(ranked.frame));
+            poses.is_some_and(|(truth, pose)| {
+                PoseError::between(&truth, &pose).translation_m <= PLACE_M
+            })
         };
         let by_scores = index.query(&features, &unverified, |_| true).ranked;
         let started = Instant::now();
@@ -116,7 +140,24 @@ fn ask(
                 .map(|ranked| [1, 5].map(|top| ranked.iter().take(top).any(is_there))),
         }
     });
-    Ok(answers.collect())
+    answers.collect()
+}
+
+/// How many first frames have so many inliers, and how many of these are right.
+fn accepted(inliers: usize, of_all: &[(String, Vec<Answer>)]) -> Vec<String> {
+    let cell = |answers: &mut dyn Iterator<Item = &Answer>| {
+        let [mut all, mut accepted, mut right] = [0; 3];
+        for answer in answers {
+            all += 1;
+            let is_accepted = answer.inliers.is_some_and(|found| found >= inliers);
+            accepted += usize::from(is_accepted);
+            right += usize::from(is_accepted && answer.is_found[1][0]);
+        }
+        format!("{accepted} of {all}: {right} right")
+    };
+    let cells = of_all.iter().map(|(_, answers)| cell(&mut answers.iter()));
+    let all = cell(&mut of_all.iter().flat_map(|(_, answers)| answers));
+    [inliers.to_string()].into_iter().chain(cells).chain([all]).collect()
 }
 
 fn row(name: &str, answers: &[Answer]) -> Vec<String> {

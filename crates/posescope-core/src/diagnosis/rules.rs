@@ -227,7 +227,9 @@ impl Code {
     /// The verdict that a method's own failure is.
     pub fn of(failure: &Failure) -> Self {
         match failure {
-            Failure::NothingInView { .. } | Failure::NoReference { .. } => Self::R1,
+            Failure::NothingInView { .. }
+            | Failure::NoReference { .. }
+            | Failure::NotRecognised { .. } => Self::R1,
             Failure::TooFewFeatures { .. } => Self::R2,
             Failure::TooFewMatches { .. }
             | Failure::NoConsensus { .. }

@@ -126,6 +126,20 @@ pub enum Failure {
         /// Where references were sought, around the query's known position \[m\].
         radius_m: Option<f64>,
     },
+    /// Retrieval ranked frames, and none resembles the query enough.
+    #[error(
+        "No place recognised: the best of {ranked} ranked frames, {best}, has {inliers} inliers, at least {needed} needed."
+    )]
+    NotRecognised {
+        /// Frames that were ranked.
+        ranked: usize,
+        /// The name of the first one.
+        best: String,
+        /// Its inliers.
+        inliers: usize,
+        /// How many it would need.
+        needed: usize,
+    },
     /// Several references were to be fused, and each failed by itself.
     #[error(
         "No reference gave a pose; {weighed} of {references} had enough matches. The best, {best}: {failure}"

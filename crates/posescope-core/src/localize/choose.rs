@@ -6,7 +6,7 @@ use super::observer::checkpoint;
 use super::select::{ByMatches, ChoiceError, Ranking, References, Selection, draw, frames_within};
 use super::{LocalizeObserver, Localizer};
 use crate::params::Params;
-use crate::retrieval::{RankedReference, ReferenceRanking};
+use crate::retrieval::{Criterion, RankedReference, ReferenceRanking};
 
 /// Chooses references for queries.
 pub struct Chooser<'a> {
@@ -97,15 +97,25 @@ impl Chooser<'_> {
                 ranked,
             })
             .collect();
-        let chosen = frames.iter().take(count);
+        // Matches are not verified, and all accepted.
+        let needed = match by.criterion() {
+            Criterion::Words => self.params.retrieval.accept,
+            Criterion::Matches => 0,
+        };
+        let chosen: Vec<usize> = frames
+            .iter()
+            .take(count)
+            .filter(|reference| reference.ranked.inliers() >= needed)
+            .map(|reference| reference.ranked.frame)
+            .collect();
         Ok(References {
-            frames: chosen.map(|reference| reference.ranked.frame).collect(),
             ranking: Some(Arc::new(ReferenceRanking {
                 criterion: by.criterion(),
                 candidates: candidates.len(),
-                chosen: count.min(frames.len()),
+                chosen: chosen.len(),
                 frames,
             })),
+            frames: chosen,
             within_m: None,
         })
     }

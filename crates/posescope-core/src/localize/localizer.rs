@@ -257,7 +257,7 @@ impl<'a> Localizer<'a> {
                     emit(Answer { result: self.marked(result, request.setting), times, asked })
                 };
                 if members.is_empty() {
-                    let failure = Failure::NoReference { radius_m: request.references.within_m };
+                    let failure = self.without_reference(&request.references);
                     let fusions = request.fusions.iter().copied().map(Some);
                     let lines =
                         if request.fusions.is_empty() { vec![None] } else { fusions.collect() };
@@ -291,6 +291,22 @@ impl<'a> Localizer<'a> {
             }
         }
         Ok(())
+    }
+
+    /// Why a query has no reference.
+    fn without_reference(&self, references: &References) -> Failure {
+        let ranking = references.ranking.as_deref();
+        let best =
+            ranking.and_then(|ranking| Some((ranking.frames.len(), ranking.frames.first()?)));
+        match best {
+            Some((ranked, best)) => Failure::NotRecognised {
+                ranked,
+                best: best.name.clone(),
+                inliers: best.ranked.inliers(),
+                needed: self.params.retrieval.accept,
+            },
+            None => Failure::NoReference { radius_m: references.within_m },
+        }
     }
 
     /// Reports each ranking once, even if several requests share it.

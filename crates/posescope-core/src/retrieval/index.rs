@@ -48,6 +48,11 @@ impl Ranked {
             Geometry::Unchecked | Geometry::Refused => None,
         }
     }
+
+    /// Inliers of the verification; 0 without one.
+    pub fn inliers(&self) -> usize {
+        self.verification().map_or(0, |found| found.inliers)
+    }
 }
 
 /// What the index answers.

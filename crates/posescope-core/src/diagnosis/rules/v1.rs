@@ -45,6 +45,9 @@ evidence!(Ranked {
     radius_m: f64,
 } => {
     let place = match (rank_of_right_place, taken) {
+        (Some(rank), 0) => {
+            format!("ranked the right place {}, and accepted no frame", ordinal(*rank))
+        }
         (Some(rank), 1) => {
             format!("ranked the right place {}, and only the first is used", ordinal(*rank))
         }
