@@ -95,8 +95,8 @@ fn report(scene: &dyn Scene, found: &Examination, width: Option<usize>) -> Strin
         );
         line("way", &words);
     }
-    if let Some([images, length_km, spacing_m]) = paper_scene(scene.name()) {
-        let words = format!("{images} images, {length_km} km, {spacing_m} m between images");
+    if let Some([images, tag, length_km, spacing_m]) = paper_scene(scene.name()) {
+        let words = format!("{tag}, {images} images, {length_km} km, {spacing_m} m between images");
         line("paper", &words);
     }
     for (frame, points, depth) in &there.clouds {

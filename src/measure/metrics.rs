@@ -75,7 +75,7 @@ impl std::fmt::Display for Group {
 }
 
 /// Median and root mean square of errors.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Spread {
     /// The number of errors.
     pub count: usize,
@@ -150,6 +150,9 @@ pub struct Measures {
     pub success_rate: f64,
     /// Errors of the successes.
     pub of_successes: Spread,
+    /// Errors of the queries that the method reports as solved, whatever the error.
+    #[serde(default)]
+    pub of_solved: Spread,
     /// Errors of the queries that every method reports as solved, whatever the errors.
     pub of_common: Spread,
     /// Shares of the queries within [`RECALL_LIMITS`], with failures counted as infinite; `None` if the truth is
@@ -199,6 +202,10 @@ impl Measures {
             "median_deg" => own.median_deg,
             "rmse_m" => own.rmse_m,
             "rmse_deg" => own.rmse_deg,
+            "solved_median_m" => self.of_solved.median_m,
+            "solved_median_deg" => self.of_solved.median_deg,
+            "solved_rmse_m" => self.of_solved.rmse_m,
+            "solved_rmse_deg" => self.of_solved.rmse_deg,
             "common" => Some(common.count as f64),
             "common_percent" => Some(self.share(common.count)),
             "common_median_m" => common.median_m,
@@ -271,6 +278,7 @@ fn measure_group(group: &Group, rows: &[&QueryResult], failure_radius_m: f64) ->
             successes: count(&success),
             success_rate: share(count(&success), rows.len()),
             of_successes: errors_of(&success),
+            of_solved: errors_of(&|row| row.status == Status::Ok),
             of_common: errors_of(&|row| is_common(&row.query)),
             recall: None,
             verdicts: BTreeMap::new(),

@@ -31,6 +31,8 @@ pub enum Plot {
     Verdicts,
     /// Success rate over what an experiment varies.
     Success,
+    /// Share that the methods report as solved, likewise: the paper's figures 11 and 12.
+    Solved,
     /// Share of the queries within an error.
     Recall,
     /// Primary failure verdicts over the distance of the reference.
@@ -53,9 +55,10 @@ impl Plot {
         match self {
             Self::Errors => errors(&run.results).into_iter().collect(),
             Self::Verdicts => verdicts(&run.measures).into_iter().collect(),
-            Self::Success if !varies(&run.measures) => {
+            Self::Success | Self::Solved if !varies(&run.measures) => {
                 let all: Vec<&Measures> = run.measures.iter().collect();
-                let chart = success("Success rate".to_owned(), "scenes", &all, brief_scenes);
+                let rate = self.rate();
+                let chart = rates(rate.title.to_owned(), "scenes", &all, brief_scenes, &rate);
                 chart.into_iter().collect()
             }
             _ => {
@@ -77,9 +80,9 @@ impl Plot {
         };
         match self {
             Self::Errors | Self::Verdicts => Vec::new(),
-            Self::Success => {
-                let axis = "uncertainty radius, and references";
-                let chart = success(titled("Success rate"), axis, &measures, setting);
+            Self::Success | Self::Solved => {
+                let (axis, rate) = ("uncertainty radius, and references", self.rate());
+                let chart = rates(titled(rate.title), axis, &measures, setting, &rate);
                 chart.into_iter().collect()
             }
             Self::Recall => {
@@ -106,6 +109,25 @@ impl Plot {
             ),
         }
     }
+
+    /// What the bars of the success plot, or of that of solved queries, show.
+    fn rate(self) -> Rate {
+        let success =
+            Rate { title: "Success rate", axis: "success rate (%)", of: |one| one.success_rate };
+        let solved = Rate {
+            title: "Queries reported as solved",
+            axis: "reported as solved (%)",
+            of: |one| one.share(one.poses),
+        };
+        if self == Self::Solved { solved } else { success }
+    }
+}
+
+/// A share of the queries that bars show.
+struct Rate {
+    title: &'static str,
+    axis: &'static str,
+    of: fn(&Measures) -> f64,
 }
 
 fn legend(methods: impl IntoIterator<Item = Method>) -> Vec<(String, palette::Rgb)> {
@@ -217,13 +239,14 @@ fn brief_scenes(one: &Measures) -> String {
     }
 }
 
-/// Success rates as bars: one group per name, one bar per method, and only r-wavg of several fusions. `None` if
-/// there is only one group.
-fn success(
+/// Rates as bars: one group per name, one bar per method, and only r-wavg of several fusions. `None` if there is
+/// only one group.
+fn rates(
     title: String,
     axis: &str,
     measures: &[&Measures],
     name: fn(&Measures) -> String,
+    shown: &Rate,
 ) -> Option<Chart> {
     let is_shown = |one: &&&Measures| one.group.fusion.is_none_or(|fusion| fusion.name == "r-wavg");
     let groups = grouped(measures.iter().filter(is_shown).map(|one| (name(one), *one)));
@@ -233,7 +256,7 @@ fn success(
         let width = 0.84 / of_group.len().max(1) as f64;
         for (place, one) in of_group.iter().enumerate() {
             let left = at as f64 + 0.08 + width * place as f64;
-            let (right, rate) = (left + 0.9 * width, 100.0 * one.success_rate);
+            let (right, rate) = (left + 0.9 * width, 100.0 * (shown.of)(one));
             let (from, to) = ((left, 0.0), (right, rate));
             let words = format!("{} {name}: {rate:.0} %", one.method.label());
             let color = palette::method(one.method);
@@ -247,7 +270,7 @@ fn success(
         title,
         x: Axis::named(axis, groups.iter().map(|group| group.0.clone()))
             .long((bars * BAR_PX).max(500.0)),
-        y: Axis::percent("success rate (%)"),
+        y: Axis::percent(shown.axis),
         marks,
         legend: legend(methods),
     })

@@ -382,7 +382,7 @@ impl<'a> Filling<'a> {
             name += &format!("-{}", slug(pair));
             caption += &format!(": {pair}");
         }
-        if has_papers && names.iter().any(|name| name.starts_with("rmse")) {
+        if has_papers && names.iter().any(|name| name.contains("rmse")) {
             caption += &format!(". {RMSE_FOOTNOTE}");
         }
         let mut table = Table::new(name, caption, header);

@@ -90,17 +90,23 @@ fn the_single_table_has_medians_over_queries_solved_by_all_and_the_papers_figure
     let rotation = lines(&tables, "single-rotation-kitti-00");
     assert_eq!(rotation[4], "FB | 0.100 | 0.250");
     assert_eq!(rotation[5], "FB (paper) | 1.76 | 3.83");
-    let success = lines(&tables, "single-success-kitti-00");
-    assert_eq!(success, ["FB | 100.0 | 50.0", "MI | 100.0 | 50.0"]);
+    let solved = [
+        "FB (solved) | 100.0 | 50.0",
+        "FB (success) | 100.0 | 50.0",
+        "MI (solved) | 100.0 | 100.0",
+        "MI (success) | 100.0 | 50.0",
+    ];
+    assert_eq!(lines(&tables, "single-solved-kitti-00"), solved);
     // Failures are infinite: half of the queries at 15 m is within no limit for fb.
     assert!(lines(&tables, "summary")[2].ends_with("| 0.0 | 50.0 | 50.0"));
 }
 
 #[test]
-fn the_multi_table_has_the_rmse_over_the_successes_of_each_fusion() {
+fn the_multi_table_has_the_rmse_over_all_queries_that_each_fusion_solved() {
+    // 17 m is no success, and counts: the table is over what the method reports as solved.
     let mut rows = Vec::new();
     for (query, one, avg, robust) in
-        [("a", Some(3.0), Some(1.0), Some(0.6)), ("b", None, Some(7.0), Some(0.8))]
+        [("a", Some(3.0), Some(7.0), Some(0.6)), ("b", None, Some(17.0), Some(0.8))]
     {
         for method in ["fb", "mi"] {
             for (count, fusion, error) in
@@ -111,18 +117,21 @@ fn the_multi_table_has_the_rmse_over_the_successes_of_each_fusion() {
         }
     }
     let tables = tables(&RunResults::of(rows, 10.0), Some("multi"));
-    // √((1 + 49)/2) = 5, √((0.36 + 0.64)/2) = 0.707; angles are half of that.
+    // √((49 + 289)/2) = 13, √((0.36 + 0.64)/2) = 0.707; angles are half of that.
     assert_eq!(
         lines(&tables, "multi-rmse-street")[..4],
         [
-            "FB | avg | 3.000 | 1.500 | 5.000 | 2.500",
-            "FB | avg (median) | 3.000 | 1.500 | 4.000 | 2.000",
+            "FB | avg | 3.000 | 1.500 | 13.000 | 6.500",
+            "FB | avg (median) | 3.000 | 1.500 | 12.000 | 6.000",
             "FB | r-wavg | 3.000 | 1.500 | 0.707 | 0.354",
             "FB | r-wavg (median) | 3.000 | 1.500 | 0.700 | 0.350",
         ]
     );
-    let success = lines(&tables, "multi-success-street");
-    assert_eq!(success[0], "FB | avg | 50.0 | 100.0");
+    let solved = lines(&tables, "multi-solved-street");
+    assert_eq!(
+        solved[..2],
+        ["FB | avg (solved) | 50.0 | 100.0", "FB | avg (success) | 50.0 | 50.0"]
+    );
 }
 
 #[test]
