@@ -151,8 +151,8 @@ pub struct Everywhere {
 /// Changes to the parameters' defaults.
 #[derive(Clone, Debug, Default, Args)]
 pub struct ConfigArgs {
-    /// Read parameters from a TOML file with one table per group
-    #[arg(long, value_name = "FILE.toml")]
+    /// Read parameters from a TOML file with one table per group; `paper` runs the estimators as the paper writes them
+    #[arg(long, value_name = "FILE.toml|paper")]
     #[arg(help_heading = "Methods", hide_short_help = true)]
     pub config: Option<PathBuf>,
     /// Set a parameter, for example fb.ratio=0.7; repeatable; `posescope params` lists them
@@ -169,7 +169,10 @@ impl ConfigArgs {
     /// These parameters with the changes of the arguments.
     pub fn over(&self, mut params: Params) -> Result<Params, CliError> {
         if let Some(path) = &self.config {
-            let text = std::fs::read_to_string(path).map_err(CliError::io(path))?;
+            let text = match path.to_str() {
+                Some("paper") => include_str!("../../assets/paper.toml").to_owned(),
+                _ => std::fs::read_to_string(path).map_err(CliError::io(path))?,
+            };
             params
                 .merge_toml(&text)
                 .map_err(|source| CliError::Config { path: path.clone(), source })?;
@@ -202,6 +205,20 @@ mod tests {
             }
             other => panic!("{other:?}"),
         }
+    }
+
+    #[test]
+    fn the_papers_configuration_is_known_and_options_override_it() {
+        let given =
+            task(&["run", "street", "--query", "70", "--config", "paper", "--set", "fb.ratio=0.8"])
+                .params;
+        let defaults = Params::default();
+        assert_eq!(given.fb.ratio, 0.8);
+        assert!(given.fb.mlesac.fourth && !given.fb.mlesac.local && !given.surf.upright);
+        assert_eq!(given.grid.coverage_floor, 0.0);
+        let changed =
+            given.list().into_iter().zip(defaults.list()).filter(|(a, b)| a.value != b.value);
+        assert_eq!(changed.count(), 9);
     }
 
     #[test]
