@@ -26,9 +26,12 @@ pub struct Photo {
 }
 
 impl Photo {
-    /// A photo with colours; its grey values are their luma (Rec. 709).
+    /// A photo with colours; its grey values are their luma (Rec. 601), as of Matlab's `rgb2gray`, which the
+    /// paper's authors used.
     pub fn from_color(color: RgbImage) -> Self {
-        Self { gray: image::imageops::grayscale(&color), color: Some(color) }
+        let luma = color.pixels().map(|pixel| luma(pixel.0)).collect();
+        let gray = GrayImage::from_raw(color.width(), color.height(), luma).unwrap_or_default();
+        Self { gray, color: Some(color) }
     }
 
     /// A photo of a grey camera from its values, row by row from the top left.
@@ -72,6 +75,12 @@ impl Photo {
         let color = self.color.as_ref().map_or(0, |color| color.as_raw().len());
         self.gray.as_raw().len() + color
     }
+}
+
+/// The luma of a colour (Rec. 601), rounded.
+fn luma([red, green, blue]: [u8; 3]) -> u8 {
+    let [red, green, blue] = [red, green, blue].map(u32::from);
+    ((299 * red + 587 * green + 114 * blue + 500) / 1000) as u8
 }
 
 /// The image convolved with a Gaussian of `sigma` \[px\]; `sigma` 0 returns it as it is.
@@ -165,6 +174,13 @@ mod tests {
             let expected = format!("{given} grey values given, 3 x 2 px need 6");
             assert_eq!(refused.to_string(), expected);
         }
+    }
+
+    #[test]
+    fn grey_values_of_a_colour_are_those_of_rgb2gray() {
+        let colors = [[255, 0, 0], [0, 255, 0], [0, 0, 255], [255; 3], [0; 3], [10, 20, 30]];
+        let image = RgbImage::from_raw(6, 1, colors.concat()).expect("six pixels");
+        assert_eq!(Photo::from_color(image).gray.as_raw(), &[76, 150, 29, 255, 0, 18]);
     }
 
     #[test]
