@@ -29,7 +29,7 @@ picture R3 street:snow street:night 450 450 fb
 picture R4 street street 589 583 fb --method fb --set surf.max_keypoints=600 --set fb.depth_radius=0.3
 picture R5 street street:sun 322 333 fb --method fb --set surf.max_keypoints=400
 picture R6 street street 589 583 fb --method fb --set surf.max_keypoints=600 --set fb.max_trials=2
-picture R7 street street:rain 180 174 fb --method fb
+picture R7 street street:rain 203 207 fb --method fb
 picture R8 street street 802 789 fb
 picture R9 street street 589 574 fb --method fb,mi --radius 8
 picture D1 street:snow street:night 212 217 pm
@@ -39,9 +39,9 @@ picture D4 street:snow street:night 138 122 mi
 picture D5 street street 589 583 mi --method mi --degrade fog=1
 picture D6 street:snow street:night 356 357 pm
 picture D7 street street 583 589 mi
-picture D8 street street:night 147 154 pm --method pm
-picture H1 street street:night 147 154 hy --method fb,mi,hy
-picture F1 street street:night 147 154 fb --method fb --reference 150 --reference 143 --fusion avg
+picture D8 street street:rain 390 399 pm --method pm
+picture H1 street street:sun 167 153 hy --method fb,mi,hy
+picture F1 street street:rain 224 219 fb --method fb --reference 218 --reference 237 --fusion avg
 picture F2 street street 589 583 end --method mi6 --reference 595 --fusion joint
 picture V1 street street:snow 75 retrieved end --method fb --reference retrieve:1 --prior 400 \
     --index "$made/street.index"

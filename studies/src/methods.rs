@@ -37,7 +37,7 @@ pub struct Options {
     /// Poses that are better than those of --scene: lines of a frame's name and a 3 × 4 matrix.
     #[arg(long)]
     truth: Option<PathBuf>,
-    /// A method and its settings, as "mi6 mi6.yaws=1"; repeatable.
+    /// A method and its settings, as "mi6 mi6.yaws=1", or those of --config paper, as "fb paper"; repeatable.
     #[arg(long, default_values = ["fb", "pm", "mi", "hy"])]
     method: Vec<Asked>,
     /// Pairs of conditions: all, equal, other, the conditions of which all pairs are taken, as overcast,night, or pairs
@@ -69,7 +69,10 @@ impl FromStr for Asked {
         let mut words = text.split_whitespace();
         let method = words.next().ok_or("the name of a method expected")?.parse()?;
         let mut params = Params::default();
-        words.try_for_each(|assignment| params.assign(assignment))?;
+        words.try_for_each(|word| match word {
+            "paper" => params.merge_toml(include_str!("../../assets/paper.toml")),
+            assignment => params.assign(assignment),
+        })?;
         Ok(Self { label: text.to_owned(), method, params })
     }
 }

@@ -121,7 +121,7 @@ fn go_through(page: &str) {
 }
 
 /// The pages with commands of ours. Those with many have a test of their own, so that they run side by side.
-const PAGES: [&str; 12] = [
+const PAGES: [&str; 13] = [
     "README.md",
     "ci.md",
     "compute.md",
@@ -129,6 +129,7 @@ const PAGES: [&str; 12] = [
     "lessons.md",
     "methods.md",
     "other-systems.md",
+    "paper.md",
     "recordings.md",
     "results.md",
     "retrieval.md",
@@ -196,7 +197,7 @@ fn the_page_on_scenes_can_be_followed() {
 #[test]
 #[ignore = "runs every command of a page; .ci/nightly runs it"]
 fn the_pages_with_a_command_or_two_can_be_followed() {
-    for page in ["methods.md", "recordings.md", "results.md", "street.md"] {
+    for page in ["methods.md", "paper.md", "recordings.md", "results.md", "street.md"] {
         go_through(page);
     }
 }
