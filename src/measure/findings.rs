@@ -16,6 +16,8 @@ use crate::localize::QueryResult;
 const MIN_QUERIES: usize = 3;
 /// Values agree if they differ by no more than this share.
 const AGREEING: f64 = 0.02;
+/// The share of all queries that must agree if fewer than [`MIN_QUERIES`] of them are certain.
+const COMMON_HINT: f64 = 0.25;
 
 /// A mistake that several queries agree on.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -49,6 +51,8 @@ enum Claim {
 struct Vote<'a> {
     query: &'a str,
     claim: Claim,
+    /// Whether the query alone is nearly certain of it; else it is a hint.
+    certain: bool,
 }
 
 /// The mistakes that queries of these results agree on, in the order of the results.
@@ -56,8 +60,9 @@ pub fn findings(results: &[&QueryResult]) -> Vec<Finding> {
     let votes = results.iter().flat_map(|result| {
         let alone = result.per_reference.iter().flatten();
         let verdicts = alone.chain([*result]).flat_map(|one| &one.diagnosis);
-        let claims = verdicts.filter(|verdict| verdict.code == Code::X1).filter_map(claim);
-        claims.map(|claim| {
+        let suspicions = verdicts.filter(|verdict| verdict.code == Code::X1);
+        let claims = suspicions.filter_map(|verdict| Some((claim(verdict)?, is_certain(verdict))));
+        claims.map(|(claim, certain)| {
             let queries = result.query_scene.as_ref().unwrap_or(&result.scene);
             let of = match &claim {
                 Claim::Camera { whose: QUERY, .. } => queries.clone(),
@@ -65,11 +70,34 @@ pub fn findings(results: &[&QueryResult]) -> Vec<Finding> {
                 _ => result.scene.clone(),
             };
             let kind = std::mem::discriminant(&claim);
-            ((of, format!("{kind:?}")), Vote { query: &result.query, claim })
+            ((of, format!("{kind:?}")), Vote { query: &result.query, claim, certain })
         })
     });
     let by_subject = grouped(votes).into_iter();
-    by_subject.filter_map(|((of, _), votes)| agreed(of, &votes, results)).collect()
+    let agreed = by_subject.filter_map(|((of, _), votes)| agreed(of, &votes, results));
+    without_references(results).into_iter().chain(agreed).collect()
+}
+
+/// Pairs of scenes in which no query has a reference.
+fn without_references(results: &[&QueryResult]) -> Vec<Finding> {
+    let pairs =
+        grouped(results.iter().map(|result| ((&result.scene, &result.query_scene), *result)));
+    let lacking = pairs.into_iter().filter_map(|((scene, query_scene), results)| {
+        let queries: BTreeSet<&str> = results.iter().map(|result| result.query.as_str()).collect();
+        let is_lacking = results.iter().all(|result| result.references.is_empty());
+        (is_lacking && queries.len() >= MIN_QUERIES).then(|| Finding {
+            code: Code::R1,
+            of: scene.clone(),
+            queries: queries.len(),
+            text: format!(
+                "None of {} queries of {} has a reference in {scene}. The poses may be in another unit or place.",
+                queries.len(),
+                query_scene.as_ref().unwrap_or(scene)
+            ),
+            evidence: json!({}),
+        })
+    });
+    lacking.collect()
 }
 
 /// The camera of the queries alone.
@@ -79,6 +107,10 @@ const BOTH: &str = "both";
 
 fn is_given(result: &QueryResult) -> bool {
     crate::estimator::find(result.method).is_none()
+}
+
+fn is_certain(verdict: &Diagnosis) -> bool {
+    verdict.evidence.get("certain").and_then(Value::as_bool).unwrap_or(true)
 }
 
 /// What a verdict claims of a whole scene; `None` for what is of one query.
@@ -104,9 +136,10 @@ fn claim(verdict: &Diagnosis) -> Option<Claim> {
 
 /// The claim that most queries agree on, if they are enough.
 fn agreed(of: String, votes: &[Vote<'_>], results: &[&QueryResult]) -> Option<Finding> {
-    let queries_for = |claim: &Claim| -> BTreeSet<&str> {
-        votes.iter().filter(|vote| claim.agrees(&vote.claim)).map(|vote| vote.query).collect()
+    let queries_of = |wanted: &dyn Fn(&&Vote<'_>) -> bool| -> BTreeSet<&str> {
+        votes.iter().filter(wanted).map(|vote| vote.query).collect()
     };
+    let queries_for = |claim: &Claim| queries_of(&|vote| claim.agrees(&vote.claim));
     // Claims that are equal are asked once.
     let mut claims: Vec<&Claim> = Vec::new();
     for vote in votes {
@@ -118,9 +151,13 @@ fn agreed(of: String, votes: &[Vote<'_>], results: &[&QueryResult]) -> Option<Fi
     // Of equal ones the first.
     let (queries, claim) =
         candidates.reduce(|best, next| if next.0.len() > best.0.len() { next } else { best })?;
-    let all: BTreeSet<&str> = votes.iter().map(|vote| vote.query).collect();
+    let voting = queries_of(&|_| true);
+    let certain = queries_of(&|vote| vote.certain && claim.agrees(&vote.claim));
+    let all: BTreeSet<&str> = results.iter().map(|result| result.query.as_str()).collect();
     // A mistake of a whole scene is seen in many of its queries; chance agrees in a few of many.
-    let is_common = 3 * queries.len() >= all.len() && claim.is_common(queries.len(), results);
+    let is_common = 3 * queries.len() >= voting.len()
+        && claim.is_common(queries.len(), all.len())
+        && (certain.len() >= MIN_QUERIES || queries.len() as f64 >= COMMON_HINT * all.len() as f64);
     let (text, evidence) = claim.words(&of, queries.len());
     (queries.len() >= MIN_QUERIES && is_common).then_some(Finding {
         code: Code::X1,
@@ -147,9 +184,8 @@ impl Claim {
     }
 
     /// Whether so many queries are enough of all. Only clouds have no value to agree on.
-    fn is_common(&self, queries: usize, results: &[&QueryResult]) -> bool {
-        let all: BTreeSet<&str> = results.iter().map(|result| result.query.as_str()).collect();
-        *self != Self::Clouds || 2 * queries >= all.len()
+    fn is_common(&self, queries: usize, all: usize) -> bool {
+        *self != Self::Clouds || 2 * queries >= all
     }
 
     fn words(&self, of: &str, queries: usize) -> (String, Value) {
@@ -206,6 +242,31 @@ mod tests {
         assert_eq!(found.len(), 1);
         assert_eq!((found[0].queries, found[0].of.as_str()), (3, "street"));
         assert!(found[0].text.contains("600 px"), "{}", found[0].text);
+    }
+
+    #[test]
+    fn hints_count_where_a_quarter_of_the_queries_agree() {
+        let hint = |query: &str, certain: bool| {
+            let mut result = with_camera(query, 600.0);
+            result.diagnosis[0].evidence["certain"] = json!(certain);
+            result
+        };
+        let right = |at: usize| row(&format!("right {at}"), "fb", Some(0.1));
+        let with_right = |certain: bool, count: usize| {
+            let hints = ["a", "b", "c"].map(|query| hint(query, certain));
+            found(&hints.into_iter().chain((0..count).map(right)).collect::<Vec<_>>()).len()
+        };
+        assert_eq!([with_right(false, 9), with_right(false, 10), with_right(true, 10)], [1, 0, 1]);
+    }
+
+    #[test]
+    fn a_scene_without_any_reference_is_a_finding() {
+        let lacking = |query: &str| QueryResult { references: vec![], ..row(query, "fb", None) };
+        let found_one = found(&["a", "b", "c"].map(lacking));
+        assert_eq!((found_one.len(), found_one[0].queries), (1, 3));
+        assert_eq!(found(&["a", "b"].map(lacking)), []);
+        let one_has = [lacking("a"), lacking("b"), lacking("c"), row("d", "fb", Some(0.1))];
+        assert_eq!(found(&one_has), []);
     }
 
     #[test]

@@ -61,6 +61,9 @@ macro_rules! verdicts {
         pub static RULES: &[&Rule] = &[$(&$file::RULE),+];
 
         impl Code {
+            /// Every code, in the order of the rules.
+            pub(crate) const ALL: &'static [Self] = &[$(Self::$code),+];
+
             /// The code as it is written: `D3`.
             pub fn name(self) -> &'static str {
                 match self { $(Self::$code => stringify!($code)),+ }

@@ -1,15 +1,14 @@
 //! X1: the ground truth, a calibration or the units are suspect.
 
-use nalgebra::{Matrix3, Quaternion, Rotation3, Translation3, UnitQuaternion, Vector2};
+mod camera;
 
+use nalgebra::{Matrix3, Quaternion, Rotation3, Translation3, UnitQuaternion};
+
+use self::camera::{camera_by_fb, camera_by_matches, camera_of_both};
 use super::*;
 use crate::camera::Intrinsics;
-use crate::diagnosis::matches::{Pairs, TrueMatches};
-use crate::diagnosis::{Evidence, Subject};
-use crate::estimator::{Estimator, FeatureBased};
-use crate::solver::Correspondence;
+use crate::diagnosis::matches::TrueMatches;
 use crate::stats::median;
-use crate::trace::Trace;
 
 pub(super) const RULE: Rule = Rule {
     title: "a calibration, a pose convention or the ground truth is suspect",
@@ -20,6 +19,9 @@ pub(super) const RULE: Rule = Rule {
     // What one query says of a whole scene may be chance, and these verdicts need no suspicion.
     yields_to: |family, found| {
         let has = |key: &str| found.get(key).is_some();
+        if found.get("certain").is_some_and(|certain| certain == false) {
+            return Code::ALL;
+        }
         let is_of_the_scene =
             has("camera") || has("wrong_depth") || has("reading") && family != Family::Given;
         if is_of_the_scene { &[Code::R1, Code::D4, Code::D7] } else { &[] }
@@ -42,9 +44,7 @@ fn test(case: &Case<'_>) -> Option<Diagnosis> {
             // Seen by a wrong camera, the depths of the right cloud look wrong too.
             poses(case)
                 .or_else(|| camera_by_matches(case, matches))
-                .or_else(|| camera_of_both(case, matches))
-                .or_else(|| cloud(matches))
-                .or_else(|| truth_by_matches(case, matches))
+                .or_else(|| camera_cloud_or_truth(case, matches))
         }
         Family::Grid | Family::Given => {
             if let Some(found) = given_pose(case) {
@@ -52,10 +52,32 @@ fn test(case: &Case<'_>) -> Option<Diagnosis> {
             }
             let search = case.search?;
             search.result_cost?;
-            poses(case).or_else(|| camera_by_fb(case)).or_else(|| truth_by_cost(case, search))
+            poses(case)
+                .or_else(|| camera_by_fb(case, true))
+                .or_else(|| truth_by_cost(case, search))
+                .or_else(|| camera_by_fb(case, false))
         }
         Family::Starts => poses(case),
     }
+}
+
+/// What one query says of a whole scene.
+struct Suspicion {
+    found: Diagnosis,
+    /// Whether one query is enough to say so; else it is a hint, which counts where many queries give it.
+    certain: bool,
+}
+
+/// A certain suspicion, or else a hint.
+fn camera_cloud_or_truth(case: &Case<'_>, matches: &TrueMatches) -> Option<Diagnosis> {
+    let (camera, cloud) = (camera_of_both(case, matches), cloud(matches));
+    let is_certain = |one: &Option<Suspicion>| one.as_ref().is_some_and(|one| one.certain);
+    let is_of_the_scene = is_certain(&camera) || is_certain(&cloud);
+    let hint = camera.or(cloud).map(|one| one.found);
+    if is_of_the_scene {
+        return hint;
+    }
+    truth_by_matches(case, matches).or(hint)
 }
 
 /// The cloud is not in metres.
@@ -103,28 +125,29 @@ fn poses(case: &Case<'_>) -> Option<Diagnosis> {
     let reference = &subject.problem.reference.world_from_camera;
     let found = subject.problem.reference_from_query(pose);
     let stated = subject.reference_from_truth()?;
-    let inverted = reference * truth.inverse();
-    let in_metres =
-        Pose::from_parts(Translation3::from(stated.translation.vector / 1000.0), stated.rotation);
     let radius_m = subject.problem.uncertainty_radius_m;
+    // In other units, near poses are nearly the same, and so is the estimate.
     let is_far = stated.translation.vector.norm() > 5.0 * radius_m;
-    let readings =
-        [("camera_from_world (inverted)", inverted, true), ("millimetres", in_metres, is_far)];
-    let agreeing = readings.into_iter().find(|(_, reading, is_possible)| {
-        let error = PoseError::between(reading, &found);
-        *is_possible
-            && error.translation_m < case.length(AGREEING_M)
-            && error.rotation_deg < AGREEING_DEG
+    let of_both = readings(reference).into_iter().zip(readings(truth));
+    let readings = of_both.map(|((reading, reference), (_, truth))| {
+        (reading, PoseError::between(&(reference.inverse() * truth), &found))
     });
-    let (reading, pose, _) = agreeing?;
+    // A car that drives straight on reads alike in several axes.
+    let (reading, error) = readings
+        .filter(|(reading, error)| {
+            (is_far || !reading.ends_with("metres"))
+                && error.translation_m < case.length(AGREEING_M)
+                && error.rotation_deg < AGREEING_DEG
+        })
+        .min_by(|a, b| a.1.translation_m.total_cmp(&b.1.translation_m))?;
     Some(RULE.found(&Poses {
         reading,
-        error: PoseError::between(&pose, &found),
+        error,
         error_as_stated: PoseError::between(&stated, &found),
     }))
 }
 
-evidence!(Poses { reading: &'static str, error: PoseError, error_as_stated: PoseError } =>
+evidence!(Poses { reading: String, error: PoseError, error_as_stated: PoseError } =>
     "The scene's poses are suspect: read as {reading}, the estimate is {} off. As stated it is {} \
      off.",
     metres(error.translation_m), metres(error_as_stated.translation_m)
@@ -215,227 +238,27 @@ evidence!(GivenPose { reading: String, error: PoseError, error_as_stated: PoseEr
     metres(error_as_stated.translation_m), error_as_stated.rotation_deg
 );
 
-/// Cameras of one focal length, and of one centre, differ by less \[share, px\].
-const SAME_FOCAL_LENGTH: f64 = 0.02;
-const SAME_CENTRE_PX: f64 = 8.0;
 /// Fewer matches than this stand out from no crowd.
 const FEW_MATCHES: usize = 8;
 
-/// The matches agree with the truth but nearly none of their depths do: the cloud is not that of the photo.
-fn cloud(matches: &TrueMatches) -> Option<Diagnosis> {
+/// The matches agree with the truth but their depths do not: the cloud is not that of the photo.
+///
+/// It is certain if nearly no depth is right.
+fn cloud(matches: &TrueMatches) -> Option<Suspicion> {
     let (right_depth, wrong_depth) = (matches.funnel.lifted, matches.wrong_depth);
-    let is_foreign = wrong_depth >= 3 * FEW_MATCHES && wrong_depth > 4 * right_depth;
-    is_foreign.then(|| RULE.found(&Cloud { wrong_depth, right_depth }))
+    let certain = wrong_depth >= 3 * FEW_MATCHES && wrong_depth > 4 * right_depth;
+    let is_odd = wrong_depth >= 2 * FEW_MATCHES && wrong_depth > right_depth;
+    let found = || RULE.found(&Cloud { wrong_depth, right_depth, certain });
+    is_odd.then(|| Suspicion { found: found(), certain })
 }
 
-evidence!(Cloud { wrong_depth: usize, right_depth: usize } =>
-    "The cloud does not fit the reference photo: {wrong_depth} true matches have a wrong depth, \
-     {right_depth} the right one."
-);
-
-/// A method without matches learns of another camera from those of FB.
-fn camera_by_fb(case: &Case<'_>) -> Option<Diagnosis> {
-    // Where the truth is not searched, that alone explains the result.
-    case.search?.near_truth()?;
-    let subject = case.subject;
-    let mut evidence = Evidence::default();
-    let fb = FeatureBased::new(subject.params);
-    let outcome = fb.estimate(subject.problem, &mut Trace::to(&mut evidence)).ok()?;
-    let (outcome, evidence) = (&outcome, &evidence);
-    let subject = Subject { method: Method::FB, outcome, evidence, ..subject.clone() };
-    let case = Case::new(&subject, Family::Features, None);
-    let matches = case.matches()?;
-    camera_by_matches(&case, matches).or_else(|| camera_of_both(&case, matches))
-}
-
-/// With another focal length of one camera for both photos, the cloud gives far more true matches their depths.
-///
-/// A camera of photos of another size has its centre scaled too.
-fn camera_of_both(case: &Case<'_>, matches: &TrueMatches) -> Option<Diagnosis> {
-    /// Steps of the focal length, as exponents of 2: first on both sides of the stated one, then around the best.
-    const COARSE: f64 = 0.125;
-    const COARSE_STEPS: i32 = 12;
-    const FINE: f64 = 0.03;
-    const FINE_STEPS: i32 = 4;
-    let problem = case.subject.problem;
-    let [query, reference] = [problem.query.intrinsics, problem.reference.intrinsics];
-    let is_one_camera = query == reference;
-    let before = matches.funnel.lifted;
-    let lost = matches.wrong_depth + matches.no_depth;
-    if !is_one_camera || lost < 2 * FEW_MATCHES || lost < before {
-        return None;
-    }
-    let pairs = Pairs::of(case.subject, &case.matching())?;
-    let scaled = |exponent: f64, with_centre: bool| {
-        let scale = exponent.exp2();
-        let of_centre = if with_centre { scale } else { 1.0 };
-        Intrinsics {
-            fx: scale * reference.fx,
-            fy: scale * reference.fy,
-            cx: of_centre * reference.cx,
-            cy: of_centre * reference.cy,
-            ..reference
-        }
-    };
-    let count = |(exponent, with_centre): (f64, bool)| {
-        (pairs.explained_by(&scaled(exponent, with_centre)).0, exponent, with_centre)
-    };
-    let most = |candidates: &mut dyn Iterator<Item = (f64, bool)>| {
-        candidates.map(count).max_by(|a, b| a.0.cmp(&b.0).then(b.1.abs().total_cmp(&a.1.abs())))
-    };
-    let grid = |around: f64, step: f64, steps: i32| {
-        (-steps..=steps).map(move |at| around + step * f64::from(at))
-    };
-    let coarse = &mut grid(0.0, COARSE, COARSE_STEPS).flat_map(|at| [(at, false), (at, true)]);
-    let (_, exponent, with_centre) = most(coarse)?;
-    let fine = &mut grid(exponent, FINE, FINE_STEPS).map(|at| (at, with_centre));
-    let (after, exponent, _) = most(fine)?;
-    let camera = scaled(exponent, with_centre);
-    // Things that look alike agree on some camera too; of a real one, most matches do.
-    let is_most = 2 * after >= pairs.explained_by(&camera).1;
-    let is_more = after >= before + 2 * FEW_MATCHES && 5 * after >= 8 * before && is_most;
-    let is_other = (camera.fx / reference.fx - 1.0).abs() > 2.0 * SAME_FOCAL_LENGTH;
-    (is_more && is_other).then(|| {
-        RULE.found(&CameraOfBoth {
-            right_depth: before,
-            right_depth_otherwise: after,
-            camera,
-            stated: reference,
-        })
-    })
-}
-
-evidence!(CameraOfBoth {
-    right_depth: usize,
-    right_depth_otherwise: usize,
-    camera: Intrinsics,
-    stated: Intrinsics,
-} =>
-    "The camera of both photos is suspect: {}. That gives {right_depth_otherwise} true matches the right depth, \
-     not {right_depth}.",
-    what_it_should_be(camera, stated)
-);
-
-/// From the true pose, another focal length and principal point explain far more matches.
-fn camera_by_matches(case: &Case<'_>, matches: &TrueMatches) -> Option<Diagnosis> {
-    let query_from_reference = case.subject.reference_from_truth()?.inverse();
-    let stated = &case.subject.problem.query.intrinsics;
-    let threshold_px = case.matching().mlesac.inlier_threshold_px;
-    let explained = |camera: &Intrinsics| {
-        let is_explained = |c: &&Correspondence| {
-            let seen = camera.project(&(query_from_reference * c.point));
-            seen.is_some_and(|seen| (seen - c.pixel).norm() <= threshold_px)
-        };
-        matches.correspondences.iter().filter(is_explained).count()
-    };
-    let before = explained(stated);
-    let (camera, after) = likeliest_camera(matches, &query_from_reference, stated)
-        .map(|camera| (camera, explained(&camera)))?;
-    // What another pose explains as well says nothing against the camera.
-    let is_more =
-        after >= 3 * FEW_MATCHES && 2 * after > 3 * before && 5 * after > 6 * matches.inliers();
-    let is_other = (camera.fx / stated.fx - 1.0).abs() > SAME_FOCAL_LENGTH
-        || (camera.cx - stated.cx).hypot(camera.cy - stated.cy) > SAME_CENTRE_PX;
-    (is_more && is_other).then(|| {
-        RULE.found(&OtherCamera {
-            explained: before,
-            explained_otherwise: after,
-            camera,
-            stated: *stated,
-        })
-    })
-}
-
-evidence!(OtherCamera {
-    explained: usize,
-    explained_otherwise: usize,
-    camera: Intrinsics,
-    stated: Intrinsics,
-} =>
-    "The query camera is suspect: {}. That explains {explained_otherwise} matches at the truth, not \
-     {explained}.",
-    what_it_should_be(camera, stated)
-);
-
-/// What differs between two cameras, to the pixel.
-fn what_it_should_be(camera: &Intrinsics, stated: &Intrinsics) -> String {
-    let mut differences = Vec::new();
-    if (camera.fx / stated.fx - 1.0).abs() > SAME_FOCAL_LENGTH {
-        let lengths = format!("{:.0} px, not {:.0}", camera.fx, stated.fx);
-        differences.push(("its focal length", lengths));
-    }
-    if (camera.cx - stated.cx).hypot(camera.cy - stated.cy) > SAME_CENTRE_PX {
-        let centre = |of: &Intrinsics| format!("({:.0}, {:.0})", of.cx, of.cy);
-        differences.push(("its centre", format!("{}, not {}", centre(camera), centre(stated))));
-    }
-    match differences.as_slice() {
-        [(first, is), (second, are)] => format!("{first} should be {is}, and {second} {are}"),
-        others => others.iter().map(|(what, is)| format!("{what} should be {is}")).collect(),
-    }
-}
-
-/// The camera of one focal length and any centre that explains most matches from a pose.
-///
-/// Two matches fix a focal length and a centre; pairs are taken at a fixed stride, so that equal runs
-/// ask equal pairs.
-fn likeliest_camera(
-    matches: &TrueMatches,
-    query_from_reference: &Pose,
-    stated: &Intrinsics,
-) -> Option<Intrinsics> {
-    const PAIRS: usize = 400;
-    const THRESHOLD_PX: f64 = 4.0;
-    let rays: Vec<(Vector2<f64>, &Correspondence)> = matches
-        .correspondences
-        .iter()
-        .filter_map(|correspondence| {
-            let seen = query_from_reference * correspondence.point;
-            (seen.z > 0.1).then(|| (seen.coords.xy() / seen.z, correspondence))
-        })
-        .collect();
-    let count = rays.len();
-    if count < FEW_MATCHES {
-        return None;
-    }
-    let aspect = stated.fy / stated.fx;
-    let camera_of = |a: usize, b: usize| {
-        let ((ray_a, a), (ray_b, b)) = (rays[a], rays[b]);
-        let (rays, pixels) = (ray_a - ray_b, a.pixel - b.pixel);
-        let scaled = Vector2::new(rays.x, rays.y * aspect);
-        let squared = scaled.norm_squared();
-        if squared < 0.01 {
-            return None;
-        }
-        let fx = scaled.dot(&pixels) / squared;
-        let within = (0.3..3.0).contains(&(fx / stated.fx));
-        within.then(|| Intrinsics {
-            fx,
-            fy: fx * aspect,
-            cx: a.pixel.x - fx * ray_a.x,
-            cy: a.pixel.y - fx * aspect * ray_a.y,
-            ..*stated
-        })
-    };
-    let support = |camera: &Intrinsics| {
-        rays.iter()
-            .filter(|(ray, c)| {
-                let u = camera.fx * ray.x + camera.cx - c.pixel.x;
-                let v = camera.fy * ray.y + camera.cy - c.pixel.y;
-                u.hypot(v) <= THRESHOLD_PX
-            })
-            .count()
-    };
-    (0..PAIRS)
-        .filter_map(|k| {
-            let a = k * 7919 % count;
-            let b = (a + 1 + k * 104_729 % (count - 1)) % count;
-            let camera = camera_of(a, b)?;
-            Some((support(&camera), camera))
-        })
-        // Of equal ones the first.
-        .reduce(|best, next| if next.0 > best.0 { next } else { best })
-        .map(|(_, camera)| camera)
-}
+evidence!(Cloud { wrong_depth: usize, right_depth: usize, certain: bool } => {
+    let fits = if *certain { "does not fit" } else { "may not fit" };
+    format!(
+        "The cloud {fits} the reference photo: {wrong_depth} true matches have a wrong depth, {right_depth} the \
+         right one."
+    )
+});
 
 /// The photos agree on a pose as well as photos ever do, and it is not the stated truth.
 fn truth_by_matches(case: &Case<'_>, matches: &TrueMatches) -> Option<Diagnosis> {
