@@ -2,17 +2,20 @@
 
 use std::sync::Arc;
 
+use nalgebra::Vector3;
 use posescope::app::{Results, Setup, Tab};
 use posescope::camera::Intrinsics;
-use posescope::diagnosis::{Evidence, Subject, Tolerance, diagnose};
+use posescope::diagnosis::{Code, Diagnosis, Evidence, Subject, Tolerance, diagnose};
+use posescope::geometry::Pose;
 use posescope::localize::{QueryResult, localize_traced};
 use posescope::measure::{Field, measure, read_rows};
 use posescope::method::Method;
 use posescope::params::Params;
-use posescope::problem::Problem;
+use posescope::problem::{Problem, Query, ReferenceTuple};
 use posescope::run::read_results;
 use posescope::scene::{self, Scene};
 use posescope::trace::Trace;
+use serde_json::Value;
 
 use crate::small_sequence::SmallSequence;
 use crate::window::{finished, is_said, results, run_until_idle, send, setup, window_with_results};
@@ -138,21 +141,62 @@ fn a_focal_length_that_is_wrong_for_both_photos_is_named() {
         let mut query = (*street.query(30).expect("a photo")).clone();
         let mut reference = (*street.reference(23).expect("a cloud")).clone();
         (query.intrinsics, reference.intrinsics) = (camera, camera);
-        let problem = Problem::new(query, reference, 15.0).expect("a radius");
-        let (params, mut evidence) = (Params::default(), Evidence::default());
-        let mut trace = Trace::to(&mut evidence);
-        let outcome = localize_traced(&problem, Method::FB, &params, &mut trace);
-        let outcome = outcome.expect("nobody cancels");
-        let subject = Subject::new(&problem, Method::FB, &params, &outcome, &evidence);
-        let tolerance = Tolerance { translation_m: 1.0, rotation_deg: 5.0 };
-        let found = diagnose(&subject.against(Some(&truth), tolerance));
-        let named = found.first().unwrap_or_else(|| panic!("{scale}: no verdict, {outcome:?}"));
+        let found = said_of(query, reference, &truth);
+        let named = found.first().unwrap_or_else(|| panic!("{scale}: no verdict"));
         assert!(named.text.starts_with("The camera of both photos is suspect"), "{found:?}");
         let camera: Intrinsics =
             serde_json::from_value(named.evidence["camera"].clone()).expect("a camera");
         assert!((camera.fx / stated.fx - 1.0).abs() < 0.06, "{scale}: {camera:?}");
         assert!((camera.cx / stated.cx - 1.0).abs() < 0.04, "{scale}: {camera:?}");
     }
+}
+
+/// What FB's verdicts are of a query with these words for its truth.
+fn said_of(query: Query, reference: ReferenceTuple, truth: &Pose) -> Vec<Diagnosis> {
+    let problem = Problem::new(query, reference, 15.0).expect("a radius");
+    let (params, mut evidence) = (Params::default(), Evidence::default());
+    let mut trace = Trace::to(&mut evidence);
+    let outcome = localize_traced(&problem, Method::FB, &params, &mut trace);
+    let outcome = outcome.expect("nobody cancels");
+    let subject = Subject::new(&problem, Method::FB, &params, &outcome, &evidence);
+    let tolerance = Tolerance { translation_m: 1.0, rotation_deg: 5.0 };
+    diagnose(&subject.against(Some(truth), tolerance))
+}
+
+/// One query alone is not sure of what several then agree on.
+#[test]
+fn queries_give_the_same_hint_of_a_camera_and_the_same_reading_of_poses() {
+    let street = scene::open("street", None).expect("is built in");
+    let flip = Pose::rotation(Vector3::new(std::f64::consts::PI, 0.0, 0.0));
+    let [mut lengths, mut centres, mut readings] = [0; 3];
+    for frame in [152, 168, 232, 312] {
+        let truth = street.pose(frame).expect("is known");
+        let stated = street.intrinsics(frame);
+        let of = |camera: Intrinsics, turn: &Pose| {
+            let mut query = (*street.query(frame).expect("a photo")).clone();
+            let mut reference = (*street.reference(frame - 8).expect("a cloud")).clone();
+            (query.intrinsics, reference.intrinsics) = (camera, camera);
+            reference.world_from_camera *= turn;
+            let found = said_of(query, reference, &(truth * turn));
+            let place = found.iter().position(|one| one.code == Code::X1)?;
+            let hint = found[place].clone();
+            let is_hint = hint.evidence.get("certain").is_some_and(|certain| certain == false);
+            assert!(!is_hint || place + 1 == found.len(), "{found:?}");
+            Some(hint.evidence)
+        };
+        let number = |found: &Value, key: &str| found["camera"][key].as_f64();
+        let still = Pose::identity();
+        let short = Intrinsics { fx: 0.8 * stated.fx, fy: 0.8 * stated.fy, ..stated };
+        let length = of(short, &still).and_then(|found| number(&found, "fx"));
+        lengths += usize::from(length.is_some_and(|fx| (fx / stated.fx - 1.0).abs() < 0.07));
+        let aside = Intrinsics { cx: stated.cx + 90.0, ..stated };
+        let centre = of(aside, &still).and_then(|found| number(&found, "cx"));
+        centres += usize::from(centre.is_some_and(|cx| (cx - stated.cx).abs() < 20.0));
+        let reading = of(stated, &flip);
+        let axes = "camera axes (x, -y, -z)";
+        readings += usize::from(reading.is_some_and(|found| found["reading"] == axes));
+    }
+    assert!(lengths >= 3 && centres >= 3 && readings >= 3, "{lengths} {centres} {readings}");
 }
 
 /// A room has other defaults than a street, and a model without metres keeps its own unit.
