@@ -29,8 +29,8 @@ impl Photo {
     /// A photo with colours; its grey values are their luma (Rec. 601), as of Matlab's `rgb2gray`, which the
     /// paper's authors used.
     pub fn from_color(color: RgbImage) -> Self {
-        let luma = color.pixels().map(|pixel| luma(pixel.0)).collect();
-        let gray = GrayImage::from_raw(color.width(), color.height(), luma).unwrap_or_default();
+        let (width, height) = color.dimensions();
+        let gray = GrayImage::from_fn(width, height, |x, y| Luma([luma(color.get_pixel(x, y).0)]));
         Self { gray, color: Some(color) }
     }
 

@@ -24,8 +24,6 @@ parameters! {
         /// Fewest inliers of a verified frame.
         pub min_inliers: usize = 6 => count("min_inliers", "", 2..=1000),
         /// Fewest inliers of a frame that becomes a reference; 0 accepts every frame.
-        ///
-        /// docs/retrieval.md has the share of right frames by their inliers.
         pub accept: usize = 0 => count("accept", "", 0..=1000),
         /// Greatest distance of an inlier of the affine transform.
         pub inlier_px: f64 = 15.0 => number("inlier_px", "px", 0.5..=100.0),
