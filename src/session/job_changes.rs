@@ -150,12 +150,12 @@ impl Job {
         }
     }
 
-    /// The arguments that repeat this run. See [`Task::arguments`].
+    /// The arguments that repeat this run. See [`Task::arguments`](super::task::Task::arguments).
     pub fn arguments(&self) -> Vec<String> {
         (self.task).arguments(self.query_name(), &self.named_references())
     }
 
-    /// The command line that repeats this run. See [`Task::command_line`].
+    /// The command line that repeats this run. See [`Task::command_line`](super::task::Task::command_line).
     pub fn command_line(&self) -> String {
         (self.task).command_line(self.query_name(), &self.named_references())
     }
