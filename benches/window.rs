@@ -218,7 +218,7 @@ impl ManyResults {
         let setup = Setup { mode: RunMode::Paused, ..like.state().app_state().setup.clone() };
         let results = self.read();
         let before = results.clone();
-        let known = KnownResults { now: results, before: Some(before) };
+        let known = KnownResults { now: results, before: Some(before), ..KnownResults::default() };
         let mut window = Harness::builder()
             .with_size(SIZE)
             .build_eframe(|creation| App::new(creation, setup).with_results(known));

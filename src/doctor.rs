@@ -16,7 +16,7 @@ use crate::image::RgbImage;
 use crate::scene::{Scene, SceneError};
 
 pub use inventory::{Inventory, Remark};
-pub use reading::Mistake;
+pub use reading::{Mistake, Subject};
 pub use trial::{Agreement, Finding};
 
 use trial::Sample;
@@ -43,6 +43,14 @@ impl Examination {
         let mut remarks = self.remarks.iter();
         self.finding.is_some() || remarks.any(|remark| matches!(remark, Remark::Broken(_)))
     }
+}
+
+/// The mistake that explains why clouds and photos do not fit, if any does.
+///
+/// # Errors
+/// A compared frame that cannot be read.
+pub fn mistake(scene: &dyn Scene) -> Result<Option<Finding>, SceneError> {
+    Ok(Sample::read(scene)?.diagnose().1)
 }
 
 /// Examines a scene. Errors of single files become remarks.

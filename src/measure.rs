@@ -31,7 +31,7 @@ pub use crate::relation::Relation;
 pub use diff::{Change, Difference, Migration, RunComparison, migrations, verdict_name};
 #[cfg(feature = "cli")]
 pub use export::{Export, ExportError, ExportedFile, Format, export};
-pub use findings::{Finding, findings};
+pub use findings::{Finding, failing_scenes, of_examination};
 pub use gate::{Gate, GateResult};
 pub use known::{KnownFailures, KnownReport};
 pub use metrics::{Group, Measures, RECALL_LIMITS, Spread, measure};
@@ -41,7 +41,7 @@ pub use paper::scene as paper_scene;
 #[cfg(feature = "cli")]
 pub use plots::Plot;
 #[cfg(feature = "cli")]
-pub use report::{Report, SUMMARY_SCHEMA, plain, read_gate_results, write_report};
+pub use report::{Report, SUMMARY_SCHEMA, StoredSummary, plain, write_report};
 pub use results::{RunResults, read_rows};
 #[cfg(feature = "cli")]
 pub use sweep::{SweptRun, write_sweep};

@@ -16,8 +16,7 @@ use posescope_core::files::write_whole;
 use crate::chart::Chart;
 use crate::localize::{LocalizeError, Localizer, QueryResult, Request};
 use crate::measure::{
-    Change, GateResult, Measures, Plot, RunComparison, RunResults, read_gate_results, read_rows,
-    tables,
+    Change, Measures, Plot, RunComparison, RunResults, StoredSummary, read_rows, tables,
 };
 use crate::params::Params;
 use crate::run::{FAILURES, FolderError, RunFile, Scenes, read_run, recording_name};
@@ -43,7 +42,7 @@ struct RunReport {
     worst: Vec<usize>,
     measures: Vec<Measures>,
     tables: Vec<Table>,
-    gates: Vec<GateResult>,
+    summary: StoredSummary,
     charts: Vec<Chart>,
     /// Thumbnails of the queries, by the number of their CSS class.
     thumbnails: BTreeMap<usize, String>,
@@ -134,7 +133,7 @@ impl RunReport {
             changes: params.changes(),
             tables,
             charts,
-            gates: read_gate_results(folder)?,
+            summary: StoredSummary::read(folder)?,
             run,
             results,
             worst,

@@ -8,7 +8,9 @@ use std::rc::Rc;
 use super::memo::Memo;
 use crate::diagnosis::Code;
 use crate::localize::QueryResult;
-use crate::measure::{Condition, ConditionError, Migration, Overview, migrations, verdict_name};
+use crate::measure::{
+    Condition, ConditionError, Finding, Migration, Overview, migrations, verdict_name,
+};
 
 /// Results by query.
 pub type Results = BTreeMap<usize, Vec<QueryResult>>;
@@ -20,11 +22,13 @@ pub struct KnownResults {
     pub now: Results,
     /// Other results of the same queries, A, which those are held against.
     pub before: Option<Results>,
+    /// What `posescope doctor` says of scenes whose queries fail often.
+    pub examined: Vec<Finding>,
 }
 
 impl From<Results> for KnownResults {
     fn from(now: Results) -> Self {
-        Self { now, before: None }
+        Self { now, ..Self::default() }
     }
 }
 
@@ -58,6 +62,8 @@ pub struct BatchResults {
     now: Results,
     /// The results A, if some were kept or opened.
     before: Option<Results>,
+    /// What `posescope doctor` says of the scenes.
+    pub(super) examined: Vec<Finding>,
     /// Grows with every change.
     version: u64,
     rows: RefCell<Memo<(u64, Wanted), Found>>,
@@ -144,7 +150,7 @@ impl BatchResults {
     pub(super) fn overview(&self, shows_truth: bool) -> Rc<Overview> {
         let make = || {
             let shown: Vec<_> = self.all().map(|(_, result)| result.shown(shows_truth)).collect();
-            Rc::new(Overview::of(&shown.iter().collect::<Vec<_>>()))
+            Rc::new(Overview::of(&shown.iter().collect::<Vec<_>>(), &self.examined))
         };
         Rc::clone(self.overview.borrow_mut().get((self.version, shows_truth), make))
     }

@@ -108,6 +108,7 @@ impl AppState {
 
     /// Takes results over that were known before the window was opened.
     pub(super) fn set_known_results(&mut self, results: KnownResults) {
+        self.results.examined = results.examined;
         self.results.set(results.now.clone());
         self.first_results = results.now;
         self.set_results_before(results.before);

@@ -7,10 +7,12 @@ mod sweep;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
+use posescope::doctor::mistake;
 use posescope::fusion::Fusion;
 use posescope::localize::{QueryResult, Ranking, Selection};
 use posescope::measure::{
-    Change, Gate, KnownFailures, Report, RunComparison, read_rows, write_report,
+    Change, Finding, Gate, KnownFailures, Report, RunComparison, StoredSummary, failing_scenes,
+    of_examination, read_rows, write_report,
 };
 use posescope::method::Method;
 use posescope::params::Params;
@@ -21,6 +23,7 @@ use posescope::run::{
 };
 use posescope::scene::{Retriever, SceneSize};
 use posescope::session::command_line;
+use posescope::table::wrapped;
 
 use super::args::{EvalArgs, EvalCommand, JudgingArgs};
 use super::compare;
@@ -41,7 +44,16 @@ pub fn eval(args: &EvalArgs, terminal: &Terminal) -> Result<(), CliError> {
         let run = merge(&args.parts, &args.out)?;
         let kept = args.judging.keep_failures.unwrap_or(KEPT_FAILURES);
         failures::merge(&args.parts, &args.out, kept, &run)?;
-        return finish(&args.judging, None, &args.out, &run, terminal);
+        let summaries = args.parts.iter().map(|part| StoredSummary::read(part));
+        let mut examined: Vec<Finding> = Vec::new();
+        for one in
+            summaries.collect::<Result<Vec<_>, _>>()?.into_iter().flat_map(|part| part.doctor)
+        {
+            if !examined.contains(&one) {
+                examined.push(one);
+            }
+        }
+        return finish(&args.judging, None, &args.out, &run, &examined, terminal);
     }
     let protocol = args.protocol.over(Protocol::default())?;
     let gated: Vec<Method> = args.judging.gate.iter().map(Gate::method).collect();
@@ -60,9 +72,10 @@ pub fn eval(args: &EvalArgs, terminal: &Terminal) -> Result<(), CliError> {
     if let Some(sweep) = &args.sweep {
         return sweep::sweep(args, sweep, &folder, terminal);
     }
-    let run = execute(args, None, &folder, terminal)?;
+    let Executed { run, scenes } = execute(args, None, &folder, terminal)?;
     let again = args.rerun_failed.as_deref();
-    finish(&args.judging, again, &folder, &run, terminal)
+    let examined = examined(&scenes, &folder)?;
+    finish(&args.judging, again, &folder, &run, &examined, terminal)
 }
 
 /// A run that is about to start.
@@ -70,6 +83,24 @@ struct PlannedRun {
     run: RunFile,
     scenes: Scenes,
     params: Params,
+}
+
+/// A run that is complete, with its scenes.
+struct Executed {
+    run: RunFile,
+    scenes: Scenes,
+}
+
+/// What `posescope doctor` says of scenes whose queries fail often.
+fn examined(scenes: &Scenes, folder: &Path) -> Result<Vec<Finding>, CliError> {
+    let rows = read_rows(folder)?;
+    let failing = failing_scenes(&rows.iter().collect::<Vec<_>>());
+    let mut examined = Vec::new();
+    for scene in scenes.references.iter().filter(|scene| failing.contains(scene.name())) {
+        let found = mistake(scene.as_ref())?;
+        examined.extend(found.map(|found| of_examination(scene.name(), &found)));
+    }
+    Ok(examined)
 }
 
 /// A folder below `runs`, named after scenes and options.
@@ -97,7 +128,7 @@ fn execute(
     swept: Option<(&Sweep, &str)>,
     folder: &Path,
     terminal: &Terminal,
-) -> Result<RunFile, CliError> {
+) -> Result<Executed, CliError> {
     let PlannedRun { run, scenes, params } = match &args.rerun_failed {
         Some(before) => again::plan(args, before)?,
         None => plan(args, swept, terminal)?,
@@ -148,7 +179,7 @@ fn execute(
         outcome => {
             outcome?;
             closed?;
-            Ok(run)
+            Ok(Executed { run, scenes })
         }
     }
 }
@@ -281,9 +312,10 @@ impl Judged {
         again: Option<&Path>,
         folder: &Path,
         run: &RunFile,
+        examined: &[Finding],
     ) -> Result<Self, CliError> {
         let known = known_failures(args)?;
-        let report = write_report(folder, run, &args.gate, &known)?;
+        let report = write_report(folder, run, examined, &args.gate, &known)?;
         let before = args.baseline.as_deref().or(again);
         write_html(folder, before, PICTURES, None)?;
         let failed = report.gate_results.iter().filter(|one| !one.passed);
@@ -303,9 +335,10 @@ fn finish(
     again: Option<&Path>,
     folder: &Path,
     run: &RunFile,
+    examined: &[Finding],
     terminal: &Terminal,
 ) -> Result<(), CliError> {
-    let Judged { report, known, mut failures } = Judged::of(args, again, folder, run)?;
+    let Judged { report, known, mut failures } = Judged::of(args, again, folder, run, examined)?;
     if !terminal.is_quiet {
         show(&report, run, terminal.width())?;
         eprintln!("Run: {}", folder.display());
@@ -339,7 +372,9 @@ fn good_unless(failures: &[String]) -> Result<(), CliError> {
 
 fn show(report: &Report, run: &RunFile, width: Option<usize>) -> Result<(), CliError> {
     for finding in &report.findings {
-        output::print(&format!("Finding: {}", finding.text))?;
+        let line = format!("Finding: {}", finding.text);
+        let wrapped = width.map_or(line.clone(), |width| wrapped(&line, width, "  "));
+        output::print(&wrapped.trim_end())?;
     }
     // The summary of an experiment has a line for every combination: too long for a terminal.
     let skipped = usize::from(run.protocol.preset.is_some());

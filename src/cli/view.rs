@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use posescope::app::{self, KnownResults, Results, Setup, WindowError};
 use posescope::localize::QueryResult;
+use posescope::measure::StoredSummary;
 use posescope::run::{ScenePair, read_run, results_of_pair};
 use posescope::scene::{self, Scene};
 use posescope::session::{IndexFile, Job, RunMode, Task, TaskScenes};
@@ -120,13 +121,14 @@ fn begin_at(args: &ViewArgs, named: Option<usize>, setup: &mut Setup) -> Result<
     if has_reference(setup, setup.query) {
         return Ok(());
     }
-    Err(CliError::Unusable(format!(
+    let words = format!(
         "{}: no frame with a pose and a cloud within {} m of query {}; raise --radius or --prior, or \
          name a frame with --reference",
         args.scene,
         setup.task.reach_m(),
         setup.query_name()
-    )))
+    );
+    Err(CliError::Unusable(setup.task.params.scale.unit().words(&words)))
 }
 
 /// Refuses options that change the queries, which a run folder determines.
@@ -200,7 +202,8 @@ fn of_a_run(args: &ViewArgs, folder: &Path) -> Result<(Setup, KnownResults), Cli
     let chosen = chosen.collect::<Result<Vec<_>, _>>()?;
     let mut setup = setup_of(task, scenes, results.keys().copied().collect(), chosen);
     setup.query = query;
-    let known = KnownResults { now: results, before };
+    let known =
+        KnownResults { now: results, before, examined: StoredSummary::read(folder)?.doctor };
     Ok((setup, known))
 }
 

@@ -2,8 +2,25 @@
 
 use nalgebra::{Matrix3, Point3, Quaternion, Rotation3, Translation3, UnitQuaternion, Vector3};
 
+use serde::{Deserialize, Serialize};
+
 use crate::camera::Intrinsics;
 use crate::geometry::Pose;
+
+/// The part of a scene that is not as stated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+#[non_exhaustive]
+pub enum Subject {
+    /// Focal length, centre or distortion.
+    Camera,
+    /// The poses of frames.
+    Poses,
+    /// The clouds, or which photos they belong to.
+    Clouds,
+    /// The unit of lengths.
+    Units,
+}
 
 /// A usual mistake in writing or reading a scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -27,8 +44,10 @@ pub enum Mistake {
     Degrees,
     /// Poses and clouds belong to the other camera of a stereo pair.
     OtherStereoCamera,
-    /// Clouds are mirrored.
+    /// Clouds are mirrored, or photos are.
     MirroredCloud,
+    /// Clouds are turned or shifted.
+    MovedCloud,
     /// Poses are in reverse order.
     ReversedPoses,
     /// The photos were undistorted although they had no distortion.
@@ -56,11 +75,32 @@ impl Mistake {
             Self::OtherStereoCamera => {
                 "poses and clouds belong to the other camera of a stereo pair"
             }
-            Self::MirroredCloud => "the clouds are mirrored",
+            Self::MirroredCloud => "the clouds are mirrored, or the photos are",
+            Self::MovedCloud => "the clouds are turned or shifted against the photos",
             Self::ReversedPoses => "the poses are in reverse order",
             Self::UndistortedTwice => {
                 "the photos are distorted: undistorted twice, or with the parameters of another lens"
             }
+        }
+    }
+}
+
+impl Mistake {
+    /// The part of the scene with the mistake.
+    pub fn subject(self) -> Subject {
+        match self {
+            Self::InversePose
+            | Self::PoseAxes
+            | Self::QuaternionOrder
+            | Self::Degrees
+            | Self::ReversedPoses => Subject::Poses,
+            Self::CloudAxes
+            | Self::CloudOfNeighbour
+            | Self::OtherStereoCamera
+            | Self::MirroredCloud
+            | Self::MovedCloud => Subject::Clouds,
+            Self::WrongCamera | Self::UndistortedTwice => Subject::Camera,
+            Self::Millimetres => Subject::Units,
         }
     }
 }
@@ -91,6 +131,10 @@ pub(super) enum Change {
     Camera { times: f64, right: f64, down: f64 },
     /// An additional radial distortion k1.
     Lens(f64),
+    /// Clouds so many times as large.
+    Size(f64),
+    /// Clouds turned \[°\] about the camera's y, x and z axes, then shifted \[m\] along x, y and z.
+    Move([f64; 6]),
 }
 
 impl Change {
@@ -104,11 +148,18 @@ impl Change {
         }
     }
 
-    pub(super) fn point(&self, point: &Point3<f64>) -> Point3<f64> {
+    pub(super) fn points(&self, points: &[Point3<f64>]) -> Vec<Point3<f64>> {
+        let each = |read: &dyn Fn(&Point3<f64>) -> Point3<f64>| points.iter().map(read).collect();
         match *self {
-            Self::Points(read) => read(point),
-            Self::Aside(right_m) => point - Vector3::new(right_m, 0.0, 0.0),
-            _ => *point,
+            Self::Points(read) => each(&read),
+            Self::Size(times) => each(&|point| point * times),
+            Self::Aside(right_m) => each(&|point| point - Vector3::new(right_m, 0.0, 0.0)),
+            Self::Move([yaw, pitch, roll, x, y, z]) => {
+                let turn = from_angles([yaw, pitch, roll].map(f64::to_radians));
+                let moved = Pose::from_parts(Translation3::new(x, y, z), turn);
+                each(&|point| moved * point)
+            }
+            _ => points.to_vec(),
         }
     }
 
@@ -160,16 +211,8 @@ pub(super) fn readings() -> Vec<Reading> {
             "rotate the axes of each cloud to right, down, forward",
             Change::Points(|p| Point3::new(-p.y, -p.z, p.x)),
         ),
-        reading(
-            M::Millimetres,
-            "divide the coordinates of clouds by 1000",
-            Change::Points(|p| p / 1000.0),
-        ),
-        reading(
-            M::Millimetres,
-            "divide the positions of poses by 1000",
-            Change::Points(|p| p * 1000.0),
-        ),
+        reading(M::Millimetres, "divide the coordinates of clouds by 1000", Change::Size(1e-3)),
+        reading(M::Millimetres, "divide the positions of poses by 1000", Change::Size(1e3)),
         reading(
             M::QuaternionOrder,
             "read quaternions as w x y z",

@@ -26,6 +26,8 @@ const CARRIED: usize = 4;
 const TELLING_GAIN: f64 = 0.04;
 /// The fewest frames that a reading with a free number is fitted to.
 const MIN_FRAMES: usize = 4;
+/// What counts of the gain of a reading whose free numbers were chosen too.
+const CHOSEN: f64 = 0.85;
 /// The least mean gain in standard errors of the mean.
 const CERTAIN: f64 = 2.5;
 
@@ -140,7 +142,7 @@ impl Sample {
         let (Some(sight), Some(cloud)) = (self.sights.get(&anchor), cloud) else {
             return Agreement::default();
         };
-        let points: Vec<Point3<f64>> = cloud.iter().map(|point| change.point(point)).collect();
+        let points = change.points(cloud);
         let (camera, k1) = change.camera(&sight.camera);
         let seen: Vec<Option<Seen>> =
             points.iter().map(|point| project(&camera, k1, point)).collect();
@@ -170,9 +172,14 @@ impl Sample {
     pub(super) fn diagnose(&self) -> (Agreement, Option<Finding>) {
         let stated = self.scores(&Change::Pose(|pose| *pose));
         let mut best: Option<(f64, Reading, Agreement)> = None;
-        for reading in readings().into_iter().chain(self.searched()) {
+        let usual = readings().into_iter().filter(|reading| self.may_be(&reading.change));
+        for reading in usual.chain(self.searched()) {
             let scores = self.scores(&reading.change);
-            let (gain, otherwise) = (gain(&stated, &scores, &reading.change), mean_of(&scores));
+            let gain = gain(&stated, &scores, &reading.change);
+            // Of six numbers two were chosen: some of the gain is chance.
+            let is_free = reading.mistake == Mistake::MovedCloud;
+            let gain = gain.map(|gain| if is_free { CHOSEN * gain } else { gain });
+            let otherwise = mean_of(&scores);
             log::debug!("{:?} {}: {gain:?} {otherwise:?}", reading.mistake, reading.remedy);
             if let Some(gain) = gain
                 && best.as_ref().is_none_or(|(known, ..)| gain > *known)
@@ -205,9 +212,8 @@ impl Sample {
                 change: Change::Aside(right_m),
             });
         }
-        if let Some(camera) = self.best_camera() {
-            found.push(camera);
-        }
+        found.extend(self.best_camera());
+        found.extend(self.best_move());
         let bends: Vec<f64> = (-16..=16).map(|step| 0.03 * f64::from(step)).collect();
         if let Some(k1) = self.best_of(&bends, &Change::Lens)
             && self.bends_by_px(k1) > MIN_PX
@@ -262,6 +268,84 @@ impl Sample {
         })
     }
 
+    /// Turns or shifts the clouds along one axis, and along a second one if that helps too.
+    fn best_move(&self) -> Option<Reading> {
+        const STEPS: i32 = 4;
+        const TURN_DEG: f64 = 2.0;
+        /// A step of a shift as a share of the depth.
+        const SHIFT: f64 = 0.05;
+        /// Fine steps are this share of a step.
+        const FINE: f64 = 0.2;
+        const AXES: usize = 2;
+        const NAMES: [&str; 6] = ["about y", "about x", "about z", "along x", "along y", "along z"];
+        let camera = self.sights.values().next()?.camera;
+        let depth_m = self.median_depth_m()?;
+        let step = |axis: usize| if axis < 3 { TURN_DEG } else { SHIFT * depth_m };
+        let mut moved = [0.0; 6];
+        let mut worth_before = worth(&mean_of(&self.scores(&Change::Move(moved))), IN_FRAME);
+        for _ in 0..AXES {
+            let along = |moved: &[f64; 6], axis: usize, by: f64| {
+                let mut changed = *moved;
+                changed[axis] += by * step(axis);
+                let score = mean_of(&self.scores(&Change::Move(changed)));
+                (changed, worth(&score, IN_FRAME))
+            };
+            let steps = (-STEPS..=STEPS).filter(|by| *by != 0).map(f64::from);
+            let coarse = (0..6).flat_map(|axis| steps.clone().map(move |by| (axis, by)));
+            let tried = coarse.map(|(axis, by)| (axis, along(&moved, axis, by)));
+            let (axis, (best, _)) = tried.max_by(|a, b| a.1.1.total_cmp(&b.1.1))?;
+            let fine = (-STEPS..=STEPS).map(|by| along(&best, axis, FINE * f64::from(by)));
+            let (best, worth) = fine.max_by(|a, b| a.1.total_cmp(&b.1))?;
+            if worth < worth_before + TELLING_GAIN {
+                break;
+            }
+            (moved, worth_before) = (best, worth);
+        }
+        let px_of = |axis: usize| match axis {
+            2 => moved[2].to_radians() * f64::from(camera.width) / 2.0,
+            0 | 1 => moved[axis].to_radians() * camera.fx,
+            _ => moved[axis] / depth_m * camera.fx,
+        };
+        let words = (0..6).filter(|axis| px_of(*axis).abs() > MIN_PX).map(|axis| match axis {
+            0..=2 => format!("turn the clouds by {:.1}° {}", moved[axis], NAMES[axis]),
+            _ => format!("shift the clouds by {:.2} {}", moved[axis], NAMES[axis]),
+        });
+        let words: Vec<String> = words.collect();
+        (!words.is_empty()).then(|| Reading {
+            mistake: Mistake::MovedCloud,
+            remedy: words.join(" and "),
+            change: Change::Move(moved),
+        })
+    }
+
+    /// Whether the stated lengths are such as a wrong unit would leave. At one place all photos agree, so a unit that
+    /// draws cameras together would always seem to fit.
+    fn may_be(&self, change: &Change) -> bool {
+        /// What no scan reaches.
+        const FAR_M: f64 = 300.0;
+        let Change::Size(times) = *change else { return true };
+        let Some(depth_m) = self.median_depth_m() else { return true };
+        let steps = self.anchors.iter().flat_map(|&anchor| {
+            let here = self.poses.get(anchor).copied().flatten();
+            let there = partners(anchor, self.poses.len());
+            there.filter_map(move |partner| {
+                Some((self.poses[partner]?.translation.vector - here?.translation.vector).norm())
+            })
+        });
+        let mut steps: Vec<f64> = steps.collect();
+        steps.sort_by(f64::total_cmp);
+        let step_m = steps.get(steps.len() / 2).copied().unwrap_or(0.0);
+        if times < 1.0 { depth_m > FAR_M } else { step_m > depth_m }
+    }
+
+    /// The median depth of the points of the compared clouds.
+    fn median_depth_m(&self) -> Option<f64> {
+        let points = self.clouds.values().flatten();
+        let mut depths: Vec<f64> = points.map(|point| point.z).filter(|z| *z > 0.0).collect();
+        depths.sort_by(f64::total_cmp);
+        depths.get(depths.len() / 2).copied()
+    }
+
     /// How far a distortion moves pixels at the left and right edge.
     fn bends_by_px(&self, k1: f64) -> f64 {
         let Some(sight) = self.sights.values().next() else {
@@ -303,7 +387,10 @@ fn gain(stated: &[Agreement], other: &[Agreement], change: &Change) -> Option<f6
     if gains.len() < MIN_FRAMES.min(stated.len()).max(2) || gains.len() * 2 < stated.len() {
         return None;
     }
-    let has_number = matches!(change, Change::Aside(_) | Change::Camera { .. } | Change::Lens(_));
+    let has_number = matches!(
+        change,
+        Change::Aside(_) | Change::Camera { .. } | Change::Lens(_) | Change::Move(_)
+    );
     if has_number && gains.len() < MIN_FRAMES {
         return None;
     }

@@ -1,15 +1,17 @@
-//! What only several queries can show: a mistake of a whole scene.
+//! Mistakes of a whole scene: what only several queries can show, and what `posescope doctor` says of the scene.
 //!
 //! One query's verdict about a camera, about poses or about a cloud may be chance. Where several queries agree on one
 //! value, it is not.
 
 use std::collections::BTreeSet;
+use std::mem::discriminant;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
 use super::groups::grouped;
 use crate::diagnosis::{Code, Diagnosis};
+use crate::doctor::{self, Subject};
 use crate::localize::QueryResult;
 
 /// The least number of queries that agree.
@@ -18,16 +20,24 @@ const MIN_QUERIES: usize = 3;
 const AGREEING: f64 = 0.02;
 /// The share of all queries that must agree if fewer than [`MIN_QUERIES`] of them are certain.
 const COMMON_HINT: f64 = 0.25;
+/// The share of all queries whose clouds must not fit, by whatever value.
+const COMMON_MISFIT: f64 = 1.0 / 3.0;
+/// The share of a scene's queries that fail where a mistake of the scene matters.
+const COMMON_FAILURE: f64 = 0.25;
 
-/// A mistake that several queries agree on.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+/// A mistake of a whole scene.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Finding {
     /// The verdict of the single queries.
     pub code: Code,
     /// The scene or the method with the mistake.
     pub of: String,
-    /// The number of queries that agree.
+    /// What is wrong with it.
+    pub about: Subject,
+    /// The number of queries that agree; 0 if only `posescope doctor` says it.
     pub queries: usize,
+    /// Whether `posescope doctor` says so.
+    pub doctor: bool,
     /// The mistake in one sentence.
     pub text: String,
     /// The value that they agree on.
@@ -55,8 +65,9 @@ struct Vote<'a> {
     certain: bool,
 }
 
-/// The mistakes that queries of these results agree on, in the order of the results.
-pub fn findings(results: &[&QueryResult]) -> Vec<Finding> {
+/// The mistakes that queries of these results agree on, in the order of the results, and before them what
+/// `posescope doctor` says of scenes whose queries fail often.
+pub fn findings(results: &[&QueryResult], examined: &[Finding]) -> Vec<Finding> {
     let votes = results.iter().flat_map(|result| {
         let alone = result.per_reference.iter().flatten();
         let verdicts = alone.chain([*result]).flat_map(|one| &one.diagnosis);
@@ -69,13 +80,56 @@ pub fn findings(results: &[&QueryResult]) -> Vec<Finding> {
                 Claim::Poses { .. } if is_given(result) => result.method.to_string(),
                 _ => result.scene.clone(),
             };
-            let kind = std::mem::discriminant(&claim);
-            ((of, format!("{kind:?}")), Vote { query: &result.query, claim, certain })
+            (of, Vote { query: &result.query, claim, certain })
         })
     });
     let by_subject = grouped(votes).into_iter();
-    let agreed = by_subject.filter_map(|((of, _), votes)| agreed(of, &votes, results));
-    without_references(results).into_iter().chain(agreed).collect()
+    let agreed = by_subject.flat_map(|(of, votes)| agreed(&of, votes, results));
+    let failing = failing_scenes(results);
+    let quoted = examined.iter().filter(|one| failing.contains(&one.of)).cloned();
+    let mut found: Vec<Finding> = without_references(results).into_iter().chain(quoted).collect();
+    for one in agreed {
+        // Nothing contradicts the doctor, which has seen the whole scene.
+        match found.iter_mut().find(|known| known.doctor && known.of == one.of) {
+            None => found.push(one),
+            Some(known) if known.about == one.about => {
+                let text = format!("{} `posescope doctor` agrees.", one.text);
+                *known = Finding { doctor: true, text, ..one };
+            }
+            Some(_) => {}
+        }
+    }
+    found
+}
+
+/// What `posescope doctor` says of a scene.
+pub fn of_examination(scene: &str, found: &doctor::Finding) -> Finding {
+    let about = found.mistake.about();
+    Finding {
+        code: Code::X1,
+        of: scene.to_owned(),
+        about: found.mistake.subject(),
+        queries: 0,
+        doctor: true,
+        text: format!("`posescope doctor` says of {scene}: {about}; {}.", found.remedy),
+        evidence: json!({ "remedy": found.remedy }),
+    }
+}
+
+/// The scenes of references whose queries fail so often that a mistake of the scene may be the cause.
+pub fn failing_scenes(results: &[&QueryResult]) -> BTreeSet<String> {
+    let of_scenes = grouped(results.iter().map(|result| (&result.scene, *result))).into_iter();
+    let failing = of_scenes.filter(|(_, results)| {
+        let failed = results.iter().filter(|result| result.grade.is_failure());
+        let failed: BTreeSet<&str> = failed.map(|result| result.query.as_str()).collect();
+        let share = failed.len() as f64 / queries_of(results).len() as f64;
+        failed.len() >= MIN_QUERIES && share >= COMMON_FAILURE
+    });
+    failing.map(|(scene, _)| scene.clone()).collect()
+}
+
+fn queries_of<'a>(results: &[&'a QueryResult]) -> BTreeSet<&'a str> {
+    results.iter().map(|result| result.query.as_str()).collect()
 }
 
 /// Pairs of scenes in which no query has a reference.
@@ -83,12 +137,14 @@ fn without_references(results: &[&QueryResult]) -> Vec<Finding> {
     let pairs =
         grouped(results.iter().map(|result| ((&result.scene, &result.query_scene), *result)));
     let lacking = pairs.into_iter().filter_map(|((scene, query_scene), results)| {
-        let queries: BTreeSet<&str> = results.iter().map(|result| result.query.as_str()).collect();
+        let queries = queries_of(&results);
         let is_lacking = results.iter().all(|result| result.references.is_empty());
         (is_lacking && queries.len() >= MIN_QUERIES).then(|| Finding {
             code: Code::R1,
             of: scene.clone(),
+            about: Subject::Poses,
             queries: queries.len(),
+            doctor: false,
             text: format!(
                 "None of {} queries of {} has a reference in {scene}. The poses may be in another unit or place.",
                 queries.len(),
@@ -134,16 +190,33 @@ fn claim(verdict: &Diagnosis) -> Option<Claim> {
     evidence.get("wrong_depth").is_some().then_some(Claim::Clouds)
 }
 
-/// The claim that most queries agree on, if they are enough.
-fn agreed(of: String, votes: &[Vote<'_>], results: &[&QueryResult]) -> Option<Finding> {
+/// What the votes about a scene or a method agree on.
+fn agreed(of: &str, votes: Vec<Vote<'_>>, results: &[&QueryResult]) -> Vec<Finding> {
+    let all = queries_of(results).len();
+    // Cameras that differ from query to query say no more than that the clouds do not fit.
+    let misfits: BTreeSet<&str> =
+        votes.iter().filter(|vote| vote.claim.is_misfit()).map(|vote| vote.query).collect();
+    let of_kinds = grouped(votes.into_iter().map(|vote| (discriminant(&vote.claim), vote)));
+    let mut found: Vec<Finding> =
+        of_kinds.iter().filter_map(|(_, votes)| most_agree(of, votes, all)).collect();
+    let is_common =
+        misfits.len() >= MIN_QUERIES && misfits.len() as f64 >= COMMON_MISFIT * all as f64;
+    if is_common && !found.iter().any(|one| one.about == Subject::Camera) {
+        found.push(Claim::Clouds.finding(of, misfits.len()));
+    }
+    found
+}
+
+/// The claim that most queries agree on, if they are enough of `all`.
+fn most_agree(of: &str, votes: &[Vote<'_>], all: usize) -> Option<Finding> {
     let queries_of = |wanted: &dyn Fn(&&Vote<'_>) -> bool| -> BTreeSet<&str> {
         votes.iter().filter(wanted).map(|vote| vote.query).collect()
     };
     let queries_for = |claim: &Claim| queries_of(&|vote| claim.agrees(&vote.claim));
-    // Claims that are equal are asked once.
+    // Claims that are equal are asked once. Clouds have no value to agree on.
     let mut claims: Vec<&Claim> = Vec::new();
     for vote in votes {
-        if !claims.contains(&&vote.claim) {
+        if vote.claim != Claim::Clouds && !claims.contains(&&vote.claim) {
             claims.push(&vote.claim);
         }
     }
@@ -153,19 +226,10 @@ fn agreed(of: String, votes: &[Vote<'_>], results: &[&QueryResult]) -> Option<Fi
         candidates.reduce(|best, next| if next.0.len() > best.0.len() { next } else { best })?;
     let voting = queries_of(&|_| true);
     let certain = queries_of(&|vote| vote.certain && claim.agrees(&vote.claim));
-    let all: BTreeSet<&str> = results.iter().map(|result| result.query.as_str()).collect();
     // A mistake of a whole scene is seen in many of its queries; chance agrees in a few of many.
     let is_common = 3 * queries.len() >= voting.len()
-        && claim.is_common(queries.len(), all.len())
-        && (certain.len() >= MIN_QUERIES || queries.len() as f64 >= COMMON_HINT * all.len() as f64);
-    let (text, evidence) = claim.words(&of, queries.len());
-    (queries.len() >= MIN_QUERIES && is_common).then_some(Finding {
-        code: Code::X1,
-        of,
-        queries: queries.len(),
-        text,
-        evidence,
-    })
+        && (certain.len() >= MIN_QUERIES || queries.len() as f64 >= COMMON_HINT * all as f64);
+    (queries.len() >= MIN_QUERIES && is_common).then(|| claim.finding(of, queries.len()))
 }
 
 impl Claim {
@@ -183,9 +247,25 @@ impl Claim {
         }
     }
 
-    /// Whether so many queries are enough of all. Only clouds have no value to agree on.
-    fn is_common(&self, queries: usize, all: usize) -> bool {
-        *self != Self::Clouds || 2 * queries >= all
+    /// Whether it may only mean that the clouds do not fit the photos of the references.
+    fn is_misfit(&self) -> bool {
+        matches!(self, Self::Clouds | Self::Camera { whose: BOTH, .. })
+    }
+
+    fn about(&self) -> Subject {
+        match self {
+            Self::Camera { .. } => Subject::Camera,
+            Self::Poses { reading } if reading.ends_with("metres") => Subject::Units,
+            Self::Poses { .. } => Subject::Poses,
+            Self::Units { .. } => Subject::Units,
+            Self::Clouds => Subject::Clouds,
+        }
+    }
+
+    fn finding(&self, of: &str, queries: usize) -> Finding {
+        let (text, evidence) = self.words(of, queries);
+        let of = of.to_owned();
+        Finding { code: Code::X1, of, about: self.about(), queries, doctor: false, text, evidence }
     }
 
     fn words(&self, of: &str, queries: usize) -> (String, Value) {
@@ -211,7 +291,10 @@ impl Claim {
                 json!({ "unit": unit }),
             ),
             Self::Clouds => (
-                format!("The clouds of {of} do not fit its photos, by {queries} queries."),
+                format!(
+                    "The clouds of {of} do not fit its photos, by {queries} queries: they are of other frames, or moved, or \
+                     the camera is another."
+                ),
                 json!({}),
             ),
         }
@@ -221,6 +304,7 @@ impl Claim {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::doctor::Mistake;
     use crate::measure::metrics::tests::row;
 
     fn with_camera(query: &str, fx: f64) -> QueryResult {
@@ -231,7 +315,7 @@ mod tests {
     }
 
     fn found(rows: &[QueryResult]) -> Vec<Finding> {
-        findings(&rows.iter().collect::<Vec<_>>())
+        findings(&rows.iter().collect::<Vec<_>>(), &[])
     }
 
     #[test]
@@ -282,5 +366,73 @@ mod tests {
         // One query counts once, however many of its methods agree.
         let same = [with_camera("a", 600.0), with_camera("a", 600.0), with_camera("a", 601.0)];
         assert_eq!(found(&same), []);
+    }
+
+    fn with_misfit(query: &str) -> QueryResult {
+        let evidence = json!({ "wrong_depth": 5, "certain": false });
+        let verdict = Diagnosis { code: Code::X1, text: String::new(), evidence };
+        QueryResult { diagnosis: vec![verdict], ..row(query, "fb", Some(9.0)) }
+    }
+
+    #[test]
+    fn clouds_that_do_not_fit_in_a_third_of_the_queries_are_a_finding() {
+        let with_right = |misfits: &[QueryResult], count: usize| {
+            let right = (0..count).map(|at| row(&format!("right {at}"), "fb", Some(0.1)));
+            let of: Vec<Subject> = found(&misfits.iter().cloned().chain(right).collect::<Vec<_>>())
+                .iter()
+                .map(|one| one.about)
+                .collect();
+            of
+        };
+        let misfits = ["a", "b", "c"].map(with_misfit);
+        assert_eq!(with_right(&misfits, 6), [Subject::Clouds]);
+        assert_eq!(with_right(&misfits, 7), []);
+        assert_eq!(with_right(&misfits[..2], 0), []);
+        // A camera of queries and references that is another in each query is a cloud that does not fit.
+        let camera_of_both = |query: &str, fx: f64| {
+            let mut result = with_camera(query, fx);
+            let evidence = result.diagnosis[0].evidence.as_object_mut().expect("an object");
+            evidence.remove("explained");
+            result
+        };
+        let each = [("a", 600.0), ("b", 700.0), ("c", 800.0)].map(|(q, f)| camera_of_both(q, f));
+        assert_eq!(with_right(&each, 6), [Subject::Clouds]);
+        let same = ["a", "b", "c"].map(|query| camera_of_both(query, 600.0));
+        assert_eq!(with_right(&same, 6), [Subject::Camera]);
+    }
+
+    #[test]
+    fn what_the_doctor_says_is_quoted_and_never_contradicted() {
+        let says = |mistake: Mistake| {
+            let found = doctor::Finding {
+                mistake,
+                remedy: "correct it".into(),
+                stated: Default::default(),
+                otherwise: Default::default(),
+            };
+            of_examination("street", &found)
+        };
+        let rows = ["a", "b", "c"].map(|query| with_camera(query, 600.0));
+        let with = |mistake| findings(&rows.iter().collect::<Vec<_>>(), &[says(mistake)]);
+
+        let agreed = with(Mistake::WrongCamera);
+        assert_eq!((agreed.len(), agreed[0].queries, agreed[0].doctor), (1, 3, true));
+        assert!(agreed[0].text.ends_with("`posescope doctor` agrees."), "{}", agreed[0].text);
+
+        let otherwise = with(Mistake::InversePose);
+        assert_eq!((otherwise.len(), otherwise[0].queries), (1, 0));
+        assert_eq!(otherwise[0].about, Subject::Poses);
+        assert!(otherwise[0].text.contains("correct it"), "{}", otherwise[0].text);
+    }
+
+    #[test]
+    fn the_doctor_is_heard_where_three_and_a_quarter_of_the_queries_fail() {
+        let with = |wrong: usize, right: usize| {
+            let far = (0..wrong).map(|at| row(&format!("wrong {at}"), "fb", Some(99.0)));
+            let near = (0..right).map(|at| row(&format!("right {at}"), "fb", Some(0.1)));
+            let rows: Vec<QueryResult> = far.chain(near).collect();
+            failing_scenes(&rows.iter().collect::<Vec<_>>()).len()
+        };
+        assert_eq!([with(3, 9), with(3, 10), with(2, 0), with(0, 5)], [1, 0, 0, 0]);
     }
 }

@@ -43,8 +43,8 @@ impl Bar {
 }
 
 impl Overview {
-    /// Of the results of a run.
-    pub fn of(results: &[&QueryResult]) -> Self {
+    /// Of the results of a run, and of what `posescope doctor` says of its scenes.
+    pub fn of(results: &[&QueryResult], examined: &[Finding]) -> Self {
         let bars = grouped(results.iter().map(|result| (label(result), result.grade)));
         let bars = bars.into_iter().map(|(name, grades)| {
             let of = |grade| grades.iter().filter(|one| **one == grade).count();
@@ -54,7 +54,8 @@ impl Overview {
         let mut causes = causes(results.iter().filter(|result| result.grade.is_failure()));
         // A stable sort: causes that are as frequent stay in the order in which they occur.
         causes.sort_by_key(|(_, times)| std::cmp::Reverse(*times));
-        Self { findings: findings(results), headline: headline(results, &bars), bars, causes }
+        let findings = findings(results, examined);
+        Self { findings, headline: headline(results, &bars), bars, causes }
     }
 }
 
@@ -134,7 +135,7 @@ mod tests {
         rows[3].diagnosis = vec![crate::measure::metrics::tests::finding(Code::D3)];
         rows.push(row("3", "mi", Some(0.2)));
         let all: Vec<&QueryResult> = rows.iter().collect();
-        let overview = Overview::of(&all);
+        let overview = Overview::of(&all, &[]);
         assert_eq!(
             overview.headline,
             format!(
@@ -149,11 +150,11 @@ mod tests {
             .collect();
         assert_eq!(counts, [("FB", 1, 2), ("MI", 2, 3)]);
         assert_eq!(overview.causes, [(Code::D3, 1)]);
-        let wrong = Overview::of(&[&rows[3], &rows[1]]);
+        let wrong = Overview::of(&[&rows[3], &rows[1]], &[]);
         let title = Code::D3.title();
         let words = "No method is right for the query. Most frequent cause of the failures:";
         assert_eq!(wrong.headline, format!("{words} {title} (1 of 2)."));
-        assert_eq!(Overview::of(&[]).headline, "There are no results yet.");
+        assert_eq!(Overview::of(&[], &[]).headline, "There are no results yet.");
     }
 
     #[test]
@@ -167,7 +168,7 @@ mod tests {
             })
             .collect();
         let all: Vec<&QueryResult> = rows.iter().collect();
-        let causes = Overview::of(&all).causes;
+        let causes = Overview::of(&all, &[]).causes;
         assert_eq!(causes, [(Code::D3, 2), (Code::R2, 1), (Code::D4, 1)]);
     }
 }

@@ -1,4 +1,5 @@
-//! The reports of a finished run: `summary.json` and `junit.xml`. Both are derived from `run.toml` and `results.jsonl`.
+//! The reports of a finished run: `summary.json` and `junit.xml`. But for what `posescope doctor` says of the scenes, both
+//! are derived from `run.toml` and `results.jsonl`.
 
 use std::fs;
 use std::path::Path;
@@ -6,7 +7,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use super::diff::{Change, RunComparison};
-use super::findings::{Finding, findings};
+use super::findings::{Finding, failing_scenes, findings};
 use super::gate::{Gate, GateResult};
 use super::known::{KnownFailures, KnownReport};
 use super::metrics::{Measures, measure};
@@ -29,7 +30,7 @@ const SUMMARY: &str = "summary.json";
 pub struct Report {
     /// The figures by group and method.
     pub measures: Vec<Measures>,
-    /// The mistakes that several queries agree on.
+    /// The mistakes of whole scenes.
     pub findings: Vec<Finding>,
     /// The outcomes of the gates.
     pub gate_results: Vec<GateResult>,
@@ -97,42 +98,51 @@ struct Summary<'a> {
     gates: &'a [GateResult],
     #[serde(skip_serializing_if = "<[_]>::is_empty")]
     findings: &'a [Finding],
+    #[serde(skip_serializing_if = "<[_]>::is_empty")]
+    doctor: &'a [Finding],
 }
 
-/// The part of a summary that is read back.
-#[derive(Deserialize)]
-struct GatesOfSummary {
+/// The part of a summary that does not follow from the results.
+#[derive(Clone, Debug, Default, Deserialize)]
+pub struct StoredSummary {
+    /// The outcomes of the gates.
     #[serde(default)]
-    gates: Vec<GateResult>,
+    pub gates: Vec<GateResult>,
+    /// What `posescope doctor` says of scenes whose queries fail often.
+    #[serde(default)]
+    pub doctor: Vec<Finding>,
 }
 
-/// The outcomes of the gates in a run's summary; empty if it has no summary.
-///
-/// # Errors
-/// A summary that cannot be read.
-pub fn read_gate_results(folder: &Path) -> Result<Vec<GateResult>, FolderError> {
-    let path = folder.join(SUMMARY);
-    let text = match fs::read_to_string(&path) {
-        Ok(text) => text,
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(Vec::new()),
-        Err(error) => return Err(FolderError::io(path)(error)),
-    };
-    let summary: Result<GatesOfSummary, _> = serde_json::from_str(&text);
-    match summary {
-        Ok(summary) => Ok(summary.gates),
-        Err(error) => {
-            Err(FolderError::Damaged { path, line: error.line(), message: json_message(&error) })
-        }
+impl StoredSummary {
+    /// That of a run; empty if it has none.
+    ///
+    /// # Errors
+    /// A summary that cannot be read.
+    pub fn read(folder: &Path) -> Result<Self, FolderError> {
+        let path = folder.join(SUMMARY);
+        let text = match fs::read_to_string(&path) {
+            Ok(text) => text,
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
+                return Ok(Self::default());
+            }
+            Err(error) => return Err(FolderError::io(path)(error)),
+        };
+        serde_json::from_str(&text).map_err(|error| FolderError::Damaged {
+            path,
+            line: error.line(),
+            message: json_message(&error),
+        })
     }
 }
 
-/// Measures a run and writes its reports.
+/// Measures a run and writes its reports. `examined` is what `posescope doctor` says of its scenes.
 ///
 /// # Errors
 /// A result that cannot be read, or a file that cannot be written.
 pub fn write_report(
     folder: &Path,
     run: &RunFile,
+    examined: &[Finding],
     gates: &[Gate],
     known: &KnownFailures,
 ) -> Result<Report, FolderError> {
@@ -148,13 +158,17 @@ pub fn write_report(
     let gated = measured(timed.filter(|(row, _)| !known.has(row)).collect());
     let gate_results: Vec<GateResult> = gates.iter().map(|gate| gate.check(&gated)).collect();
     let known_report = known.report(&rows);
-    let findings = findings(&rows.iter().collect::<Vec<_>>());
+    let of_run: Vec<&QueryResult> = rows.iter().collect();
+    let findings = findings(&of_run, examined);
+    let failing = failing_scenes(&of_run);
+    let examined = examined.iter().filter(|one| failing.contains(&one.of));
     let summary = Summary {
         schema: SUMMARY_SCHEMA,
         failure_radius_m: run.failure_radius_m(),
         groups: &measures,
         gates: &gate_results,
         findings: &findings,
+        doctor: &examined.cloned().collect::<Vec<_>>(),
     };
     let json = serde_json::to_vec_pretty(&summary);
     let json = json.map_err(|error| FolderError::io(folder)(error.into()))?;

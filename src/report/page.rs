@@ -22,7 +22,7 @@ const SCRIPT: &str = include_str!("../../assets/report/report.js");
 pub(super) fn page(report: &RunReport) -> String {
     let title = title(&report.run);
     let all: Vec<_> = report.results.iter().map(|one| &one.result).collect();
-    let overview = Overview::of(&all);
+    let overview = Overview::of(&all, &report.summary.doctor);
     let columns = results::columns(report);
     let rules = results::column_rules(&columns);
     html! {
@@ -40,7 +40,7 @@ pub(super) fn page(report: &RunReport) -> String {
                     @for finding in &overview.findings { p.headline { b.wrong { (finding.text) } } }
                     p.headline { (with_code(&overview.headline)) }
                     nav aria-label="Parts of the report" {
-                        @if !report.gates.is_empty() { a href="#gates" { "Gates" } " " }
+                        @if !report.summary.gates.is_empty() { a href="#gates" { "Gates" } " " }
                         @if report.baseline.is_some() { a href="#changes" { "Changes" } " " }
                         a href="#methods" { "Methods" } " "
                         @if !overview.causes.is_empty() { a href="#causes" { "Causes" } " " }
@@ -102,16 +102,16 @@ fn thumbnails(report: &RunReport) -> String {
 }
 
 fn gates(report: &RunReport) -> Markup {
-    let failed = report.gates.iter().filter(|gate| !gate.passed).count();
+    let failed = report.summary.gates.iter().filter(|gate| !gate.passed).count();
     html! {
-        @if !report.gates.is_empty() {
+        @if !report.summary.gates.is_empty() {
             section aria-labelledby="gates" {
                 h2 id="gates" { "Gates" }
                 p {
                     @if failed == 0 { b.right { "All gates passed." } }
-                    @else { b.wrong { (failed) " of " (report.gates.len()) " gates failed." } }
+                    @else { b.wrong { (failed) " of " (report.summary.gates.len()) " gates failed." } }
                 }
-                (table(&GateResult::table(&report.gates)))
+                (table(&GateResult::table(&report.summary.gates)))
             }
         }
     }

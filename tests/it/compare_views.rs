@@ -171,7 +171,8 @@ fn over_two_runs() -> (Harness<'static, App>, Results, Results) {
         assert!(result.diagnosis.is_empty());
         result.diagnosis.clone_from(&told);
     }
-    let known = KnownResults { now: now.clone(), before: Some(before.clone()) };
+    let known =
+        KnownResults { now: now.clone(), before: Some(before.clone()), ..KnownResults::default() };
     let mut window = crate::window::window_with_results(setup(), known);
     run_until_idle(&mut window);
     (window, before, now)

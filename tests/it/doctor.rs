@@ -15,7 +15,7 @@ use crate::planted::{Fault, Planted};
 use crate::small_sequence::SmallSequence;
 
 /// What each fault is to be called; half a pixel is less than clouds and photos agree by.
-const EXPECTED: [(Fault, Option<Mistake>); 16] = [
+const EXPECTED: [(Fault, Option<Mistake>); 18] = [
     (Fault::Nothing, None),
     (Fault::InversePose, Some(Mistake::InversePose)),
     (Fault::PoseAxes, Some(Mistake::PoseAxes)),
@@ -30,15 +30,18 @@ const EXPECTED: [(Fault, Option<Mistake>); 16] = [
     (Fault::RadiansForDegrees, Some(Mistake::Degrees)),
     (Fault::LeftForRight, Some(Mistake::OtherStereoCamera)),
     (Fault::MirroredCloud, Some(Mistake::MirroredCloud)),
+    (Fault::TurnedCloud, Some(Mistake::MovedCloud)),
+    (Fault::LoweredCloud, Some(Mistake::MovedCloud)),
     (Fault::ReversedPoses, Some(Mistake::ReversedPoses)),
     (Fault::UndistortedTwice, Some(Mistake::UndistortedTwice)),
 ];
 
 /// The faults that every change is held to: of a pose, a cloud and a camera, of nothing, and of too little.
-const FEW: [Fault; 5] = [
+const FEW: [Fault; 6] = [
     Fault::Nothing,
     Fault::InversePose,
     Fault::MirroredCloud,
+    Fault::TurnedCloud,
     Fault::WrongCamera,
     Fault::HalfPixel,
 ];

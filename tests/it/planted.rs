@@ -24,6 +24,8 @@ pub enum Fault {
     RadiansForDegrees,
     LeftForRight,
     MirroredCloud,
+    TurnedCloud,
+    LoweredCloud,
     ReversedPoses,
     UndistortedTwice,
 }
@@ -162,6 +164,11 @@ impl Scene for Planted<'_> {
             Fault::MillimetreClouds => moved(&|p| p * 1000.0),
             Fault::LeftForRight => moved(&|p| Point3::new(p.x + BASELINE_M as f32, p.y, p.z)),
             Fault::MirroredCloud => moved(&|p| Point3::new(-p.x, p.y, p.z)),
+            Fault::TurnedCloud => {
+                let turn = Rotation3::from_axis_angle(&Vector3::y_axis(), 4_f32.to_radians());
+                moved(&|p| turn * p)
+            }
+            Fault::LoweredCloud => moved(&|p| Point3::new(p.x, p.y + 1.0, p.z)),
             _ => cloud,
         })
     }
