@@ -3,6 +3,7 @@
 use maud::{Markup, PreEscaped, html};
 
 use crate::palette::Rgb;
+use crate::scale::LengthUnit;
 
 /// The size of the plot area \[px\].
 const SIZE: (f64, f64) = (500.0, 300.0);
@@ -20,6 +21,28 @@ pub(crate) struct Chart {
     /// From bottom to top.
     pub marks: Vec<Mark>,
     pub legend: Vec<(String, Rgb)>,
+}
+
+impl Chart {
+    /// Says in the unit what titles and labels say in metres.
+    pub fn in_words_of(mut self, unit: LengthUnit) -> Self {
+        let marked = self.marks.iter_mut().flat_map(|mark| {
+            let words = match &mut mark.shape {
+                Shape::Words { text, .. } => Some(text),
+                _ => None,
+            };
+            words.into_iter().chain([&mut mark.title])
+        });
+        let axes = [&mut self.x, &mut self.y].into_iter();
+        let labels = axes.flat_map(|axis| {
+            let ticks = axis.ticks.iter_mut().map(|(_, label)| label);
+            ticks.chain([&mut axis.label])
+        });
+        for text in marked.chain(labels).chain([&mut self.title]) {
+            *text = unit.words(text);
+        }
+        self
+    }
 }
 
 /// An axis with its numbers or names.

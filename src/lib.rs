@@ -25,7 +25,7 @@ pub use posescope_core::{
 pub use posescope_core::{
     camera, cloud, cost, depth, describe, diagnosis, estimator, event, features, foreign, fusion,
     geometry, grid, history, image, localize, method, params, problem, render, retrieval, robust,
-    solver, text, trace,
+    scale, solver, text, trace,
 };
 
 #[cfg(feature = "app")]

@@ -24,6 +24,7 @@ use crate::palette::{self, Rgb};
 use crate::params::Params;
 use crate::picture;
 use crate::problem::Problem;
+use crate::scale::LengthUnit;
 use crate::trace::Record;
 
 pub use layout::{MARK, Place, free_corner, label_place, title_end};
@@ -138,6 +139,11 @@ impl ProofPicture {
     /// The picture that proves the primary verdict, or shows the stage that decided where there is none. `None`
     /// where the method told nothing that can be drawn.
     pub fn of(case: &ProofCase<'_>) -> Option<Self> {
+        let picture = Self::in_metres(case)?;
+        Some(picture.in_words_of(case.params.scale.unit()))
+    }
+
+    fn in_metres(case: &ProofCase<'_>) -> Option<Self> {
         match kind(case.result) {
             Proof::CostMap(overlay) => maps::cost_map(case, overlay),
             Proof::FreedViews => maps::freed_views(case),
@@ -150,6 +156,17 @@ impl ProofPicture {
             Proof::Ranking => places::ranking(case),
             Proof::DecidingStage => case.deciding_stage(),
         }
+    }
+
+    /// Says in the unit what titles and marks say in metres.
+    fn in_words_of(mut self, unit: LengthUnit) -> Self {
+        for panel in [&mut self.large].into_iter().chain(&mut self.below).chain(&mut self.beside) {
+            panel.title = unit.words(&panel.title);
+            for mark in &mut panel.marks {
+                mark.label = unit.words(&mark.label);
+            }
+        }
+        self
     }
 
     /// The same with a small panel, counted from 0, in the place of the large one.

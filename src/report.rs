@@ -20,6 +20,7 @@ use crate::measure::{
 };
 use crate::params::Params;
 use crate::run::{FAILURES, FolderError, RunFile, Scenes, read_run, recording_name};
+use crate::scale::LengthUnit;
 use crate::table::Table;
 use pictures::{DrawnProof, Witness, thumbnail};
 
@@ -142,6 +143,11 @@ impl RunReport {
             notes,
             baseline,
         })
+    }
+
+    /// The unit of lengths.
+    fn unit(&self) -> LengthUnit {
+        self.results.first().map(|one| one.result.unit).unwrap_or_default()
     }
 
     /// Whether the results come from several scenes or settings.

@@ -1,5 +1,7 @@
 //! Text tables, for terminals of any width, pipes, Markdown, CSV and LaTeX.
 
+use crate::scale::LengthUnit;
+
 /// The alignment of a column.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Align {
@@ -29,6 +31,16 @@ pub struct Table {
 }
 
 impl Table {
+    /// Says in the unit what names and cells say in metres.
+    #[must_use]
+    pub fn in_words_of(mut self, unit: LengthUnit) -> Self {
+        let cells = self.header.iter_mut().chain(self.rows.iter_mut().flatten());
+        for text in cells.chain([&mut self.caption]) {
+            *text = unit.words(text);
+        }
+        self
+    }
+
     /// A table without rows: the first column is text, the others are numbers.
     pub fn new(
         name: impl Into<String>,

@@ -76,5 +76,6 @@ pub(super) fn latest(run: &Run, span: &Span, cursor: usize) -> Option<String> {
     let last = span.records.end.checked_sub(1)?.min(cursor);
     let records = run.records().get(span.records.start..=last)?;
     let mut latest = records.iter().rev();
-    latest.find_map(|record| narration::sentence(&record.event))
+    let sentence = latest.find_map(|record| narration::sentence(&record.event))?;
+    Some(run.params.scale.unit().words(&sentence))
 }

@@ -38,6 +38,11 @@ impl<'a> ViewContext<'a> {
         Self { run, cursor, setup: &state.setup, options: &state.options, state, commands }
     }
 
+    /// Says in the unit of the scene what words say in metres.
+    pub(super) fn in_unit(&self, words: &str) -> String {
+        self.setup.task.params.scale.unit().words(words)
+    }
+
     /// The same at another position among the records of the run.
     pub(super) fn at(&self, cursor: usize) -> Self {
         Self { cursor, ..*self }

@@ -74,7 +74,10 @@ pub fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), CliError> {
         && matches!(task.protocol.selection(), Selection::Random(_))
     {
         let reach_m = task.reach_m();
-        terminal.say(|| format!("References are drawn at random within {reach_m} m of the query; --reference names others"));
+        let words = format!(
+            "References are drawn at random within {reach_m} m of the query; --reference names others"
+        );
+        terminal.say(|| size.scale.unit().words(&words));
     }
     if task.photos.is_some() {
         plan.warn_of_copies(&tasks)?;
@@ -264,12 +267,13 @@ impl Plan<'_> {
         let chosen = chooser.choose(query, &|_| false, observer)?;
         if chosen.frames.is_empty() {
             let name = &self.localizer.queries().frames()[query];
-            return Err(CliError::Unusable(format!(
+            let words = format!(
                 "{}: no frame with a pose and a cloud within {} m of query {name}; \
                  raise --radius or --prior, or name a frame with --reference",
                 self.localizer.references().name(),
                 self.task.reach_m()
-            )));
+            );
+            return Err(CliError::Unusable(self.task.params.scale.unit().words(&words)));
         }
         Ok(chosen)
     }

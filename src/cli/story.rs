@@ -43,7 +43,8 @@ fn pose(result: &QueryResult) -> Option<String> {
     let pose = result.pose.as_ref().filter(|_| is_ours && result.grade != Grade::Wrong)?;
     let [x, y, z] = pose.position_m;
     let [qx, qy, qz, qw] = pose.quaternion_xyzw;
-    Some(format!(
+    let words = format!(
         "world_from_camera: position {x:.3} {y:.3} {z:.3} m, quaternion x y z w {qx:.6} {qy:.6} {qz:.6} {qw:.6}"
-    ))
+    );
+    Some(result.unit.words(&words))
 }

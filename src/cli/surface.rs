@@ -57,7 +57,8 @@ pub fn surface(args: &RunArgs, out: &Path, terminal: &Terminal) -> Result<(), Cl
     write(&surface, out)?;
     if !terminal.is_quiet {
         let truth = queried.pose(query);
-        output::print(&described(&surface, &problem, truth.as_ref()))?;
+        let words = described(&surface, &problem, truth.as_ref());
+        output::print(&task.params.scale.unit().words(&words))?;
     }
     terminal.say(|| {
         let (hypotheses, out) = (surface.hypotheses(), out.display());

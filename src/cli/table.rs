@@ -23,8 +23,9 @@ pub fn results(results: &[(QueryResult, Duration)], width: Option<usize>) -> Str
     // Rows of the same query and references differ only in the method.
     let mut table = Table::with_notes(header, &[2, 5, 6, 7, 8], 3);
     for (result, time) in results {
-        let part = |part: fn(&PoseError) -> String| result.error.as_ref().map(part);
-        let start = result.initial_error.as_ref().map(PoseError::translation);
+        let words = |text: String| result.unit.words(&text);
+        let part = |part: fn(&PoseError) -> String| result.error.as_ref().map(part).map(words);
+        let start = result.initial_error.as_ref().map(PoseError::translation).map(words);
         table.push([
             result.query.clone(),
             result.references.join(" "),

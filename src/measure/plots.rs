@@ -52,6 +52,11 @@ impl Plot {
 
     /// One chart per pair of scenes; for causes, also per method.
     pub(crate) fn charts(self, run: &RunResults) -> Vec<Chart> {
+        let charts = self.in_metres(run).into_iter();
+        charts.map(|chart| chart.in_words_of(run.unit())).collect()
+    }
+
+    fn in_metres(self, run: &RunResults) -> Vec<Chart> {
         match self {
             Self::Errors => errors(&run.results).into_iter().collect(),
             Self::Verdicts => verdicts(&run.measures).into_iter().collect(),

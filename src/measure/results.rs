@@ -5,6 +5,7 @@ use std::path::Path;
 use super::metrics::{Measures, measure};
 use crate::localize::QueryResult;
 use crate::run::{FolderError, read_results, read_run};
+use crate::scale::LengthUnit;
 
 /// The results of a run with their figures.
 #[derive(Clone, Debug)]
@@ -18,6 +19,11 @@ pub struct RunResults {
 }
 
 impl RunResults {
+    /// The unit of lengths.
+    pub fn unit(&self) -> LengthUnit {
+        self.results.first().map(|result| result.unit).unwrap_or_default()
+    }
+
     /// Measures results.
     pub fn of(results: Vec<QueryResult>, failure_radius_m: f64) -> Self {
         Self { measures: measure(&results, failure_radius_m), results, failure_radius_m }

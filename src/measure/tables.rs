@@ -60,13 +60,16 @@ impl TableName {
             tables.extend(advantage(&run.measures).filter(|_| number >= 5));
             tables
         };
+        let in_unit = |tables: Vec<Table>| {
+            tables.into_iter().map(|table| table.in_words_of(run.unit())).collect()
+        };
         match self {
             Self::Rows => {
                 let fields = Field::ALL.iter().chain(Field::POSE);
                 vec![rows(&run.results, fields, Field::whole)]
             }
-            Self::Summary => shaped(&run.measures, |shape| shape.name == "summary"),
-            Self::Verdicts => verdicts(&run.measures).into_iter().collect(),
+            Self::Summary => in_unit(shaped(&run.measures, |shape| shape.name == "summary")),
+            Self::Verdicts => in_unit(verdicts(&run.measures).into_iter().collect()),
             Self::Paper1 => vec![paper::scenes(1)],
             Self::Paper2 => vec![paper::scenes(2)],
             Self::Paper3 => papers(3),

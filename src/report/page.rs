@@ -189,7 +189,7 @@ fn request(report: &RunReport) -> Markup {
                 @if let Some(shard) = run.shard { dt { "part" } dd { (shard) } }
                 dt { "methods" } dd { (protocol.methods.iter().map(|method| method.name()).collect::<Vec<_>>().join(", ")) }
                 dt { "right" } dd { "within " (protocol.right) " of the truth; wrong otherwise" }
-                dt { "success, as the paper counts it" } dd { "within " (run.failure_radius_m()) " m of the truth" }
+                dt { "success, as the paper counts it" } dd { (report.unit().words(&format!("within {} m of the truth", run.failure_radius_m()))) }
                 @for (option, value) in protocol.options() { dt { (option) } dd { (value) } }
                 dt { "parameters" }
                 dd {

@@ -223,6 +223,27 @@ fn a_room_is_searched_at_its_own_scale() {
     let model = std::path::Path::new(&data).join("colmap/lund_door");
     let asked =
         format!("run {} --query DSC_0003 --reference DSC_0002 --method fb", model.display());
-    sequence.run(&format!("{asked} --right 0.1,5deg --json model.jsonl"));
+    let ran = sequence.run(&format!("{asked},mi --right 0.1,5deg --json model.jsonl"));
     crate::binary::has(&sequence.text("model.jsonl"), r#""unit":null"#);
+    says_no_metres(&ran.out);
+    says_no_metres(&ran.err);
+    says_no_metres(&sequence.text("model.jsonl"));
+    let limits = "--limit 4 --method fb,mi --right 0.1,5deg --keep-failures 1";
+    let ran = sequence.run(&format!("eval {} {limits} --out model", model.display()));
+    for text in [ran.out, ran.err, sequence.text("model/report.html")] {
+        says_no_metres(&text);
+    }
+}
+
+/// No number in it has the unit metre.
+#[track_caller]
+fn says_no_metres(text: &str) {
+    for (at, _) in text.match_indices(" m") {
+        let is_after_number = text[..at].ends_with(|c: char| c.is_ascii_digit() || c == ')');
+        let is_word = text[at + 2..].starts_with(|c: char| c.is_alphanumeric() || c == '²');
+        let around: String = text[..at + 2].chars().rev().take(80).collect();
+        let around: String = around.chars().rev().collect();
+        assert!(!is_after_number || is_word, "{around}");
+    }
+    assert!(!text.contains("(m)") && !text.contains("[m]"), "{text}");
 }

@@ -14,8 +14,8 @@ pub use choose::Chooser;
 pub use localizer::{LocalizeError, Localizer, Request, is_one_drive};
 pub use observer::{LocalizeObserver, NoObserver};
 pub use result::{
-    Agreement, CostAtPose, CostReport, Explanation, Helped, LengthUnit, PoseReport, QueryResult,
-    Reason, SCHEMA, Setting, Status, evaluate,
+    Agreement, CostAtPose, CostReport, Explanation, Helped, PoseReport, QueryResult, Reason,
+    SCHEMA, Setting, Status, evaluate,
 };
 pub use select::{
     ByMatches, ChoiceError, Ranking, References, Selection, draw, frames_within, report_ranking,

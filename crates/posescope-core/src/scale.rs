@@ -43,6 +43,11 @@ impl Scale {
         self.is_metric
     }
 
+    /// The unit of lengths.
+    pub fn unit(self) -> LengthUnit {
+        if self.is_metric { LengthUnit::Metre } else { LengthUnit::Model }
+    }
+
     /// Whether it is that of the paper, in metres.
     pub fn is_paper(self) -> bool {
         self == Self::PAPER
@@ -85,6 +90,54 @@ fn short(number: f64) -> f64 {
     format!("{number:.9e}").parse().unwrap_or(number)
 }
 
+/// The unit of lengths.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(from = "Option<String>", into = "Option<String>")]
+pub enum LengthUnit {
+    /// The metre.
+    #[default]
+    Metre,
+    /// That of a model which has no metric scale; written as null.
+    Model,
+}
+
+impl LengthUnit {
+    pub(crate) fn is_metre(&self) -> bool {
+        *self == Self::Metre
+    }
+
+    /// Words about lengths in metres, as words about as many of this unit: `0.25 m` becomes `0.25 units` in a model
+    /// without metric scale, and `(m)` becomes `(units)`.
+    pub fn words(self, text: &str) -> String {
+        const METRE: &str = " m";
+        if self.is_metre() {
+            return text.to_owned();
+        }
+        let text = text.replace("[m]", "[units]").replace("(m)", "(units)");
+        let mut parts = text.split(METRE);
+        let mut words = parts.next().unwrap_or_default().to_owned();
+        for part in parts {
+            let is_after_number = words.ends_with(|c: char| c.is_ascii_digit() || c == ')');
+            let ends_here = !part.starts_with(|c: char| c.is_alphanumeric() || c == '²');
+            words += if is_after_number && ends_here { " units" } else { METRE };
+            words += part;
+        }
+        words
+    }
+}
+
+impl From<LengthUnit> for Option<String> {
+    fn from(unit: LengthUnit) -> Self {
+        unit.is_metre().then(|| "m".to_owned())
+    }
+}
+
+impl From<Option<String>> for LengthUnit {
+    fn from(unit: Option<String>) -> Self {
+        if unit.is_some() { Self::Metre } else { Self::Model }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -107,5 +160,14 @@ mod tests {
         assert_eq!((room.radius(), Scale::PAPER.radius()), (1.0, 15.0));
         assert_eq!(room.per_length(3.0), 30.0);
         assert_eq!(Scale::PAPER.length(0.004), 0.004);
+    }
+
+    #[test]
+    fn a_model_without_scale_has_units_where_a_scene_has_metres() {
+        let text =
+            "It is 12.5 m off, 3 m² and 4 metres, in frame m; 2 mm, 0.3 m. Ahead [m], (1, 2) m";
+        assert_eq!(LengthUnit::Metre.words(text), text);
+        let words = "It is 12.5 units off, 3 m² and 4 metres, in frame m; 2 mm, 0.3 units. Ahead [units], (1, 2) units";
+        assert_eq!(LengthUnit::Model.words(text), words);
     }
 }

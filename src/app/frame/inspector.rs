@@ -99,12 +99,13 @@ fn why(ui: &mut Ui, context: &ViewContext<'_>) {
     if !result.agreement.is_empty() {
         heading(ui, "Poses of the other methods");
         for one in &result.agreement {
-            ui.label(format!(
+            let words = format!(
                 "{}: {:.2} m and {:.1}° away",
                 one.method.label(),
                 one.translation_m,
                 one.rotation_deg
-            ));
+            );
+            ui.label(result.unit.words(&words));
         }
     }
 }
@@ -305,7 +306,10 @@ fn remedy(ui: &mut Ui, context: &ViewContext<'_>, helped: &Helped) {
         ui.set_width(ui.available_width());
         ui.label(RichText::new(&args).monospace().size(12.0));
         let color = theme::grade(ui.visuals(), Grade::Right);
-        ui.label(RichText::new(format!("● {}", helped.error.translation())).color(color));
+        ui.label(
+            RichText::new(format!("● {}", context.in_unit(&helped.error.translation())))
+                .color(color),
+        );
     });
     let response = response.response.interact(Sense::click());
     let spoken = format!("Run with {args}");

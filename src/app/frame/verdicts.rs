@@ -200,7 +200,7 @@ fn remedy(ui: &mut Ui, context: &ViewContext<'_>, result: &QueryResult) {
     let (text, help) = match (&result.explanation, explaining) {
         (Some(explanation), _) => match explanation.best() {
             Some(helped) => {
-                number = format!(" → {}", helped.error.translation());
+                number = format!(" → {}", context.in_unit(&helped.error.translation()));
                 args = Some(helped.args.clone());
                 let all = helped.args.join(" ");
                 let help = format!("Keeps this run as A and runs the query with {all}");

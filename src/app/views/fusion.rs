@@ -126,8 +126,8 @@ fn map(ui: &mut Ui, context: &ViewContext<'_>, fused: &[&ReferencesFused], heigh
         .height(height)
         .data_aspect(1.0)
         .allow_scroll(false)
-        .x_axis_label("right of the first reference [m]")
-        .y_axis_label("ahead [m]")
+        .x_axis_label(context.in_unit("right of the first reference [m]"))
+        .y_axis_label(context.in_unit("ahead [m]"))
         .legend(Legend::default())
         .show(ui, |plot| {
             for problem in problems {

@@ -101,7 +101,7 @@ pub(super) fn method_name(ui: &Ui, method: Method) -> RichText {
 /// How far a pose is from the truth, in words, if that is known and shown.
 pub(super) fn from_truth(context: &ViewContext<'_>, pose: &Pose) -> Option<String> {
     let error = PoseError::between(context.truth()?, pose);
-    Some(format!("{}, {}", error.translation(), error.rotation()))
+    Some(context.in_unit(&format!("{}, {}", error.translation(), error.rotation())))
 }
 
 /// Writes what is at the point of a plot under the pointer; `words` take the name of its line.

@@ -29,7 +29,7 @@ impl View for LogView {
                         let name = ended.stage.name().replace('_', " ");
                         (indent, format!("{name} stopped here"))
                     }
-                    event => (indent + 1, narration::sentence(event)?),
+                    event => (indent + 1, context.in_unit(&narration::sentence(event)?)),
                 };
                 Some((at, indent, words))
             })

@@ -44,7 +44,7 @@ impl View for ReferencesView {
         let mut shown: Vec<usize> = chosen.clone();
         shown.extend(frames.iter().filter(|frame| !chosen.contains(frame)));
         let (used, all) = (chosen.len(), frames.len());
-        ui.weak(format!("{used} of {all} frames within {radius_m} m"));
+        ui.weak(context.in_unit(&format!("{used} of {all} frames within {radius_m} m")));
         let area = ScrollArea::vertical().auto_shrink(false);
         area.show_rows(ui, THUMBNAIL.y, shown.len(), |ui, rows| {
             for &frame in &shown[rows] {
@@ -162,5 +162,5 @@ fn distance(context: &ViewContext<'_>, frame: usize) -> Option<String> {
     let query = setup.queries.pose(setup.query)?;
     let error = PoseError::between(&query, &reference);
     let words = format!("{}, {} away", error.translation(), error.rotation());
-    context.options.shows_truth.then_some(words)
+    context.options.shows_truth.then(|| context.in_unit(&words))
 }

@@ -21,6 +21,7 @@ use crate::app::ViewContext;
 use crate::app::memo::{Memo, Same};
 use crate::problem::ReferenceTuple;
 use crate::render::RenderParams;
+use crate::scale::LengthUnit;
 use cameras::{CameraKind, SceneCamera};
 use orbit::Orbit;
 use picture::{Spot, picture};
@@ -55,6 +56,7 @@ pub struct SpaceView {
 
 /// What there is to draw at the cursor.
 struct SceneContent {
+    unit: LengthUnit,
     geometry: SceneGeometry,
     cameras: Vec<SceneCamera>,
     points: Arc<Vec<Spot>>,
@@ -84,7 +86,8 @@ impl SpaceView {
         let points =
             self.cloud.get(key, || Arc::new(picture::points(&geometry, reference, params)));
         let points = Arc::clone(points);
-        Some(SceneContent { geometry, cameras: cameras::cameras(context, &geometry), points })
+        let unit = context.setup.task.params.scale.unit();
+        Some(SceneContent { unit, geometry, cameras: cameras::cameras(context, &geometry), points })
     }
 
     fn pane(&mut self, ui: &mut Ui, content: &SceneContent) {
@@ -94,7 +97,7 @@ impl SpaceView {
         self.steer(ui, &response, content);
         let view_camera = self.view_camera(size, content);
         self.draw(ui, pane, content, &view_camera);
-        let headline = self.headline(content);
+        let headline = content.unit.words(&self.headline(content));
         cameras::headline(ui, pane, &headline);
         if let Some(kind) = cameras::labels(ui, pane, &view_camera, &content.cameras) {
             self.eye = Eye::Through(kind);

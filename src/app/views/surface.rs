@@ -80,6 +80,7 @@ impl SurfaceView {
             dense,
             scale: &scale,
             marks: &marks,
+            unit: context.setup.task.params.scale.unit(),
             line: line.map(|line| [line.from, line.to].map(|pose| search.offset(&pose))),
         };
         let readout = ui.horizontal(|ui| {

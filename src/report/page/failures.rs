@@ -87,8 +87,8 @@ fn details(report: &RunReport, one: &ReportedResult) -> Markup {
             summary { "Numbers, and how to repeat it" }
             dl {
                 dt { "References" } dd { (result.references.join(", ")) }
-                @if let Some(error) = &result.error { dt { "Error" } dd { (error) } }
-                @if let Some(error) = &result.initial_error { dt { "Reference, distance from the truth" } dd { (error) } }
+                @if let Some(error) = &result.error { dt { "Error" } dd { (result.unit.words(&error.to_string())) } }
+                @if let Some(error) = &result.initial_error { dt { "Reference, distance from the truth" } dd { (result.unit.words(&error.to_string())) } }
                 @if let Some(counts) = &result.counts {
                     dt { "Features" }
                     dd {

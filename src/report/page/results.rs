@@ -55,6 +55,7 @@ pub(super) fn column_rules(columns: &[&Column]) -> String {
 }
 
 pub(super) fn results(report: &RunReport, columns: &[&Column]) -> Markup {
+    let unit = report.unit();
     let is_any = |is: &dyn Fn(&ReportedResult) -> bool| report.results.iter().any(is);
     let methods = &report.run.protocol.methods;
     let methods = methods.iter().map(|method| (method, method.to_string()));
@@ -79,7 +80,7 @@ pub(super) fn results(report: &RunReport, columns: &[&Column]) -> Markup {
                 @for (at, column) in columns.iter().enumerate() {
                     label {
                         input type="checkbox" id={ "c" (at + 1) } checked[column.is_default] autocomplete="off";
-                        " " (column.name)
+                        " " (unit.words(column.name))
                     }
                     " "
                 }
@@ -93,7 +94,7 @@ pub(super) fn results(report: &RunReport, columns: &[&Column]) -> Markup {
                             @for column in columns {
                                 th scope="col" class=[class(column)] {
                                     @if column.name == "photo" { (column.name) }
-                                    @else { button type="button" { (column.name) } }
+                                    @else { button type="button" { (unit.words(column.name)) } }
                                 }
                             }
                         }

@@ -245,6 +245,7 @@ impl Recording {
     }
 
     fn say(&mut self, words: &str, level: &str) {
+        let words = self.params.scale.unit().words(words);
         self.stream.log(entities::LOG, &TextLog::new(words).with_level(level));
     }
 

@@ -21,13 +21,15 @@ pub(super) fn markdown(
     if let Some(problem) = problems.first() {
         let references = problems.iter().map(|p| &p.reference.name);
         let names: Vec<String> = references.map(|name| identity.reference_label(name)).collect();
-        text += &format!(
+        let unit = results.first().map(|result| result.unit).unwrap_or_default();
+        let words = format!(
             "# Query {}\n\nReference: {}. Search radius: {} m. Seed: {}.\n\n",
             identity.query_label(&problem.query.name),
             names.join(", "),
             problem.uncertainty_radius_m,
             problem.seed
         );
+        text += &unit.words(&words);
     }
     text += &story(results);
     text += &errors(results);
@@ -80,7 +82,7 @@ fn errors(results: &[QueryResult]) -> String {
         };
         let part = |part: fn(&PoseError) -> String| {
             let error = result.error.as_ref();
-            error.map_or("–".to_owned(), part)
+            error.map_or("–".to_owned(), |error| result.unit.words(&part(error)))
         };
         let confidence = result.confidence.as_ref();
         let confidence = confidence.map(PoseConfidence::likely);
@@ -97,6 +99,8 @@ fn errors(results: &[QueryResult]) -> String {
     let mut text = table.to_markdown();
     let initial = results.iter().find_map(|result| result.initial_error);
     if let Some(error) = initial {
+        let unit = results.first().map(|result| result.unit).unwrap_or_default();
+        let error = unit.words(&error.to_string());
         text += &format!("\nDistance of the first reference from the truth: {error}.\n");
     }
     text + "\n"

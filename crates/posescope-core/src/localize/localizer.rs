@@ -13,8 +13,8 @@ use self::work::{Answer, Estimated, MethodOutcome, Place, QueryWork};
 use super::observer::checkpoint;
 use super::single::estimate_traced;
 use super::{
-    LengthUnit, LocalizeObserver, QueryResult, References, Setting, StageTimes, StageTimings,
-    localize_by, report_ranking,
+    LocalizeObserver, QueryResult, References, Setting, StageTimes, StageTimings, localize_by,
+    report_ranking,
 };
 use crate::diagnosis::{Evidence, Subject, Tolerance, confidence};
 use crate::estimator::{self, Estimator, Failure, Given, Hybrid, Outcome, hybrid_outcome};
@@ -327,10 +327,12 @@ impl<'a> Localizer<'a> {
         Ok(())
     }
 
-    fn marked(&self, result: QueryResult, setting: Option<Setting>) -> QueryResult {
+    fn marked(&self, mut result: QueryResult, setting: Option<Setting>) -> QueryResult {
+        let unit = self.params.scale.unit();
+        result.put_into_words_of(unit);
         QueryResult {
             query_scene: (!self.is_one_drive).then(|| self.queries.name().to_owned()),
-            unit: if self.params.scale.is_metric() { LengthUnit::Metre } else { LengthUnit::Model },
+            unit,
             scale: self.params.scale.metre(),
             degraded: self.queries.as_degraded().map(DegradedScene::degradation),
             setting,

@@ -14,6 +14,7 @@ use crate::grid::GridParams;
 use crate::grid::{Basin, Offset, Phase};
 use crate::image::Degradation;
 use crate::method::Method;
+use crate::scale::LengthUnit;
 use crate::text::words;
 
 /// The version of the result's form.
@@ -92,35 +93,6 @@ fn one() -> f64 {
 
 fn is_one(scale: &f64) -> bool {
     *scale == 1.0
-}
-
-/// The unit of the lengths of a result.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(from = "Option<String>", into = "Option<String>")]
-pub enum LengthUnit {
-    /// The metre.
-    #[default]
-    Metre,
-    /// That of a model which has no metric scale; written as null.
-    Model,
-}
-
-impl LengthUnit {
-    fn is_metre(&self) -> bool {
-        *self == Self::Metre
-    }
-}
-
-impl From<LengthUnit> for Option<String> {
-    fn from(unit: LengthUnit) -> Self {
-        unit.is_metre().then(|| "m".to_owned())
-    }
-}
-
-impl From<Option<String>> for LengthUnit {
-    fn from(unit: Option<String>) -> Self {
-        if unit.is_some() { Self::Metre } else { Self::Model }
-    }
 }
 
 /// What was tried to make a wrong result right.

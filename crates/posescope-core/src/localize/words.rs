@@ -2,6 +2,7 @@
 
 use super::result::{QueryResult, Status};
 use crate::diagnosis::{Code, Diagnosis, Grade, confidence};
+use crate::scale::LengthUnit;
 
 impl QueryResult {
     /// The method, with the fusion where references were fused.
@@ -15,7 +16,20 @@ impl QueryResult {
     /// How far the pose is off: the distance, and where it is wrong for its heading, the angle.
     pub fn off(&self) -> Option<String> {
         let error = self.error.as_ref()?;
-        Some(if self.grade == Grade::Wrong { error.greater() } else { error.translation() })
+        let off = if self.grade == Grade::Wrong { error.greater() } else { error.translation() };
+        Some(self.unit.words(&off))
+    }
+
+    /// Says in the unit what its sentences say in metres.
+    pub(super) fn put_into_words_of(&mut self, unit: LengthUnit) {
+        let reason = self.reason.iter_mut().map(|reason| &mut reason.text);
+        let verdicts = self.diagnosis.iter_mut().map(|verdict| &mut verdict.text);
+        for text in reason.chain(verdicts) {
+            *text = unit.words(text);
+        }
+        for one in self.per_reference.iter_mut().flatten() {
+            one.put_into_words_of(unit);
+        }
     }
 
     /// Query, method and error in a line, with the primary verdict.
@@ -57,7 +71,8 @@ impl QueryResult {
         };
         for helped in &explanation.helped {
             let args = helped.args.join(" ");
-            paragraphs.push(format!("helped: {args} ({})", helped.error));
+            let error = self.unit.words(&helped.error.to_string());
+            paragraphs.push(format!("helped: {args} ({error})"));
         }
         if explanation.helped.is_empty() {
             paragraphs.push(match explanation.runs {

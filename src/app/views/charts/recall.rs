@@ -53,11 +53,11 @@ pub(super) fn ui(ui: &mut Ui, context: &ViewContext<'_>, results: &[Chosen<'_>],
             format!("{} {:.1} %{was}", method.label(), share(of_method))
         })
         .collect();
-    let words = format!("Within {right}: {}", words.join("; "));
+    let words = context.in_unit(&format!("Within {right}: {}", words.join("; ")));
     ui.weak(&words);
     let degrees_of = right.rotation_deg / right.translation_m;
     let plot = Plot::new("recall")
-        .x_axis_label(format!("tolerance x [m], with {degrees_of:.3} ° for each m"))
+        .x_axis_label(context.in_unit(&format!("tolerance x [m] and x times {degrees_of:.3}°")))
         .y_axis_label("share of right results [%]")
         .default_x_bounds(0.0, most_m)
         .default_y_bounds(0.0, 100.0)

@@ -179,7 +179,7 @@ fn numbers(ui: &mut Ui, context: &ViewContext<'_>, subject: &Subject<'_>) {
     grid.spacing(vec2(10.0, 2.0)).show(ui, |ui| {
         for (name, value) in subject.facts() {
             ui.weak(name);
-            ui.label(value);
+            ui.label(context.in_unit(&value));
             ui.end_row();
         }
     });

@@ -160,9 +160,10 @@ fn acceptance(ui: &mut Ui, context: &ViewContext<'_>, judged: &ConsensusJudged) 
         AcceptanceRule::Consensus => "",
         AcceptanceRule::Paper => " (the paper's rule ignores it)",
     };
-    ui.label(format!(
+    let words = format!(
         "{distance_m:.2} m from the reference {} {limit_m:.2} m, the radius of {radius_m:.1} m and {:.0} %{note}",
         if *distance_m > limit_m { ">" } else { "≤" },
         100.0 * params.radius_slack
-    ));
+    );
+    ui.label(context.in_unit(&words));
 }

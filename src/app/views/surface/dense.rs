@@ -70,7 +70,7 @@ fn lowest(
     let mut words = format!("Lowest of all{so_far}: cost {}", number(score.cost?));
     if let Some(truth) = context.truth() {
         let error = PoseError::between(truth, &search.pose(&offset));
-        let (distance, angle) = (error.translation(), error.rotation());
+        let (distance, angle) = (context.in_unit(&error.translation()), error.rotation());
         words += &format!(", {distance} and {angle} from the truth");
     }
     Some(words)

@@ -42,7 +42,7 @@ pub(super) fn ui(
     };
     let step_m = context.run.params.grid.fine_step_m;
     let profile = Profile::of(along, search.least_covered, step_m);
-    ui.label(profile.words());
+    ui.label(context.in_unit(&profile.words()));
     draw(ui, context, search, &profile)
 }
 
@@ -144,7 +144,7 @@ fn draw(
         .height(PLOT_HEIGHT)
         .allow_scroll(false)
         .allow_drag(false)
-        .x_axis_label(format!("from the result to the truth [{unit}]"))
+        .x_axis_label(context.in_unit(&format!("from the result to the truth [{unit}]")))
         .y_axis_label("cost")
         .label_formatter(label)
         .show(ui, |plot| {
@@ -165,7 +165,7 @@ fn draw(
         });
     name_picture(
         &answer.response,
-        format!("Cost from the result to the truth: {}", profile.words()),
+        context.in_unit(&format!("Cost from the result to the truth: {}", profile.words())),
     );
     let at = answer.response.hover_pos()?;
     if !answer.transform.frame().contains(at) {

@@ -12,6 +12,7 @@ use crate::geometry::Pose;
 use crate::grid::{DenseSurface, Lattice, Offset, ScoredLattice};
 use crate::proof::Thing;
 use crate::render::Score;
+use crate::scale::LengthUnit;
 
 /// The width of the numbers left of the map \[points\].
 pub(super) const LEFT_AXIS: f32 = 34.0;
@@ -41,6 +42,7 @@ pub(super) struct MapContent<'a> {
     pub(super) dense: Option<&'a DenseSurface>,
     pub(super) scale: &'a Scale,
     pub(super) marks: &'a [MapMark],
+    pub(super) unit: LengthUnit,
     /// From the result to the truth, where both are known and shown.
     pub(super) line: Option<[Offset; 2]>,
 }
@@ -217,8 +219,10 @@ fn plot(
             .tick_label_font(theme::SMALL)
             .formatter(|mark, _| format!("{}", (1000.0 * mark.value).round() / 1000.0))
     };
-    let right = narrow(AxisHints::new_x(), LOWER_AXIS).label(small(ui, "right [m]"));
-    let forward = narrow(AxisHints::new_y(), LEFT_AXIS).label(small(ui, "forward [m]"));
+    let right =
+        narrow(AxisHints::new_x(), LOWER_AXIS).label(small(ui, &shown.unit.words("right [m]")));
+    let forward =
+        narrow(AxisHints::new_y(), LEFT_AXIS).label(small(ui, &shown.unit.words("forward [m]")));
     let bounds = whole(shown);
     // A plot keeps its bounds, so a map of another extent is another plot.
     let extent = bounds.width().to_bits();
@@ -288,7 +292,7 @@ fn cell_at(shown: &MapContent<'_>, transform: &PlotTransform, at: Pos2) -> Optio
 
 /// The cost and coverage of a cell, in words.
 fn readout(shown: &MapContent<'_>, cell: &Cell) -> String {
-    let mut at = place(&cell.offset);
+    let mut at = shown.unit.words(&place(&cell.offset));
     if shown.dense.is_some() {
         at += &format!(", {}", heading(&cell.offset));
     }
