@@ -1,4 +1,4 @@
-//! The command line of posescope.
+//! The command line of posescope, for the program and for the Python package.
 
 mod args;
 mod compare;
@@ -10,6 +10,7 @@ mod eval;
 mod event_export;
 mod failure;
 mod failures;
+mod host;
 mod index;
 mod interrupt;
 mod lesson;
@@ -36,27 +37,43 @@ use std::ffi::OsString;
 use std::num::NonZeroUsize;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
-use std::process::ExitCode;
 
 use clap::{CommandFactory as _, FromArgMatches as _, Parser as _};
 
 use args::{Arguments, Command};
 use failure::CliError;
 
-/// Parses the arguments, runs the command and prints an error in one line.
-pub fn main() -> ExitCode {
-    let matches = args::definition().get_matches();
-    let arguments = Arguments::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
+pub use doctor::report as examination_in_words;
+pub use host::{CommandError, Host};
+
+/// Parses the arguments, of which the first is the program's name, runs the command and prints an error in one
+/// line. Returns the exit code.
+pub fn run(arguments: Vec<OsString>) -> u8 {
+    let parsed = args::definition()
+        .try_get_matches_from(arguments)
+        .and_then(|matches| Arguments::from_arg_matches(&matches));
+    let arguments = match parsed {
+        Ok(arguments) => arguments,
+        Err(error) => return answered(&error),
+    };
     failure::report_panics_in_one_line();
     let outcome = catch_unwind(AssertUnwindSafe(|| dispatch(&arguments)));
     match outcome {
-        Ok(Ok(()) | Err(CliError::ReaderGone)) => ExitCode::SUCCESS,
+        Ok(Ok(()) | Err(CliError::ReaderGone)) => failure::DONE,
+        Ok(Err(CliError::Arguments(error))) => answered(&error),
         Ok(Err(error)) => {
             eprintln!("posescope: {error}");
             error.exit_code()
         }
-        Err(_) => ExitCode::from(failure::INTERNAL),
+        Err(_) => failure::INTERNAL,
     }
+}
+
+/// Prints the help that was asked for, or what is wrong with the arguments.
+fn answered(error: &clap::Error) -> u8 {
+    // A reader that is gone needs no answer.
+    error.print().ok();
+    if error.use_stderr() { failure::USAGE } else { failure::DONE }
 }
 
 fn dispatch(arguments: &Arguments) -> Result<(), CliError> {
@@ -102,7 +119,7 @@ fn opened_by(words: &[OsString]) -> Result<Arguments, CliError> {
         return Err(CliError::Usage(no_command(&name)));
     }
     let line = ["posescope", "view"].map(OsString::from);
-    Ok(Arguments::parse_from(line.iter().chain(words)))
+    Ok(Arguments::try_parse_from(line.iter().chain(words))?)
 }
 
 /// The error message for a word that is neither a command nor a scene.

@@ -17,6 +17,10 @@
 #[doc = include_str!("../README.md")]
 struct Readme;
 
+// The command line names the library as its other users do.
+#[cfg(feature = "rerun")]
+extern crate self as posescope;
+
 pub use posescope_core::{
     Cloud, Cost, Direct, Estimator, Failure, History, InputError, Intrinsics, Method, Outcome,
     Params, Photo, Pose, Problem, Query, ReferenceTuple, Trace, inner_scene, localize_by,
@@ -32,6 +36,8 @@ pub use posescope_core::{
 pub mod app;
 #[cfg(feature = "cli")]
 mod chart;
+#[cfg(feature = "rerun")]
+pub mod cli;
 pub mod doctor;
 #[cfg(feature = "rerun")]
 pub mod feature_progress;

@@ -1,9 +1,7 @@
-//! The command line: parse, run, one error line, exit code.
-
-mod cli;
+//! The program `posescope`.
 
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    cli::main()
+    ExitCode::from(posescope::cli::run(std::env::args_os().collect()))
 }

@@ -22,7 +22,8 @@ use crate::params::Params;
 use crate::run::{FAILURES, FolderError, RunFile, Scenes, read_run, recording_name};
 use crate::scale::LengthUnit;
 use crate::table::Table;
-use pictures::{DrawnProof, Witness, thumbnail};
+use pictures::thumbnail;
+pub use pictures::{DrawnProof, Witness};
 
 /// The default number of failures with a picture.
 pub const PICTURES: usize = 16;

@@ -67,7 +67,8 @@ fn verdict(scene: &dyn Scene, found: &Examination) -> String {
     format!("{name}: {}", broken.unwrap_or("the scene is unusable"))
 }
 
-fn report(scene: &dyn Scene, found: &Examination, width: Option<usize>) -> String {
+/// The findings in words, a line each, in lines of at most this many characters.
+pub fn report(scene: &dyn Scene, found: &Examination, width: Option<usize>) -> String {
     let mut text = String::new();
     let there = &found.inventory;
     let mut line = |what: &str, words: &str| {

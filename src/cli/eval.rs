@@ -30,7 +30,6 @@ use super::compare;
 use super::event_export::EventExport;
 use super::failure::CliError;
 use super::failures::{self, FailureRecordings};
-use super::interrupt::Interrupt;
 use super::opened;
 use super::output;
 use super::table;
@@ -64,11 +63,10 @@ pub fn eval(args: &EvalArgs, terminal: &Terminal) -> Result<(), CliError> {
     if let Some(before) = &args.rerun_failed
         && !again::has_failed(before)?
     {
-        eprintln!("No query failed in {}", before.display());
+        terminal.say(|| format!("No query failed in {}", before.display()));
         return Ok(());
     }
-    let out = args.out.clone();
-    let folder = out.unwrap_or_else(|| default_folder(args, &protocol));
+    let folder = folder(args)?;
     if let Some(sweep) = &args.sweep {
         return sweep::sweep(args, sweep, &folder, terminal);
     }
@@ -76,6 +74,14 @@ pub fn eval(args: &EvalArgs, terminal: &Terminal) -> Result<(), CliError> {
     let again = args.rerun_failed.as_deref();
     let examined = examined(&scenes, &folder)?;
     finish(&args.judging, again, &folder, &run, &examined, terminal)
+}
+
+/// The folder of a run.
+pub fn folder(args: &EvalArgs) -> Result<PathBuf, CliError> {
+    match &args.out {
+        Some(out) => Ok(out.clone()),
+        None => Ok(default_folder(args, &args.protocol.over(Protocol::default())?)),
+    }
 }
 
 /// A run that is about to start.
@@ -152,7 +158,7 @@ fn execute(
     }
     let bar = terminal.bar(run.items().count() as u64);
     bar.set_position(run_folder.done() as u64);
-    let interrupt = Interrupt::listen();
+    let interrupt = terminal.interrupt();
     let kept = if args.sweep.is_some() { 0 } else { KEPT_FAILURES };
     let kept = args.judging.keep_failures.unwrap_or(kept);
     let mut observer = FailureRecordings::new(

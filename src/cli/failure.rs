@@ -2,7 +2,6 @@
 
 use std::io;
 use std::path::{Path, PathBuf};
-use std::process::ExitCode;
 
 use image::ImageError;
 use posescope::describe::ParamError;
@@ -14,9 +13,9 @@ use posescope::session::JobError;
 use posescope::sink::rerun::RecordError;
 use posescope::trace::Cancelled;
 
-const DONE: u8 = 0;
+pub const DONE: u8 = 0;
 const NOT_GOOD_ENOUGH: u8 = 1;
-const USAGE: u8 = 2;
+pub const USAGE: u8 = 2;
 const BAD_DATA: u8 = 3;
 /// The requested graphics card is missing or failed.
 const NO_GPU: u8 = 5;
@@ -40,6 +39,9 @@ fn about_choosing(error: &SceneError) -> String {
 pub enum CliError {
     #[error("{0}")]
     Usage(String),
+    /// What clap says of arguments, or the help that they ask for; it is printed as it is.
+    #[error(transparent)]
+    Arguments(#[from] clap::Error),
     #[error(transparent)]
     Param(#[from] ParamError),
     #[error(transparent)]
@@ -107,11 +109,12 @@ impl CliError {
         }
     }
 
-    pub fn exit_code(&self) -> ExitCode {
-        ExitCode::from(match self {
+    pub fn exit_code(&self) -> u8 {
+        match self {
             Self::ReaderGone | Self::Stopped(_) | Self::Choice(ChoiceError::Cancelled(_)) => DONE,
             Self::NotGoodEnough(_) => NOT_GOOD_ENOUGH,
             Self::Usage(_)
+            | Self::Arguments(_)
             | Self::Param(_)
             | Self::Protocol(_)
             | Self::Index(NoIndex::NoFolder)
@@ -129,7 +132,7 @@ impl CliError {
             Self::Interrupted(_) => INTERRUPTED,
             // All others are about files that cannot be read or written.
             _ => BAD_DATA,
-        })
+        }
     }
 }
 

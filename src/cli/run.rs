@@ -16,7 +16,6 @@ use posescope::sink::rerun::{Identity, Recorder, Targets};
 use super::args::RunArgs;
 use super::event_export::EventExport;
 use super::failure::CliError;
-use super::interrupt::Interrupt;
 use super::match_export::MatchExport;
 use super::observer::CliObserver;
 use super::opened::{self, OpenedTask};
@@ -50,7 +49,7 @@ pub fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), CliError> {
     let localizer = Localizer::new(references, queries, &task.params, task.protocol.seed);
     let plan = Plan { args, task: &task, localizer: task.protocol.configured(localizer)? };
     let wanted = if args.all { (0..queries.frames().len()).collect() } else { wanted };
-    let interrupt = Interrupt::listen();
+    let interrupt = terminal.interrupt();
     let has_index = matches!(task.protocol.selection(), Selection::Retrieved(_));
     let mut observer = CliObserver::new(terminal.bar(0), interrupt.clone());
     observer.index_for = Some(args.scene.clone()).filter(|_| !has_index && !terminal.is_quiet);

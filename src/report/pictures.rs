@@ -40,7 +40,7 @@ fn jpeg(picture: &DynamicImage, width: u32, quality: u8) -> Option<String> {
 
 /// Collects the records for a proof of a query.
 #[derive(Default)]
-pub(super) struct Witness {
+pub struct Witness {
     history: History,
     problems: Vec<Problem>,
 }
@@ -63,16 +63,16 @@ impl LocalizeObserver for Witness {
 
 /// The picture that proves a failure.
 #[derive(Clone, Debug)]
-pub(super) struct DrawnProof {
+pub struct DrawnProof {
     /// The picture as a data URI.
-    pub(super) picture: String,
+    pub picture: String,
     /// Its description, panel by panel.
-    pub(super) words: String,
+    pub words: String,
 }
 
 impl Witness {
     /// Draws the proof of the result.
-    pub(super) fn proof(
+    pub fn proof(
         &self,
         truth: Option<&Pose>,
         result: &QueryResult,

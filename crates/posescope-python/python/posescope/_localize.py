@@ -1,0 +1,172 @@
+"""Localising, and judging somebody else's pose."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Callable, List, Mapping, Optional, Sequence, Tuple, Union
+
+from . import _posescope
+from ._posescope import Query, Reference
+from ._result import Result
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    Matches = Sequence[ArrayLike]
+    """Query points (N x 2), reference points (N x 2), and perhaps scores (N) [px]."""
+    Matcher = Callable[[Any, Any], Matches]
+    """Takes the photo of the query and that of a reference, and returns their matches."""
+    MatchesOrMatcher = Union[Matches, Sequence[Matches], Matcher]
+
+_USES_MATCHES = ("fb", "hy")
+"""The methods that use matches of another system."""
+
+
+def localize(
+    query: Query,
+    reference: "Reference | Sequence[Reference]",
+    method: Optional[str] = None,
+    params: Optional[Mapping[str, object]] = None,
+    radius: Optional[float] = None,
+    matches: "Optional[MatchesOrMatcher]" = None,
+    fusion: Optional[str] = None,
+    seed: int = 0,
+    threads: Optional[int] = None,
+) -> Result:
+    """Estimates where a query was taken.
+
+    The result has the same bytes as that of the command, on any number of threads. The interpreter's lock is released
+    meanwhile; Ctrl-C stops it.
+
+    Args:
+        query: The photo whose pose is sought.
+        reference: One reference, or several, which are fused.
+        method: ``fb``, ``pm``, ``mi``, ``hy`` as in the paper, ``fb2``, ``mi6``, ``nid``, or ``robust``. By default
+            ``robust``; ``fb`` where matches are given.
+        params: Parameters by name, such as ``{"fb.ratio": 0.7}``; ``posescope params`` lists them.
+        radius: How far from the reference the direct methods search [m]. By default 15 m on a street, and in other
+            scenes what suits the depth of their clouds.
+        matches: Matches that take the place of SURF's in ``fb`` and ``hy``: query points, reference points, and
+            perhaps scores. Points are N x 2 [px], and (0, 0) is the centre of the top-left pixel. For several
+            references, a list with one entry each. Or a callable that takes both photos (uint8, H x W x 3 where they
+            have colours, else H x W) and returns such a tuple.
+        fusion: How several references become one pose: ``r-wavg`` (by default), ``maxf``, ``avg``, ``wavg``,
+            ``joint``.
+        seed: The seed of every random choice.
+        threads: The number of threads; by default one per core.
+
+    Returns:
+        The pose with its confidence and verdicts, or why there is none. Having no pose is no exception.
+
+    Raises:
+        ValueError: An array has another dtype or shape, or an argument another value; the message names what was
+            expected.
+        InputError: A frame of a scene cannot be read.
+        InternalError: A bug of posescope.
+    """
+    references = _list_of(reference)
+    if method is None:
+        method = "robust" if matches is None else _USES_MATCHES[0]
+    if matches is not None and method not in _USES_MATCHES:
+        raise ValueError(f"matches: the methods that use them are fb and hy, `{method}` given")
+    answer = _posescope.localize(
+        query,
+        references,
+        method,
+        _texts(params),
+        radius,
+        _matches_of(query, references, matches),
+        fusion,
+        seed,
+        threads,
+    )
+    return Result(answer)
+
+
+def diagnose(
+    query: Query,
+    references: "Reference | Sequence[Reference]",
+    world_from_camera: "ArrayLike",
+    truth: "Optional[ArrayLike]" = None,
+    matches: "Optional[MatchesOrMatcher]" = None,
+    params: Optional[Mapping[str, object]] = None,
+    name: str = "pose",
+    threads: Optional[int] = None,
+) -> Result:
+    """Says what the verdicts and the costs make of a pose that somebody else found.
+
+    Args:
+        query: The photo.
+        references: One reference, or several.
+        world_from_camera: The pose to judge, 4 x 4 [m].
+        truth: The true pose, 4 x 4, where the query does not know it.
+        matches: As in :func:`localize`.
+        params: Parameters by name.
+        name: What the other system is called in the result.
+        threads: The number of threads; by default one per core.
+
+    Returns:
+        A result whose pose is the given one.
+
+    Raises:
+        ValueError: An array has another dtype or shape, or an argument another value.
+        InputError: A frame of a scene cannot be read.
+        InternalError: A bug of posescope.
+    """
+    all_references = _list_of(references)
+    answer = _posescope.diagnose(
+        query,
+        all_references,
+        world_from_camera,
+        truth,
+        _matches_of(query, all_references, matches),
+        _texts(params),
+        name,
+        threads,
+    )
+    return Result(answer)
+
+
+def _list_of(reference: "Reference | Sequence[Reference]") -> List[Reference]:
+    return [reference] if isinstance(reference, Reference) else list(reference)
+
+
+def _texts(params: Optional[Mapping[str, object]]) -> List[Tuple[str, str]]:
+    """Parameters as the command line writes them."""
+
+    def text(value: object) -> str:
+        return str(value).lower() if isinstance(value, bool) else str(value)
+
+    return [(str(key), text(value)) for key, value in (params or {}).items()]
+
+
+def _matches_of(
+    query: Query, references: List[Reference], matches: "Optional[MatchesOrMatcher]"
+) -> Optional[List[Tuple[Any, Any, Any]]]:
+    """The matches of each reference, as triples."""
+    if matches is None:
+        return None
+    if callable(matches):
+        photo = query.photo
+        given: Sequence[Any] = [matches(photo, reference.photo) for reference in references]
+    else:
+        several = len(references) > 1 or _is_nested(matches)
+        given = list(matches) if several else [matches]
+    if len(given) != len(references):
+        raise ValueError(
+            f"matches: one entry per reference expected, {len(given)} for {len(references)} references given"
+        )
+    return [_triple(one) for one in given]
+
+
+def _is_nested(matches: Any) -> bool:
+    """Whether this is a list with the matches of one reference."""
+    return isinstance(matches, list) and len(matches) == 1
+
+
+def _triple(matches: Any) -> Tuple[Any, Any, Any]:
+    parts = tuple(matches)
+    if len(parts) not in (2, 3):
+        raise ValueError(
+            f"matches: query points, reference points and perhaps scores expected, {len(parts)} parts given"
+        )
+    return parts[0], parts[1], parts[2] if len(parts) == 3 else None

@@ -1,0 +1,27 @@
+"""What a notebook shows: Rerun's viewer, and progress."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from ._result import Result
+
+_INSTALL = "Rerun's notebook viewer is not installed; run: pip install 'rerun-sdk[notebook]==0.36.3'"
+
+
+def show(result: "Result") -> Any:
+    """The recording of a result in Rerun's notebook viewer."""
+    try:
+        import rerun
+        import rerun_notebook  # noqa: F401
+    except ImportError as missing:
+        raise ImportError(_INSTALL) from missing
+    folder = tempfile.mkdtemp(prefix="posescope-")
+    path = os.path.join(folder, "result.rrd")
+    result.save(path)
+    stream = rerun.RecordingStream("posescope")
+    stream.log_file_from_path(path)
+    return rerun.notebook.Viewer(recording=stream)

@@ -1,0 +1,232 @@
+"""Results: a pose, or why there is none, and what speaks for it."""
+
+from __future__ import annotations
+
+import html
+import json
+import os
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Dict, List, Optional, Tuple
+
+import numpy as np
+
+from . import _notebook
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from ._posescope import Answer
+
+
+@dataclass(frozen=True)
+class Failure:
+    """Why there is no pose."""
+
+    code: str
+    """The code of the verdict, such as ``R3``."""
+    text: str
+    """The reason in one sentence."""
+    numbers: Dict[str, Any] = field(default_factory=dict)
+    """The numbers that the sentence is made from. Names end in their unit."""
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Why a pose is wrong, missing or uncertain."""
+
+    code: str
+    """The code, such as ``D3``."""
+    text: str
+    """The sentence with its numbers."""
+    evidence: Dict[str, Any] = field(default_factory=dict)
+    """The numbers that the sentence is made from. Names end in their unit."""
+
+    def __str__(self) -> str:
+        return f"{self.code} {self.text}"
+
+
+@dataclass(frozen=True)
+class PoseError:
+    """How far a pose is from the truth."""
+
+    translation_m: float
+    """Distance of the camera centres [m]."""
+    rotation_deg: float
+    """Geodesic angle [degrees]."""
+    max_euler_deg: float
+    """The largest Euler angle [degrees], the error that the paper uses."""
+
+
+@dataclass(frozen=True)
+class Confidence:
+    """How likely a pose is right. It needs no truth."""
+
+    probability: float
+    """Probability of being within 1 m of the truth."""
+    word: str
+    """``trusted`` from 0.95, ``unsure`` from 0.5, else ``low``."""
+    details: Dict[str, Any] = field(default_factory=dict)
+    """The further fields of ``confidence`` in a results file."""
+
+    def __float__(self) -> float:
+        return self.probability
+
+
+class Result:
+    """What one method made of one query.
+
+    In a notebook it shows itself: the sentence, and the picture that proves it.
+    """
+
+    def __init__(self, answer: "Answer") -> None:
+        self._answer = answer
+        self._json = answer.json()
+        self._row: Dict[str, Any] = json.loads(self._json)
+        self._proof: Optional[Tuple[str, str]] = None
+        self._has_proof = False
+
+    @property
+    def query(self) -> str:
+        """The name of the query."""
+        return str(self._row["query"])
+
+    @property
+    def references(self) -> List[str]:
+        """The names of the references."""
+        return list(self._row["references"])
+
+    @property
+    def method(self) -> str:
+        """The method."""
+        return str(self._row["method"])
+
+    @property
+    def pose(self) -> Optional["NDArray[np.float64]"]:
+        """``world_from_camera``, 4 x 4 [m]; None without a pose, and ``failure`` says why."""
+        pose = self._row["pose"]
+        if pose is None:
+            return None
+        matrix = np.eye(4)
+        matrix[:3] = pose["world_from_camera"]
+        return matrix
+
+    @property
+    def failure(self) -> Optional[Failure]:
+        """Why there is no pose; None where there is one."""
+        reason = self._row["reason"]
+        if reason is None:
+            return None
+        same = (one for one in self._row["diagnosis"] if one["code"] == reason["code"])
+        numbers = next(same, {}).get("evidence") or {}
+        return Failure(reason["code"], reason["text"], numbers)
+
+    @property
+    def grade(self) -> str:
+        """``right``, ``wrong``, ``no pose``, or ``unmeasured`` where the truth is unknown."""
+        return str(self._row["grade"])
+
+    @property
+    def error(self) -> Optional[PoseError]:
+        """The error of the pose, where the truth is known."""
+        error = self._row["error"]
+        return None if error is None else PoseError(**error)
+
+    @property
+    def confidence(self) -> Optional[Confidence]:
+        """How likely the pose is right; None without a pose."""
+        known = self._row["confidence"]
+        if known is None:
+            return None
+        details = {key: value for key, value in known.items() if key not in ("probability", "word")}
+        return Confidence(known["probability"], known["word"], details)
+
+    @property
+    def verdicts(self) -> List[Verdict]:
+        """Why the pose is wrong, missing or uncertain, the most likely cause first."""
+        found = self._row["diagnosis"]
+        return [Verdict(one["code"], one["text"], one.get("evidence") or {}) for one in found]
+
+    @property
+    def counts(self) -> Optional[Dict[str, int]]:
+        """Where the features went, from ``query_keypoints`` to ``inliers``; None without features."""
+        counts = self._row["counts"]
+        return None if counts is None else dict(counts)
+
+    @property
+    def cost(self) -> Optional[Dict[str, Any]]:
+        """The cost at the poses that matter (lower is better); None without a search."""
+        cost = self._row["cost"]
+        return None if cost is None else dict(cost)
+
+    @property
+    def per_reference(self) -> List[Dict[str, Any]]:
+        """What each reference alone gave, where several were fused."""
+        return list(self._row.get("per_reference") or [])
+
+    @property
+    def headline(self) -> str:
+        """Query, method and error in a line, with the first verdict."""
+        return self._answer.headline()
+
+    @property
+    def paragraphs(self) -> List[str]:
+        """What follows the first verdict: other verdicts, and what to try."""
+        return self._answer.paragraphs()
+
+    def to_json(self) -> str:
+        """The line of this result in ``results.jsonl``."""
+        return self._json
+
+    def to_dict(self) -> Dict[str, Any]:
+        """The object of this result in ``results.jsonl``; docs/results.md explains its fields."""
+        row: Dict[str, Any] = json.loads(self._json)
+        return row
+
+    def events(self) -> List[Dict[str, Any]]:
+        """Every decision of the method, in order, as dicts; docs/results.md explains them.
+
+        Localises again, which gives the same result.
+        """
+        return [json.loads(line) for line in self._answer.events().splitlines()]
+
+    def save(self, path: "str | os.PathLike[str]") -> None:
+        """Saves a recording (``.rrd``) for the Rerun viewer 0.36. Localises again, which gives the same result.
+
+        Raises:
+            OSError: The file cannot be written.
+        """
+        self._answer.save(os.fspath(path))
+
+    def show(self) -> Any:
+        """Opens the recording in Rerun's notebook viewer.
+
+        Raises:
+            ImportError: ``rerun-sdk[notebook]`` is not installed; the message says how to install it.
+        """
+        return _notebook.show(self)
+
+    def proof(self) -> Optional[Tuple[str, str]]:
+        """The picture that proves the first verdict or shows what decided: a data URI, and what it shows.
+
+        Localises again, once.
+        """
+        if not self._has_proof:
+            self._proof = self._answer.proof()
+            self._has_proof = True
+        return self._proof
+
+    def __repr__(self) -> str:
+        return f"<Result {self.headline}>"
+
+    def _repr_html_(self) -> str:
+        lines = [f"<strong>{html.escape(self.headline)}</strong>"]
+        known = self.confidence
+        if known is not None:
+            lines.append(f"{known.word}, {100 * known.probability:.0f} % likely within 1 m")
+        lines += [html.escape(paragraph) for paragraph in self.paragraphs]
+        parts = "".join(f"<div>{line}</div>" for line in lines)
+        drawn = self.proof()
+        if drawn is not None:
+            picture, words = drawn
+            parts += f'<img src="{picture}" alt="{html.escape(words)}" style="max-width: 100%">'
+        return f"<div>{parts}</div>"

@@ -1,0 +1,100 @@
+//! The commands: all of them for the program, and some that return what they find.
+
+use std::ffi::OsString;
+use std::num::NonZeroUsize;
+use std::path::PathBuf;
+
+use posescope::cli::{self, CommandError, Host};
+use posescope::doctor::{Examination, Remark, examine};
+use posescope::report::{PICTURES, write_html};
+use pyo3::exceptions::PyOSError;
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyList};
+
+use crate::detached::{Stop, detached, detached_with};
+use crate::scene::Scene;
+use crate::{arrays, errors};
+
+/// Exit codes of the program.
+const NOT_GOOD_ENOUGH: u8 = 1;
+const USAGE: u8 = 2;
+
+/// Runs the command `posescope` with these arguments, the program's name first, and returns its exit code.
+#[pyfunction]
+pub fn main(py: Python<'_>, arguments: Vec<OsString>) -> u8 {
+    py.detach(|| cli::run(arguments))
+}
+
+/// Runs `posescope eval`. Returns the run folder, and why the run is not good enough.
+///
+/// `progress` is called with the number of queries that are done, and of all.
+#[pyfunction]
+pub fn evaluate(
+    py: Python<'_>,
+    arguments: Vec<OsString>,
+    threads: Option<NonZeroUsize>,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<(Option<PathBuf>, Option<String>)> {
+    let host = Host::default();
+    let mut shown = (0, 0);
+    let tick = |py: Python<'_>| {
+        let now = host.progress();
+        if let Some(progress) = progress.as_ref().filter(|_| now != shown) {
+            shown = now;
+            progress.call1(py, now)?;
+        }
+        Ok(())
+    };
+    let run = detached_with(py, threads, &Stop::command(&host), tick, |_| host.eval(arguments))?;
+    if let Some(progress) = &progress {
+        progress.call1(py, host.progress())?;
+    }
+    match run {
+        Ok(folder) => Ok((Some(folder), None)),
+        Err(CommandError { exit_code: NOT_GOOD_ENOUGH, message, .. }) => Ok((None, Some(message))),
+        Err(error) => Err(raised(&error)),
+    }
+}
+
+/// The exception of a command that failed.
+fn raised(error: &CommandError) -> PyErr {
+    match &error.scene {
+        Some(scene) => errors::scene(scene),
+        None if error.exit_code == USAGE => errors::value(error),
+        None => {
+            let (file, expected) = error.message.split_once(": ").unwrap_or(("", &error.message));
+            errors::input(file, "", expected)
+        }
+    }
+}
+
+/// What `posescope doctor` finds: whether the scene is broken, its remarks, the mistake with its remedy, the text and
+/// the picture.
+#[pyfunction]
+pub fn doctor<'py>(py: Python<'py>, scene: &Scene) -> PyResult<Bound<'py, PyDict>> {
+    let scene = scene.opened.scene.as_ref();
+    let found = detached(py, None, |_| examine(scene))?.map_err(|error| errors::scene(&error))?;
+    let dict = PyDict::new(py);
+    let Examination { remarks, finding, picture, .. } = &found;
+    dict.set_item("is_broken", found.is_broken())?;
+    let remarks = remarks.iter().map(|remark| match remark {
+        Remark::Broken(why) => ("broken", why.as_str()),
+        Remark::Odd(why) => ("odd", why.as_str()),
+    });
+    dict.set_item("remarks", PyList::new(py, remarks.collect::<Vec<_>>())?)?;
+    let mistake = finding.as_ref().map(|one| (one.mistake.about(), one.remedy.as_str()));
+    dict.set_item("mistake", mistake)?;
+    dict.set_item("text", cli::examination_in_words(scene, &found, None).trim_end())?;
+    let picture = picture
+        .as_ref()
+        .map(|picture| arrays::of_photo(py, &posescope_core::Photo::from_color(picture.clone())));
+    dict.set_item("picture", picture.transpose()?)?;
+    Ok(dict)
+}
+
+/// Writes `report.html` of a run folder and returns its path.
+#[pyfunction]
+pub fn write_report(py: Python<'_>, folder: PathBuf) -> PyResult<PathBuf> {
+    let written = detached(py, None, |_| write_html(&folder, None, PICTURES, None))?;
+    written.map_err(|error| PyOSError::new_err(error.to_string()))
+}

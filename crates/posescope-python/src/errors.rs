@@ -1,0 +1,96 @@
+//! Errors as Python's exceptions.
+
+use std::cell::RefCell;
+use std::path::Path;
+
+use posescope::localize::LocalizeError;
+use posescope::scene::SceneError;
+use posescope_core::InputError;
+use pyo3::exceptions::{PyKeyboardInterrupt, PyValueError};
+use pyo3::prelude::*;
+
+/// Where the classes of exceptions are.
+const MODULE: &str = "posescope._errors";
+
+thread_local! {
+    /// Where the last panic of this thread came from.
+    static PLACE: RefCell<String> = const { RefCell::new(String::new()) };
+}
+
+/// A panic becomes an exception, so nothing is printed.
+pub fn keep_panics_silent() {
+    std::panic::set_hook(Box::new(|panic| {
+        let place = panic.location().map(|place| format!("{}:{}", place.file(), place.line()));
+        PLACE.with_borrow_mut(|kept| *kept = place.unwrap_or_default());
+    }));
+}
+
+/// Where the last panic of this thread came from, as file and line.
+pub fn place_of_panic() -> String {
+    PLACE.with_borrow(Clone::clone)
+}
+
+fn raised(class: &str, arguments: impl for<'py> pyo3::call::PyCallArgs<'py>) -> PyErr {
+    Python::attach(|py| {
+        let made = || py.import(MODULE)?.getattr(class)?.call1(arguments);
+        made().map_or_else(|error| error, PyErr::from_value)
+    })
+}
+
+/// `posescope.InternalError`: a bug of posescope.
+pub fn internal(message: &str) -> PyErr {
+    raised("InternalError", (message.to_owned(),))
+}
+
+/// `posescope.InputError`: a file, a place in it, and what was expected there.
+pub fn input(file: &str, place: &str, expected: &str) -> PyErr {
+    raised("InputError", (file.to_owned(), place.to_owned(), expected.to_owned()))
+}
+
+/// An error of input files.
+pub fn scene(error: &SceneError) -> PyErr {
+    let shown = |path: &Path| path.display().to_string();
+    match error {
+        SceneError::Io { path, source } => input(&shown(path), "", &source.to_string()),
+        SceneError::Image { path, source } => input(&shown(path), "", &source.to_string()),
+        SceneError::Content { path, expected } => input(&shown(path), "", expected),
+        SceneError::Line { path, line, expected } => {
+            input(&shown(path), &format!("line {line}"), expected)
+        }
+        SceneError::UnknownFrame { scene, frame, known } => {
+            input(scene, &format!("frame {frame}"), &format!("one of the frames {known}"))
+        }
+        SceneError::NoPose { scene, frame } => {
+            input(scene, &format!("frame {frame}"), "a reference has a pose")
+        }
+        SceneError::NoCloud { path, frame, hint } => input(
+            &shown(path),
+            &format!("frame {frame}"),
+            &format!("a reference has a cloud; {hint}"),
+        ),
+        other => {
+            let text = other.to_string();
+            let (file, expected) = text.split_once(": ").unwrap_or(("", &text));
+            input(file, "", expected)
+        }
+    }
+}
+
+/// An error of arrays, cameras and radii.
+pub fn array(error: &InputError) -> PyErr {
+    PyValueError::new_err(error.to_string())
+}
+
+/// An error of a localisation.
+pub fn localize(error: &LocalizeError) -> PyErr {
+    match error {
+        LocalizeError::Scene(error) => scene(error),
+        LocalizeError::Cancelled(_) => PyKeyboardInterrupt::new_err(()),
+        other => internal(&other.to_string()),
+    }
+}
+
+/// A wrong argument.
+pub fn value(error: impl ToString) -> PyErr {
+    PyValueError::new_err(error.to_string())
+}

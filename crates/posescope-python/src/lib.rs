@@ -1,0 +1,40 @@
+//! The extension module `posescope._posescope` of the Python package.
+//!
+//! It translates: arrays to photos, clouds and poses, Python's arguments to a [`job::Job`], results to JSON. What
+//! people see (`Result`, `Run`, `localize` and the rest) is in `python/posescope` and stands on this module. No
+//! algorithm is in either.
+
+mod arrays;
+mod camera;
+mod command;
+mod detached;
+mod errors;
+mod frames;
+mod held;
+mod job;
+mod localize;
+mod scene;
+mod witness;
+
+use pyo3::prelude::*;
+
+/// What the Python package is made of.
+#[pymodule]
+#[pyo3(name = "_posescope")]
+fn extension(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    errors::keep_panics_silent();
+    module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    module.add_class::<camera::Camera>()?;
+    module.add_class::<frames::Query>()?;
+    module.add_class::<frames::Reference>()?;
+    module.add_class::<scene::Scene>()?;
+    module.add_class::<localize::Answer>()?;
+    module.add_function(wrap_pyfunction!(localize::localize, module)?)?;
+    module.add_function(wrap_pyfunction!(localize::diagnose, module)?)?;
+    module.add_function(wrap_pyfunction!(localize::methods, module)?)?;
+    module.add_function(wrap_pyfunction!(command::main, module)?)?;
+    module.add_function(wrap_pyfunction!(command::evaluate, module)?)?;
+    module.add_function(wrap_pyfunction!(command::doctor, module)?)?;
+    module.add_function(wrap_pyfunction!(command::write_report, module)?)?;
+    Ok(())
+}

@@ -1,0 +1,275 @@
+//! Localising a query, and judging somebody else's pose of it.
+
+use std::collections::BTreeMap;
+use std::num::NonZeroUsize;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use posescope::foreign::{Foreign, MatchSource};
+use posescope::fusion::Fusion;
+use posescope::localize::{LocalizeError, NoObserver, QueryResult, Request};
+use posescope::report::Witness;
+use posescope::run::Protocol;
+use posescope::scene::SceneError;
+use posescope::sink::rerun::{Recorder, Targets};
+use posescope_core::features::{FoundMatches, PairMatches};
+use posescope_core::{Method, Params};
+use pyo3::exceptions::PyOSError;
+use pyo3::prelude::*;
+
+use crate::detached::{Stoppable, detached};
+use crate::frames::{Query, Reference};
+use crate::job::{Frames, Job};
+use crate::witness::EventLines;
+use crate::{arrays, errors};
+
+/// Query points, reference points and perhaps scores.
+type GivenMatches<'py> = (Bound<'py, PyAny>, Bound<'py, PyAny>, Option<Bound<'py, PyAny>>);
+
+/// The fusion of several references, as of `posescope eval`.
+const FUSION: &str = "r-wavg";
+
+/// What a method answered, with all that is needed to ask it again.
+#[pyclass(frozen, module = "posescope._posescope")]
+pub struct Answer {
+    job: Job,
+    result: QueryResult,
+    threads: Option<NonZeroUsize>,
+}
+
+impl Answer {
+    fn of(py: Python<'_>, job: Job, threads: Option<NonZeroUsize>) -> PyResult<Self> {
+        let result = detached(py, threads, |stop| {
+            job.run(&mut Stoppable { observer: &mut NoObserver, stop })
+        })?;
+        let result = result.map_err(|error| errors::localize(&error))?;
+        Ok(Self { job, result, threads })
+    }
+}
+
+#[pymethods]
+impl Answer {
+    /// The result as a line of `results.jsonl`.
+    fn json(&self) -> PyResult<String> {
+        serde_json::to_string(&self.result).map_err(|error| errors::internal(&error.to_string()))
+    }
+
+    /// Query, method and error in a line, with the primary verdict.
+    fn headline(&self) -> String {
+        self.result.headline()
+    }
+
+    /// What follows the primary verdict.
+    fn paragraphs(&self) -> Vec<String> {
+        self.result.paragraphs()
+    }
+
+    /// What the result rests on, in a few words.
+    fn evidence(&self) -> String {
+        self.result.evidence()
+    }
+
+    /// All events as lines of JSON.
+    fn events(&self, py: Python<'_>) -> PyResult<String> {
+        let mut lines = EventLines::new(self.job.frames.scene_names());
+        let run = detached(py, self.threads, |stop| {
+            self.job.run(&mut Stoppable { observer: &mut lines, stop })
+        })?;
+        run.map_err(|error| errors::localize(&error))?;
+        Ok(lines.into_text())
+    }
+
+    /// Saves a recording for the Rerun viewer.
+    fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
+        let saved = detached(py, self.threads, |stop| -> Result<_, PyErr> {
+            let (targets, identity) = (Targets::file(&path), self.job.identity());
+            let failed =
+                |error: posescope::sink::rerun::RecordError| PyOSError::new_err(error.to_string());
+            let mut recorder =
+                Recorder::open(&targets, &identity, &[self.job.method]).map_err(failed)?;
+            let run = self.job.run(&mut Stoppable { observer: &mut recorder, stop });
+            recorder.close().map_err(failed)?;
+            run.map(drop).map_err(|error| errors::localize(&error))
+        })?;
+        saved
+    }
+
+    /// The picture that proves the primary verdict, or shows what decided: a data URI and a description.
+    fn proof(&self, py: Python<'_>) -> PyResult<Option<(String, String)>> {
+        let mut witness = Witness::default();
+        let drawn = detached(py, self.threads, |stop| -> Result<_, LocalizeError> {
+            self.job.run(&mut Stoppable { observer: &mut witness, stop })?;
+            Ok(witness.proof(self.job.truth().as_ref(), &self.result, &self.job.params))
+        })?;
+        let drawn = drawn.map_err(|error| errors::localize(&error))?;
+        Ok(drawn.map(|drawn| (drawn.picture, drawn.words)))
+    }
+}
+
+/// Matches of another system by the name of the reference.
+struct ByReference(BTreeMap<String, FoundMatches>);
+
+impl MatchSource for ByReference {
+    fn matches(&self, _: &str, reference: &str) -> Result<Option<PairMatches>, SceneError> {
+        Ok(self.0.get(reference).cloned().map(PairMatches::Found))
+    }
+}
+
+/// The matches of one reference. Better scores come first, so that they keep a point that several claim.
+fn found(name: &str, (query, reference, scores): &GivenMatches<'_>) -> PyResult<FoundMatches> {
+    let query = arrays::points(&format!("{name}[0]"), query)?;
+    let reference = arrays::points(&format!("{name}[1]"), reference)?;
+    if query.len() != reference.len() {
+        let (some, others) = (query.len(), reference.len());
+        return Err(errors::value(format!(
+            "{name}: as many query points as reference points expected, {some} and {others} given"
+        )));
+    }
+    let mut order: Vec<usize> = (0..query.len()).collect();
+    if let Some(scores) = scores {
+        let scores = arrays::scores(&format!("{name}[2]"), scores, query.len())?;
+        order.sort_by(|&a, &b| scores[b].total_cmp(&scores[a]));
+    }
+    let in_order = |points: &[[f32; 2]]| order.iter().map(|&at| points[at]).collect::<Vec<_>>();
+    let matched: Vec<Option<usize>> = (0..query.len()).map(Some).collect();
+    Ok(FoundMatches::new(&in_order(&query), &in_order(&reference), &matched))
+}
+
+/// The matches of each reference, by its name.
+fn by_reference(frames: &Frames, matches: &[GivenMatches<'_>]) -> PyResult<Arc<dyn MatchSource>> {
+    let names = frames.chosen.iter().map(|&frame| frames.references.frames()[frame].clone());
+    let mut found_by_name = BTreeMap::new();
+    for (name, given) in names.zip(matches) {
+        found_by_name.insert(name, found("matches", given)?);
+    }
+    Ok(Arc::new(ByReference(found_by_name)))
+}
+
+/// Defaults of the scene's size, then what is given.
+fn job(
+    frames: Frames,
+    method: Method,
+    params: &[(String, String)],
+    radius: Option<f64>,
+    fusion: Option<&str>,
+    seed: u64,
+) -> PyResult<Job> {
+    let protocol = Protocol::default().at_size(&frames.size);
+    let mut own = Params::at_scale(frames.size.scale);
+    for (key, value) in params {
+        own.set(key, value).map_err(errors::value)?;
+    }
+    let radius_m = radius.unwrap_or_else(|| protocol.radius_m());
+    if !(radius_m.is_finite() && radius_m > 0.0) {
+        return Err(errors::value(format!(
+            "radius: a finite number above 0 expected, {radius_m} given"
+        )));
+    }
+    let fusion = fusion.or_else(|| (frames.chosen.len() > 1).then_some(FUSION));
+    let fusions = match fusion {
+        Some(name) => vec![name.parse::<Fusion>().map_err(errors::value)?],
+        None => Vec::new(),
+    };
+    Ok(Job {
+        request: Request {
+            radius_m,
+            references: frames.chosen.clone().into(),
+            fusions,
+            setting: None,
+        },
+        frames,
+        method,
+        params: own,
+        seed,
+        right: protocol.right,
+        foreign: Foreign::default(),
+    })
+}
+
+fn frames_of(
+    query: &Query,
+    references: &[PyRef<'_, Reference>],
+    truth: Option<&posescope_core::Pose>,
+) -> PyResult<Frames> {
+    if references.is_empty() {
+        return Err(errors::value("references: at least one expected, none given"));
+    }
+    let references: Vec<&Reference> = references.iter().map(|one| &**one).collect();
+    Frames::of(query, &references, truth).map_err(|error| errors::array(&error))
+}
+
+fn threads_of(threads: Option<usize>) -> PyResult<Option<NonZeroUsize>> {
+    /// More threads are a mistake.
+    const MAX: usize = 1024;
+    match threads {
+        None => Ok(None),
+        Some(count) => NonZeroUsize::new(count).filter(|count| count.get() <= MAX).map_or_else(
+            || Err(errors::value(format!("threads: 1 to {MAX} expected, {count} given"))),
+            |count| Ok(Some(count)),
+        ),
+    }
+}
+
+/// Localises a query.
+#[pyfunction]
+#[expect(clippy::too_many_arguments, reason = "Python names them")]
+pub fn localize(
+    py: Python<'_>,
+    query: &Query,
+    references: Vec<PyRef<'_, Reference>>,
+    method: &str,
+    params: Vec<(String, String)>,
+    radius: Option<f64>,
+    matches: Option<Vec<GivenMatches<'_>>>,
+    fusion: Option<&str>,
+    seed: u64,
+    threads: Option<usize>,
+) -> PyResult<Answer> {
+    let threads = threads_of(threads)?;
+    let method: Method = method.parse().map_err(errors::value)?;
+    posescope::run::known(&[method], &[]).map_err(errors::value)?;
+    let frames = frames_of(query, &references, None)?;
+    let mut foreign = Foreign::default();
+    if let Some(matches) = matches {
+        foreign = foreign.with_matches(by_reference(&frames, &matches)?);
+    }
+    let job = Job { foreign, ..job(frames, method, &params, radius, fusion, seed)? };
+    Answer::of(py, job, threads)
+}
+
+/// What the verdicts say of a pose.
+#[pyfunction]
+#[expect(clippy::too_many_arguments, reason = "Python names them")]
+pub fn diagnose(
+    py: Python<'_>,
+    query: &Query,
+    references: Vec<PyRef<'_, Reference>>,
+    world_from_camera: &Bound<'_, PyAny>,
+    truth: Option<&Bound<'_, PyAny>>,
+    matches: Option<Vec<GivenMatches<'_>>>,
+    params: Vec<(String, String)>,
+    name: &str,
+    threads: Option<usize>,
+) -> PyResult<Answer> {
+    let threads = threads_of(threads)?;
+    let method = Method::called(name).map_err(errors::value)?;
+    if posescope::run::known(&[method], &[]).is_ok() {
+        return Err(errors::value(format!("name: `{name}` is a method of posescope")));
+    }
+    let pose = arrays::pose("world_from_camera", world_from_camera)?;
+    let truth = truth.map(|truth| arrays::pose("truth", truth)).transpose()?;
+    let frames = frames_of(query, &references, truth.as_ref())?;
+    let estimates = [(query.query.name.clone(), pose)].into();
+    let mut foreign = Foreign::default().with_estimates(method, estimates);
+    if let Some(matches) = matches {
+        foreign = foreign.with_matches(by_reference(&frames, &matches)?);
+    }
+    let job = Job { foreign, ..job(frames, method, &params, None, None, 0)? };
+    Answer::of(py, job, threads)
+}
+
+/// The names of all methods.
+#[pyfunction]
+pub fn methods() -> Vec<&'static str> {
+    posescope_core::methods().map(Method::name).collect()
+}

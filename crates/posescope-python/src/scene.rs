@@ -1,0 +1,150 @@
+//! Scenes.
+
+use std::sync::{Arc, OnceLock};
+
+use posescope::scene::{FrameStore, Scene as _, SceneError, SceneSize};
+use pyo3::prelude::*;
+
+use crate::detached::detached;
+use crate::errors;
+use crate::frames::{Origin, Query, Reference};
+
+/// An opened scene with the frames used last.
+pub struct Opened {
+    /// The scene argument.
+    pub argument: String,
+    /// The scene.
+    pub scene: Arc<dyn posescope::scene::Scene>,
+    /// Its frames, with what was computed of them.
+    pub store: Arc<FrameStore>,
+    size: OnceLock<SceneSize>,
+}
+
+impl Opened {
+    /// How large the scene is.
+    pub fn size(&self) -> SceneSize {
+        *self.size.get_or_init(|| SceneSize::of(self.scene.as_ref()))
+    }
+}
+
+/// A scene: frames with photos, cameras, and where they are known poses and clouds.
+///
+/// `Scene.open` reads KITTI, RobotCar, TUM RGB-D, 7-Scenes, COLMAP and `scene.toml`; `Scene.street` is built in.
+#[pyclass(frozen, module = "posescope")]
+pub struct Scene {
+    /// The scene.
+    pub opened: Arc<Opened>,
+}
+
+impl Scene {
+    fn of(py: Python<'_>, argument: &str, format: Option<&str>) -> PyResult<Self> {
+        let opened = detached(py, None, |_| posescope::scene::open(argument, format))?;
+        let opened = opened.map_err(|error| errors::scene(&error))?;
+        Ok(Self {
+            opened: Arc::new(Opened {
+                argument: argument.to_owned(),
+                scene: Arc::from(opened),
+                store: Arc::default(),
+                size: OnceLock::new(),
+            }),
+        })
+    }
+
+    fn find(&self, name: &str) -> PyResult<Origin> {
+        let found = self.opened.scene.find(name).map_err(|error| errors::scene(&error))?;
+        Ok(Origin { opened: Arc::clone(&self.opened), frame: found })
+    }
+}
+
+#[pymethods]
+impl Scene {
+    /// Opens a scene.
+    ///
+    /// Args:
+    ///     path: A folder or file, or `street` or `street:CONDITION`, as the command takes it.
+    ///     format: The name of the format, where it is not recognised.
+    ///
+    /// Raises:
+    ///     InputError: There is no scene, or it cannot be read.
+    #[staticmethod]
+    #[pyo3(signature = (path, format = None))]
+    fn open(py: Python<'_>, path: std::path::PathBuf, format: Option<&str>) -> PyResult<Self> {
+        Self::of(py, &path.to_string_lossy(), format)
+    }
+
+    /// The built-in street: photos, scans and exact poses.
+    ///
+    /// Args:
+    ///     condition: `night`, `snow` or another condition; without one, the street by day.
+    ///
+    /// Raises:
+    ///     InputError: There is no such condition; the message lists them.
+    #[staticmethod]
+    #[pyo3(signature = (condition = None))]
+    fn street(py: Python<'_>, condition: Option<&str>) -> PyResult<Self> {
+        let argument = condition.map_or("street".to_owned(), |name| format!("street:{name}"));
+        Self::of(py, &argument, None)
+    }
+
+    /// Its name in results.
+    #[getter]
+    fn name(&self) -> &str {
+        self.opened.scene.name()
+    }
+
+    /// The names of its frames, in order.
+    #[getter]
+    fn frames(&self) -> Vec<String> {
+        self.opened.scene.frames().to_vec()
+    }
+
+    /// What `Scene.open` took.
+    #[getter]
+    fn path(&self) -> &str {
+        &self.opened.argument
+    }
+
+    /// A frame as a query, with its true pose where the scene knows it.
+    ///
+    /// Args:
+    ///     name: The frame's name; leading zeros may be left out.
+    ///
+    /// Raises:
+    ///     InputError: There is no such frame, or its photo cannot be read.
+    fn query(&self, py: Python<'_>, name: &str) -> PyResult<Query> {
+        let origin = self.find(name)?;
+        let read = detached(py, None, |_| {
+            let Origin { opened, frame } = &origin;
+            opened.store.of(&opened.scene).query(*frame)
+        })?;
+        let query = read.map_err(|error| errors::scene(&error))?;
+        let truth = origin.opened.scene.pose(origin.frame);
+        Ok(Query { query, truth, origin: Some(origin) })
+    }
+
+    /// A frame as a reference: photo, camera, pose and cloud.
+    ///
+    /// Args:
+    ///     name: The frame's name; leading zeros may be left out.
+    ///
+    /// Raises:
+    ///     InputError: There is no such frame, it has no pose or no cloud, or a file cannot be read.
+    fn reference(&self, py: Python<'_>, name: &str) -> PyResult<Reference> {
+        let origin = self.find(name)?;
+        let read: Result<_, SceneError> = detached(py, None, |_| {
+            let Origin { opened, frame } = &origin;
+            opened.store.of(&opened.scene).reference(*frame)
+        })?;
+        let reference = read.map_err(|error| errors::scene(&error))?;
+        Ok(Reference::new(reference, Some(origin)))
+    }
+
+    fn __len__(&self) -> usize {
+        self.opened.scene.frames().len()
+    }
+
+    fn __repr__(&self) -> String {
+        let scene = &self.opened.scene;
+        format!("<Scene {}: {} frames>", scene.name(), scene.frames().len())
+    }
+}
