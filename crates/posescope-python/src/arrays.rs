@@ -1,86 +1,96 @@
 //! Arrays of numpy as photos, clouds, poses and points, and back.
 
 use nalgebra::{Matrix3x4, Point3};
-use numpy::ndarray::Array2;
-use numpy::{
-    Element, IntoPyArray as _, PyArray1, PyArray2, PyArray3, PyArrayDyn, PyArrayMethods as _,
-    PyReadonlyArrayDyn, PyUntypedArray, PyUntypedArrayMethods as _,
-};
 use posescope_core::geometry::pose_from_matrix;
 use posescope_core::image::{GrayImage, RgbImage};
 use posescope_core::{Cloud, Photo, Pose};
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{PyByteArray, PyBytes};
 
 use crate::errors;
 
 /// The most elements of a photo or a cloud. A larger array is a mistake, such as one that repeats an element.
 const MAX_ELEMENTS: usize = 1 << 30;
 
-/// What is wrong with an array: its name, what was expected, and its dtype and shape.
-fn wrong(name: &str, expected: &str, array: &Bound<'_, PyUntypedArray>) -> PyErr {
-    let sides: Vec<String> = array.shape().iter().map(ToString::to_string).collect();
-    let dtype = array.dtype();
-    errors::value(format!(
-        "{name}: {expected} expected, {dtype} of shape ({}) given",
-        sides.join(", ")
-    ))
+/// An array of numpy: its elements are read through numpy itself, in any order in memory.
+struct Array<'py> {
+    /// What the caller calls it.
+    name: &'py str,
+    array: Bound<'py, PyAny>,
+    shape: Vec<usize>,
+    /// The kind of its elements, such as `f`, and their size in bytes.
+    element: (char, usize),
 }
 
-/// Anything as an array, without a copy where it is one.
-fn array<'py>(name: &str, value: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyUntypedArray>> {
-    if let Ok(array) = value.cast::<PyUntypedArray>() {
-        return Ok(array.clone());
+impl<'py> Array<'py> {
+    /// Anything as an array, without a copy where it is one.
+    fn of(name: &'py str, value: &Bound<'py, PyAny>) -> PyResult<Self> {
+        let numpy = value.py().import("numpy")?;
+        let array = numpy.call_method1("asarray", (value,)).map_err(|error| {
+            let given = value.get_type();
+            errors::value(format!("{name}: an array expected, {given} given ({error})"))
+        })?;
+        let dtype = array.getattr("dtype")?;
+        let element = (dtype.getattr("kind")?.extract()?, dtype.getattr("itemsize")?.extract()?);
+        Ok(Self { name, shape: array.getattr("shape")?.extract()?, element, array })
     }
-    let numpy = value.py().import("numpy")?;
-    match numpy.call_method1("asarray", (value,)) {
-        Ok(array) => Ok(array.cast_into::<PyUntypedArray>()?),
-        Err(error) => Err(errors::value(format!(
-            "{name}: an array expected, {} given ({error})",
-            value.get_type().name()?
-        ))),
+
+    /// What is wrong with it: its name, what was expected, and its dtype and shape.
+    fn wrong(&self, expected: &str) -> PyErr {
+        let sides: Vec<String> = self.shape.iter().map(ToString::to_string).collect();
+        let dtype = self.array.getattr("dtype").map_or("?".to_owned(), |dtype| dtype.to_string());
+        let (name, shape) = (self.name, sides.join(", "));
+        errors::value(format!("{name}: {expected} expected, {dtype} of shape ({shape}) given"))
     }
-}
 
-/// `kind` and size in bytes of an element.
-fn kind(array: &Bound<'_, PyUntypedArray>) -> (u8, usize) {
-    let dtype = array.dtype();
-    (numpy::PyArrayDescrMethods::kind(&dtype), numpy::PyArrayDescrMethods::itemsize(&dtype))
-}
+    fn is_small(&self) -> bool {
+        let mut sides = self.shape.iter();
+        let elements = sides.try_fold(1, |product: usize, side| product.checked_mul(*side));
+        elements.is_some_and(|elements| elements <= MAX_ELEMENTS)
+    }
 
-/// The elements of an array row by row, as they are or converted.
-fn elements<T: Element + Clone>(
-    array: &Bound<'_, PyUntypedArray>,
-    dtype: &str,
-) -> PyResult<Vec<T>> {
-    let py = array.py();
-    let order = PyDict::new(py);
-    order.set_item("dtype", dtype)?;
-    let numpy = py.import("numpy")?;
-    let rows = numpy.call_method("ascontiguousarray", (array,), Some(&order))?;
-    let rows: PyReadonlyArrayDyn<'_, T> = rows.cast::<PyArrayDyn<T>>()?.try_readonly()?;
-    Ok(rows.as_slice()?.to_vec())
+    fn has_numbers(&self) -> bool {
+        matches!(self.element.0, 'f' | 'i' | 'u')
+    }
+
+    /// Its bytes row by row, as elements of this dtype.
+    fn bytes(&self, dtype: &str) -> PyResult<Bound<'py, PyBytes>> {
+        let numpy = self.array.py().import("numpy")?;
+        let converted = numpy.call_method1("asarray", (&self.array, dtype))?;
+        Ok(converted.call_method0("tobytes")?.cast_into::<PyBytes>()?)
+    }
+
+    fn f32s(&self) -> PyResult<Vec<f32>> {
+        let bytes = self.bytes("<f4")?;
+        Ok(bytes.as_bytes().as_chunks().0.iter().map(|four| f32::from_le_bytes(*four)).collect())
+    }
+
+    fn f64s(&self) -> PyResult<Vec<f64>> {
+        let bytes = self.bytes("<f8")?;
+        Ok(bytes.as_bytes().as_chunks().0.iter().map(|eight| f64::from_le_bytes(*eight)).collect())
+    }
 }
 
 /// A photo: uint8, H × W or H × W × 3.
 pub fn photo(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Photo> {
-    const EXPECTED: &str = "uint8 of shape (H, W) or (H, W, 3)";
-    let given = array(name, value)?;
-    let wrong = || wrong(name, EXPECTED, &given);
-    if kind(&given) != (b'u', 1) || given.len() > MAX_ELEMENTS {
+    let given = Array::of(name, value)?;
+    let wrong = || given.wrong("uint8 of shape (H, W) or (H, W, 3)");
+    if given.element != ('u', 1) || !given.is_small() {
         return Err(wrong());
     }
-    let side = |side: usize| u32::try_from(side).map_err(|_| wrong());
-    match *given.shape() {
+    let size = |width: usize, height: usize| {
+        Ok::<_, PyErr>((u32::try_from(width)?, u32::try_from(height)?))
+    };
+    match *given.shape {
         [height, width] => {
-            let (width, height) = (side(width)?, side(height)?);
-            let gray = GrayImage::from_raw(width, height, elements(&given, "uint8")?);
-            Ok(Photo::from_gray(gray.ok_or_else(wrong)?))
+            let (width, height) = size(width, height)?;
+            let values = given.bytes("u1")?.as_bytes().to_vec();
+            Ok(Photo::from_gray(GrayImage::from_raw(width, height, values).ok_or_else(wrong)?))
         }
         [height, width, 3] => {
-            let (width, height) = (side(width)?, side(height)?);
-            let color = RgbImage::from_raw(width, height, elements(&given, "uint8")?);
-            Ok(Photo::from_color(color.ok_or_else(wrong)?))
+            let (width, height) = size(width, height)?;
+            let values = given.bytes("u1")?.as_bytes().to_vec();
+            Ok(Photo::from_color(RgbImage::from_raw(width, height, values).ok_or_else(wrong)?))
         }
         _ => Err(wrong()),
     }
@@ -93,48 +103,45 @@ pub fn cloud(
     value: &Bound<'_, PyAny>,
     world_from_camera: Option<&Pose>,
 ) -> PyResult<Cloud> {
-    const EXPECTED: &str = "float32 or float64 of shape (N, 3)";
-    let given = array(name, value)?;
-    if given.len() > MAX_ELEMENTS || !matches!(*given.shape(), [_, 3]) {
-        return Err(wrong(name, EXPECTED, &given));
+    let given = Array::of(name, value)?;
+    if !given.is_small()
+        || !matches!(*given.shape, [_, 3])
+        || !matches!(given.element, ('f', 4 | 8))
+    {
+        return Err(given.wrong("float32 or float64 of shape (N, 3)"));
     }
     let is_finite = |point: &Point3<f32>| point.iter().all(|x| x.is_finite());
-    let points: Vec<Point3<f32>> = match (kind(&given), world_from_camera) {
-        ((b'f', 4), None) => {
-            let numbers: Vec<f32> = elements(&given, "float32")?;
-            numbers.as_chunks().0.iter().copied().map(Point3::from).filter(is_finite).collect()
+    let points = match world_from_camera {
+        None => {
+            // Numpy rounds float64 as Rust does.
+            let numbers = given.f32s()?;
+            let points = numbers.as_chunks().0.iter().copied().map(Point3::from);
+            points.filter(is_finite).collect()
         }
-        ((b'f', 4 | 8), pose) => {
+        Some(pose) => {
             // Map coordinates do not fit f32, so they become the camera's before they are rounded.
-            let camera_from_given = pose.map_or_else(Pose::identity, Pose::inverse);
-            let numbers: Vec<f64> = elements(&given, "float64")?;
+            let camera_from_world = pose.inverse();
+            let numbers = given.f64s()?;
             let points = numbers.as_chunks().0.iter().copied().map(Point3::<f64>::from);
-            match pose {
-                None => points.map(|point| point.cast()).filter(is_finite).collect(),
-                Some(_) => points
-                    .map(|point| (camera_from_given * point).cast())
-                    .filter(is_finite)
-                    .collect(),
-            }
+            let points = points.map(|point| (camera_from_world * point).cast());
+            points.filter(is_finite).collect()
         }
-        _ => return Err(wrong(name, EXPECTED, &given)),
     };
     Ok(Cloud { points })
 }
 
 /// A pose: numbers, 4 × 4 or 3 × 4.
 pub fn pose(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Pose> {
-    const EXPECTED: &str = "numbers of shape (4, 4), world_from_camera,";
-    let given = array(name, value)?;
-    if !matches!(kind(&given).0, b'f' | b'i' | b'u') || !matches!(*given.shape(), [3 | 4, 4]) {
-        return Err(wrong(name, EXPECTED, &given));
+    let given = Array::of(name, value)?;
+    if !given.has_numbers() || !matches!(*given.shape, [3 | 4, 4]) {
+        return Err(given.wrong("numbers of shape (4, 4)"));
     }
-    let numbers: Vec<f64> = elements(&given, "float64")?;
-    if numbers.get(12..).is_some_and(|last| !last.is_empty() && *last != [0.0, 0.0, 0.0, 1.0]) {
-        return Err(errors::value(format!(
-            "{name}: the last row 0 0 0 1 expected, {:?} given",
-            &numbers[12..]
-        )));
+    let numbers = given.f64s()?;
+    if let Some(last @ [_, ..]) = numbers.get(12..)
+        && *last != [0.0, 0.0, 0.0, 1.0]
+    {
+        let words = format!("{name}: the last row 0 0 0 1 expected, {last:?} given");
+        return Err(errors::value(words));
     }
     let matrix = Matrix3x4::from_row_iterator(numbers.into_iter().take(12));
     pose_from_matrix(&matrix).map_err(|error| errors::value(format!("{name}: {error}")))
@@ -142,12 +149,11 @@ pub fn pose(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Pose> {
 
 /// Points of a photo: numbers, N × 2.
 pub fn points(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec<[f32; 2]>> {
-    let given = array(name, value)?;
-    let is_numbers = matches!(kind(&given).0, b'f' | b'i' | b'u');
-    if !is_numbers || !matches!(*given.shape(), [_, 2]) || given.len() > MAX_ELEMENTS {
-        return Err(wrong(name, "numbers of shape (N, 2)", &given));
+    let given = Array::of(name, value)?;
+    if !given.has_numbers() || !matches!(*given.shape, [_, 2]) || !given.is_small() {
+        return Err(given.wrong("numbers of shape (N, 2)"));
     }
-    let numbers: Vec<f32> = elements(&given, "float32")?;
+    let numbers = given.f32s()?;
     if !numbers.iter().all(|x| x.is_finite()) {
         return Err(errors::value(format!("{name}: finite numbers expected")));
     }
@@ -156,40 +162,46 @@ pub fn points(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec<[f32; 2]>> {
 
 /// A number for each of `count` matches.
 pub fn scores(name: &str, value: &Bound<'_, PyAny>, count: usize) -> PyResult<Vec<f64>> {
-    let given = array(name, value)?;
-    if !matches!(kind(&given).0, b'f' | b'i' | b'u') || *given.shape() != [count] {
-        return Err(wrong(name, &format!("numbers of shape ({count},)"), &given));
+    let given = Array::of(name, value)?;
+    if !given.has_numbers() || *given.shape != [count] {
+        return Err(given.wrong(&format!("numbers of shape ({count},)")));
     }
-    elements(&given, "float64")
+    given.f64s()
+}
+
+/// Bytes as an array that can be written to.
+fn made<'py>(
+    py: Python<'py>,
+    bytes: &[u8],
+    dtype: &str,
+    shape: &[usize],
+) -> PyResult<Bound<'py, PyAny>> {
+    let buffer = PyByteArray::new(py, bytes);
+    let flat = py.import("numpy")?.call_method1("frombuffer", (buffer, dtype))?;
+    flat.call_method1("reshape", (shape.to_vec(),))
 }
 
 /// A photo as an array: H × W × 3 where it has colours, else H × W.
 pub fn of_photo<'py>(py: Python<'py>, photo: &Photo) -> PyResult<Bound<'py, PyAny>> {
     let (width, height) = photo.dimensions();
     let (width, height) = (width as usize, height as usize);
-    Ok(match &photo.color {
-        Some(color) => {
-            let pixels = PyArray1::from_slice(py, color.as_raw());
-            let image: Bound<'_, PyArray3<u8>> = pixels.reshape([height, width, 3])?;
-            image.into_any()
-        }
-        None => {
-            let pixels = PyArray1::from_slice(py, photo.gray.as_raw());
-            let image: Bound<'_, PyArray2<u8>> = pixels.reshape([height, width])?;
-            image.into_any()
-        }
-    })
+    match &photo.color {
+        Some(color) => made(py, color.as_raw(), "u1", &[height, width, 3]),
+        None => made(py, photo.gray.as_raw(), "u1", &[height, width]),
+    }
 }
 
 /// A pose as a 4 × 4 array.
-pub fn of_pose<'py>(py: Python<'py>, pose: &Pose) -> Bound<'py, PyArray2<f64>> {
-    let matrix = pose.to_homogeneous();
-    Array2::from_shape_fn((4, 4), |(row, column)| matrix[(row, column)]).into_pyarray(py)
+pub fn of_pose<'py>(py: Python<'py>, pose: &Pose) -> PyResult<Bound<'py, PyAny>> {
+    // nalgebra stores columns.
+    let rows = pose.to_homogeneous().transpose();
+    let bytes: Vec<u8> = rows.iter().flat_map(|number| number.to_le_bytes()).collect();
+    made(py, &bytes, "<f8", &[4, 4])
 }
 
 /// A cloud as an N × 3 array.
-pub fn of_cloud<'py>(py: Python<'py>, cloud: &Cloud) -> PyResult<Bound<'py, PyArray2<f32>>> {
-    let numbers: Vec<f32> =
-        cloud.points.iter().flat_map(|point| [point.x, point.y, point.z]).collect();
-    PyArray1::from_vec(py, numbers).reshape([cloud.len(), 3])
+pub fn of_cloud<'py>(py: Python<'py>, cloud: &Cloud) -> PyResult<Bound<'py, PyAny>> {
+    let numbers = cloud.points.iter().flat_map(|point| [point.x, point.y, point.z]);
+    let bytes: Vec<u8> = numbers.flat_map(f32::to_le_bytes).collect();
+    made(py, &bytes, "<f4", &[cloud.len(), 3])
 }

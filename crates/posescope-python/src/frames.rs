@@ -2,7 +2,6 @@
 
 use std::sync::{Arc, OnceLock};
 
-use numpy::PyArray2;
 use posescope::scene::{Lengths, SceneSize};
 use posescope_core::{Pose, ReferenceTuple};
 use pyo3::prelude::*;
@@ -79,8 +78,8 @@ impl Query {
 
     /// The true `world_from_camera`, 4 × 4, where it is known.
     #[getter]
-    fn truth<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray2<f64>>> {
-        self.truth.as_ref().map(|truth| arrays::of_pose(py, truth))
+    fn truth<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
+        self.truth.as_ref().map(|truth| arrays::of_pose(py, truth)).transpose()
     }
 
     fn __repr__(&self) -> String {
@@ -172,13 +171,13 @@ impl Reference {
 
     /// Its pose `world_from_camera`, 4 × 4 [m].
     #[getter]
-    fn world_from_camera<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
+    fn world_from_camera<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         arrays::of_pose(py, &self.reference.world_from_camera)
     }
 
     /// A copy of the cloud: float32, N × 3 [m], in the camera's frame.
     #[getter]
-    fn cloud<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
+    fn cloud<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         arrays::of_cloud(py, &self.reference.cloud)
     }
 
