@@ -71,28 +71,45 @@ impl<'py> Array<'py> {
     }
 }
 
+/// What a photo is.
+const PHOTO: &str = "uint8 of shape (H, W) or (H, W, 3)";
+
 /// A photo: uint8, H × W or H × W × 3.
 pub fn photo(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Photo> {
     let given = Array::of(name, value)?;
-    let wrong = || given.wrong("uint8 of shape (H, W) or (H, W, 3)");
-    if given.element != ('u', 1) || !given.is_small() {
-        return Err(wrong());
+    let (width, height, has_color) = size_of_photo(&given)?;
+    let bytes = given.bytes("u1")?;
+    let values = bytes.as_bytes();
+    let photo = value.py().detach(|| {
+        let values = values.to_vec();
+        if has_color {
+            RgbImage::from_raw(width, height, values).map(Photo::from_color)
+        } else {
+            GrayImage::from_raw(width, height, values).map(Photo::from_gray)
+        }
+    });
+    photo.ok_or_else(|| given.wrong(PHOTO))
+}
+
+/// Checks that a value is a photo of this size, without copying it.
+pub fn check_photo(name: &str, value: &Bound<'_, PyAny>, size: (u32, u32)) -> PyResult<()> {
+    let given = Array::of(name, value)?;
+    let (width, height, _) = size_of_photo(&given)?;
+    if (width, height) == size {
+        return Ok(());
     }
-    let size = |width: usize, height: usize| {
-        Ok::<_, PyErr>((u32::try_from(width)?, u32::try_from(height)?))
-    };
+    let (camera_width, camera_height) = size;
+    Err(given.wrong(&format!("a photo of its camera, {camera_height} x {camera_width},")))
+}
+
+/// Width and height \[px\], and whether it has colours.
+fn size_of_photo(given: &Array<'_>) -> PyResult<(u32, u32, bool)> {
+    let is_bytes = given.element == ('u', 1) && given.is_small();
+    let side = |side: usize| u32::try_from(side).map_err(|_| given.wrong(PHOTO));
     match *given.shape {
-        [height, width] => {
-            let (width, height) = size(width, height)?;
-            let values = given.bytes("u1")?.as_bytes().to_vec();
-            Ok(Photo::from_gray(GrayImage::from_raw(width, height, values).ok_or_else(wrong)?))
-        }
-        [height, width, 3] => {
-            let (width, height) = size(width, height)?;
-            let values = given.bytes("u1")?.as_bytes().to_vec();
-            Ok(Photo::from_color(RgbImage::from_raw(width, height, values).ok_or_else(wrong)?))
-        }
-        _ => Err(wrong()),
+        [height, width] if is_bytes => Ok((side(width)?, side(height)?, false)),
+        [height, width, 3] if is_bytes => Ok((side(width)?, side(height)?, true)),
+        _ => Err(given.wrong(PHOTO)),
     }
 }
 

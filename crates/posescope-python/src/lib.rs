@@ -12,6 +12,7 @@ mod errors;
 mod frames;
 mod held;
 mod job;
+mod live;
 mod localize;
 mod scene;
 mod witness;
@@ -36,5 +37,11 @@ fn extension(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(command::evaluate, module)?)?;
     module.add_function(wrap_pyfunction!(command::doctor, module)?)?;
     module.add_function(wrap_pyfunction!(command::write_report, module)?)?;
+    module.add_function(wrap_pyfunction!(live::check_photo, module)?)?;
+    module.add_function(wrap_pyfunction!(live::save_photo, module)?)?;
+    module.add_function(wrap_pyfunction!(live::nearest, module)?)?;
+    module.add_function(wrap_pyfunction!(live::unjudged, module)?)?;
+    module.add_function(wrap_pyfunction!(live::run_text, module)?)?;
+    module.add_function(wrap_pyfunction!(live::summarise, module)?)?;
     Ok(())
 }

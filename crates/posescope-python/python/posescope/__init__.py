@@ -16,28 +16,38 @@ import sys
 from typing import List, Optional
 
 from . import _posescope
-from ._errors import InputError, InternalError
+from ._commands import Examination, doctor, evaluate
+from ._errors import GateError, InputError, InternalError
 from ._localize import diagnose, localize
 from ._posescope import Camera, Query, Reference, Scene, __version__, methods
+from ._record import Recording, record
 from ._result import Confidence, Failure, PoseError, Result, Verdict
+from ._run import Run
 
 __all__ = [
     "Camera",
     "Confidence",
+    "Examination",
     "Failure",
+    "GateError",
     "InputError",
     "InternalError",
     "PoseError",
     "Query",
+    "Recording",
     "Reference",
     "Result",
+    "Run",
     "Scene",
     "Verdict",
     "__version__",
     "diagnose",
+    "doctor",
+    "evaluate",
     "localize",
     "main",
     "methods",
+    "record",
 ]
 
 

@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from ._run import Run
+
 
 class InputError(Exception):
     """A file or a scene cannot be used.
@@ -24,3 +29,15 @@ class InputError(Exception):
 
 class InternalError(RuntimeError):
     """A bug of posescope. The message says where it happened."""
+
+
+class GateError(Exception):
+    """A gate of an evaluation failed.
+
+    Attributes:
+        run: The run, which is complete.
+    """
+
+    def __init__(self, message: str, run: "Run") -> None:
+        super().__init__(message)
+        self.run = run

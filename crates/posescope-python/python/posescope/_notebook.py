@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import os
 import tempfile
 from typing import TYPE_CHECKING, Any
@@ -15,8 +16,8 @@ _INSTALL = "Rerun's notebook viewer is not installed; run: pip install 'rerun-sd
 def show(result: "Result") -> Any:
     """The recording of a result in Rerun's notebook viewer."""
     try:
-        import rerun
-        import rerun_notebook  # noqa: F401
+        rerun: Any = importlib.import_module("rerun")
+        importlib.import_module("rerun_notebook")
     except ImportError as missing:
         raise ImportError(_INSTALL) from missing
     folder = tempfile.mkdtemp(prefix="posescope-")

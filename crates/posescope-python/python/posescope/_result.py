@@ -117,7 +117,8 @@ class Result:
         if reason is None:
             return None
         same = (one for one in self._row["diagnosis"] if one["code"] == reason["code"])
-        numbers = next(same, {}).get("evidence") or {}
+        found: Dict[str, Any] = next(same, {})
+        numbers = found.get("evidence") or {}
         return Failure(reason["code"], reason["text"], numbers)
 
     @property
