@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
+use nalgebra::Point3;
 use posescope::diagnosis::Tolerance;
 use posescope::estimator::Failure;
 use posescope::localize::{QueryResult, frames_within};
@@ -12,7 +13,6 @@ use posescope::run::{
     EstimatesFile, FolderError, Protocol, QueryCamera, RUN_SCHEMA, Reference, RunFile, ScenePair,
     read_run,
 };
-use posescope_core::nalgebra::Point3;
 use posescope_core::{Method, Params};
 use pyo3::exceptions::PyOSError;
 use pyo3::prelude::*;
@@ -75,7 +75,15 @@ pub fn unjudged(
     let result = QueryResult {
         query_scene: Some(query_scene.to_owned()),
         per_reference: None,
-        ..QueryResult::new(name, query, method, 0, pose.as_ref().ok_or(&failure), truth.as_ref(), right)
+        ..QueryResult::new(
+            name,
+            query,
+            method,
+            0,
+            pose.as_ref().ok_or(&failure),
+            truth.as_ref(),
+            right,
+        )
     };
     serde_json::to_string(&result).map_err(|error| errors::internal(&error.to_string()))
 }
@@ -105,7 +113,6 @@ pub fn run_text(
             references: vec![Reference::Chosen(posescope::localize::Selection::Nearest(1))],
             estimates: vec![EstimatesFile { method, path: estimates }],
             methods: vec![method],
-            matches,
             ..Protocol::default().at_size(&size)
         },
         inputs: BTreeMap::new(),

@@ -1,0 +1,116 @@
+"""Somebody else's matches, and somebody else's pose."""
+
+from __future__ import annotations
+
+from typing import Any, Tuple
+
+import numpy as np
+import pytest
+
+import posescope
+
+
+@pytest.fixture(scope="module")
+def pair(street: posescope.Scene) -> Tuple[posescope.Query, posescope.Reference]:
+    return street.query("70"), street.reference("62")
+
+
+@pytest.fixture(scope="module")
+def surf(pair: Tuple[posescope.Query, posescope.Reference]) -> Tuple[np.ndarray, np.ndarray]:
+    """The accepted matches of SURF."""
+    events = posescope.localize(*pair, method="fb").events()
+    detected = {event["side"]: event for event in events if event["kind"] == "FeaturesDetected"}
+    decided = next(event for event in events if event["kind"] == "MatchesDecided")
+    points = {
+        side: np.array([event["keypoints"]["x_px"], event["keypoints"]["y_px"]]).T
+        if "keypoints" in event
+        else np.array([event["x_px"], event["y_px"]]).T
+        for side, event in detected.items()
+    }
+    matches: Any = decided.get("matches", decided)
+    verdicts = matches["verdict"]
+    kept = [at for at, verdict in enumerate(verdicts) if "candidate" in str(verdict).lower()]
+    query = np.array(matches["query_keypoint"])[kept]
+    reference = np.array(matches["reference_keypoint"])[kept]
+    return points["query"][query], points["reference"][reference]
+
+
+def test_the_matches_of_surf_give_the_pose_of_surf(
+    pair: Tuple[posescope.Query, posescope.Reference], surf: Tuple[np.ndarray, np.ndarray]
+) -> None:
+    own = posescope.localize(*pair, method="fb")
+    given = posescope.localize(*pair, matches=surf)
+    assert given.method == "fb" and own.pose is not None
+    assert given.pose is not None and np.allclose(given.pose, own.pose)
+
+
+def test_a_callable_gets_both_photos(
+    pair: Tuple[posescope.Query, posescope.Reference], surf: Tuple[np.ndarray, np.ndarray]
+) -> None:
+    seen = []
+
+    def matcher(query: np.ndarray, reference: np.ndarray) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
+        seen.append((query, reference))
+        return (*surf, np.ones(len(surf[0])))
+
+    result = posescope.localize(*pair, method="fb", matches=matcher)
+    assert result.grade == "right"
+    assert np.array_equal(seen[0][0], pair[0].photo) and np.array_equal(seen[0][1], pair[1].photo)
+
+    def fails(query: np.ndarray, reference: np.ndarray) -> Any:
+        raise LookupError("no weights")
+
+    with pytest.raises(LookupError, match="no weights"):
+        posescope.localize(*pair, matches=fails)
+
+
+@pytest.mark.parametrize(
+    ("matches", "words"),
+    [
+        ((np.zeros((3, 2)), np.zeros((4, 2))), "as many query points as reference points"),
+        ((np.zeros((3, 3)), np.zeros((3, 2))), "matches[0]: numbers of shape (N, 2) expected, float64 of shape (3, 3)"),
+        ((np.zeros((3, 2)), np.full((3, 2), np.nan)), "matches[1]: finite numbers"),
+        ((np.zeros((3, 2)), np.zeros((3, 2)), np.zeros(2)), "matches[2]: numbers of shape (3,)"),
+        ((np.zeros((3, 2)),), "1 parts given"),
+        ([(np.zeros((3, 2)), np.zeros((3, 2)))] * 2, "parts|entry|shape"),
+    ],
+)
+def test_wrong_matches_are_named(
+    matches: Any, words: str, pair: Tuple[posescope.Query, posescope.Reference]
+) -> None:
+    with pytest.raises(ValueError) as raised:
+        posescope.localize(*pair, matches=matches)
+    assert any(word in str(raised.value) for word in words.split("|"))
+
+
+def test_methods_without_matches_refuse_them(
+    pair: Tuple[posescope.Query, posescope.Reference], surf: Tuple[np.ndarray, np.ndarray]
+) -> None:
+    with pytest.raises(ValueError, match="fb and hy"):
+        posescope.localize(*pair, method="robust", matches=surf)
+
+
+def test_no_matches_are_a_failure(pair: Tuple[posescope.Query, posescope.Reference]) -> None:
+    result = posescope.localize(*pair, matches=(np.zeros((0, 2)), np.zeros((0, 2))))
+    assert result.failure is not None and result.pose is None
+
+
+def test_somebody_elses_pose_gets_verdicts(
+    pair: Tuple[posescope.Query, posescope.Reference], surf: Tuple[np.ndarray, np.ndarray]
+) -> None:
+    query, reference = pair
+    truth = query.truth
+    assert truth is not None
+    right = posescope.diagnose(query, reference, truth)
+    assert right.grade == "right" and right.method == "pose" and right.pose is not None
+    assert np.allclose(right.pose, truth)
+    moved = truth.copy()
+    moved[:3, 3] += [6.0, 0.0, 0.0]
+    wrong = posescope.diagnose(query, reference, moved, matches=surf, name="mine")
+    assert wrong.grade == "wrong" and wrong.verdicts and wrong.method == "mine"
+    assert wrong.error is not None and wrong.error.translation_m == pytest.approx(6.0)
+    unknown = posescope.Query(query.photo, query.camera)
+    assert posescope.diagnose(unknown, reference, moved).grade == "unmeasured"
+    assert posescope.diagnose(unknown, reference, moved, truth=truth).grade == "wrong"
+    with pytest.raises(ValueError, match="method of posescope"):
+        posescope.diagnose(query, reference, truth, name="mi")
