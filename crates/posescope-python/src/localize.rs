@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::time::{Duration, Instant};
 
 use posescope::foreign::{Foreign, MatchSource};
 use posescope::fusion::Fusion;
@@ -35,15 +36,18 @@ pub struct Answer {
     job: Job,
     result: QueryResult,
     threads: Option<NonZeroUsize>,
+    took: Duration,
 }
 
 impl Answer {
     fn of(py: Python<'_>, job: Job, threads: Option<NonZeroUsize>) -> PyResult<Self> {
-        let result = detached(py, threads, |stop| {
-            job.run(&mut Stoppable { observer: &mut NoObserver, stop })
+        let (result, took) = detached(py, threads, |stop| {
+            let start = Instant::now();
+            let result = job.run(&mut Stoppable { observer: &mut NoObserver, stop });
+            (result, start.elapsed())
         })?;
         let result = result.map_err(|error| errors::localize(&error))?;
-        Ok(Self { job, result, threads })
+        Ok(Self { job, result, threads, took })
     }
 }
 
@@ -52,6 +56,11 @@ impl Answer {
     /// The result as a line of `results.jsonl`.
     fn json(&self) -> PyResult<String> {
         serde_json::to_string(&self.result).map_err(|error| errors::internal(&error.to_string()))
+    }
+
+    /// How long the work took \[s\], without Python's part.
+    fn seconds(&self) -> f64 {
+        self.took.as_secs_f64()
     }
 
     /// Query, method and error in a line, with the primary verdict.

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import importlib
 import inspect
+import os
 import re
 from pathlib import Path
 
@@ -39,3 +41,13 @@ def test_everything_public_has_a_docstring() -> None:
                 if not member.startswith("_") and is_documented and not inspect.getdoc(value):
                     missing.append(f"{name}.{member}")
     assert missing == []
+
+
+def test_the_reference_is_made_from_the_docstrings(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(str(Path(__file__).parents[1]))
+    reference = importlib.import_module("reference")
+    stored = ROOT / "docs" / "python-reference.md"
+    if os.environ.get("UPDATE_DOCS"):
+        stored.write_text(reference.page(), encoding="utf-8")
+    hint = "run: UPDATE_DOCS=1 pytest crates/posescope-python/tests/test_docs.py"
+    assert reference.page() == stored.read_text(encoding="utf-8"), hint

@@ -165,6 +165,11 @@ class Result:
         return list(self._row.get("per_reference") or [])
 
     @property
+    def seconds(self) -> float:
+        """How long the localisation took [s]. It is in no file: results hold no clock."""
+        return self._answer.seconds()
+
+    @property
     def headline(self) -> str:
         """Query, method and error in a line, with the first verdict."""
         return self._answer.headline()

@@ -1,0 +1,119 @@
+"""A thousand random arguments: nothing crashes, and only documented exceptions are raised."""
+
+from __future__ import annotations
+
+import collections
+from typing import Any, Callable, List
+
+import numpy as np
+
+import posescope
+
+DOCUMENTED = (ValueError, TypeError, OverflowError, posescope.InputError)
+SIZE = (24, 32)
+
+
+class Draw:
+    """Draws arguments, right and wrong ones."""
+
+    def __init__(self, seed: int) -> None:
+        self.random = np.random.default_rng(seed)
+
+    def of(self, choices: List[Callable[[], Any]]) -> Any:
+        return choices[self.random.integers(len(choices))]()
+
+    def strided(self, array: np.ndarray) -> np.ndarray:
+        """The same elements in another order in memory."""
+        flipped = array[::-1]
+        wide = np.repeat(array, 2, axis=0)[::2]
+        frozen = array.copy()
+        frozen.flags.writeable = False
+        return self.of(
+            [lambda: array, lambda: np.asfortranarray(array), lambda: flipped, lambda: wide, lambda: frozen]
+        )
+
+    def garbage(self) -> Any:
+        random = self.random
+        shape = tuple(int(side) for side in random.integers(0, 5, random.integers(0, 4)))
+        dtypes = ["u1", "i8", "f2", "f4", "f8", ">f8", "c16", "b1", "O", "U3", "M8[s]"]
+        return self.of(
+            [
+                lambda: None,
+                lambda: "text",
+                lambda: {},
+                lambda: -1,
+                lambda: float("nan"),
+                lambda: [[1, 2], [3]],
+                lambda: np.zeros(shape, dtypes[random.integers(len(dtypes))]),
+                lambda: np.full(shape, np.nan),
+                lambda: np.broadcast_to(np.uint8(1), (1 << 20, 1 << 20)),
+                lambda: np.broadcast_to(np.float32(1), (1 << 40, 3)),
+            ]
+        )
+
+    def photo(self) -> Any:
+        pixels = self.random.integers(0, 256, (*SIZE, 3), np.uint8)
+        return self.of([lambda: self.strided(pixels), lambda: self.strided(pixels[..., 0]), self.garbage])
+
+    def cloud(self) -> Any:
+        points = self.random.normal(0, 5, (40, 3)) + [0, 0, 9]
+        holes = np.where(self.random.random((40, 3)) < 0.1, np.nan, points)
+        return self.of(
+            [
+                lambda: self.strided(points),
+                lambda: self.strided(holes.astype(np.float32)),
+                lambda: np.zeros((0, 3)),
+                lambda: points * 1e300,
+                self.garbage,
+            ]
+        )
+
+    def pose(self) -> Any:
+        angle = self.random.normal()
+        pose = np.eye(4)
+        pose[:2, :2] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
+        pose[:3, 3] = self.random.normal(0, 3, 3)
+        return self.of(
+            [lambda: pose, lambda: self.strided(pose), lambda: pose[:3], lambda: pose * np.nan, self.garbage]
+        )
+
+    def matches(self) -> Any:
+        count = int(self.random.integers(0, 9))
+        points = self.random.uniform(-5, 40, (2, count, 2))
+        return self.of(
+            [
+                lambda: None,
+                lambda: (points[0], points[1]),
+                lambda: (points[0], points[1], self.random.random(count)),
+                lambda: (points[0], points[1][1:]),
+                lambda: (self.garbage(), self.garbage()),
+                lambda: (lambda query, reference: (points[0], points[1])),
+                self.garbage,
+            ]
+        )
+
+
+def attempt(draw: Draw) -> str:
+    number = lambda right: draw.of([lambda: right, lambda: right, lambda: right, draw.garbage])  # noqa: E731
+    camera = posescope.Camera(number(30.0), number(30.0), 15.5, 11.5, number(SIZE[1]), number(SIZE[0]))
+    query = posescope.Query(draw.photo(), camera, truth=draw.of([lambda: None, draw.pose]))
+    frame = draw.of([lambda: "camera", lambda: "world", lambda: "x"])
+    reference = posescope.Reference(draw.photo(), camera, draw.pose(), draw.cloud(), cloud_frame=frame)
+    matches = draw.matches()
+    if draw.random.random() < 0.3:
+        return posescope.diagnose(query, reference, draw.pose(), truth=None, matches=matches).grade
+    method = draw.of([lambda: None, lambda: "fb", lambda: "hy", lambda: "mi", lambda: "x"])
+    radius = draw.of([lambda: None, lambda: 1.0, lambda: -1.0, lambda: float("inf")])
+    return posescope.localize(query, reference, method, radius=radius, matches=matches, threads=1).grade
+
+
+def test_a_thousand_random_arguments_crash_nothing() -> None:
+    seen: "collections.Counter[str]" = collections.Counter()
+    for seed in range(1000):
+        try:
+            seen[attempt(Draw(seed))] += 1
+        except DOCUMENTED as error:
+            seen[type(error).__name__] += 1
+    # Some of each went through, or the test tests nothing.
+    assert seen["ValueError"] > 100
+    assert seen["no pose"] + seen["unmeasured"] + seen["wrong"] + seen["right"] > 20, seen
