@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Builds the wheel, installs it into a virtual environment of its own, and runs what it brought:
 #   examples/ci/wheel.sh            optimised, into target/wheels
-#   PROFILE=dev examples/ci/wheel.sh   with what cargo run has built, to try the packaging
+#   PROFILE=dev examples/ci/wheel.sh   with the dependencies that cargo test has built, to try the packaging
 # Needs Python 3.9, its venv module, and Rust.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
@@ -21,6 +21,14 @@ cd "$work"   # nothing of the project is at hand here
 "$work/clean/bin/posescope" lesson
 "$work/clean/bin/posescope" run street --query 70 --reference 62 --save first.rrd
 test -s first.rrd
+"$work/clean/bin/python" - <<'END'
+import posescope
+
+street = posescope.Scene.street()
+result = posescope.localize(street.query("70"), street.reference("62"))
+print(result.pose)
+print(result.confidence)
+END
 
 cd - >/dev/null
 mkdir -p target/wheels

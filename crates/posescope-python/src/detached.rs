@@ -117,6 +117,12 @@ pub fn detached_with<T: Send>(
     }
 }
 
+/// Panics, to test what becomes of a panic.
+#[pyfunction]
+pub fn panic(py: Python<'_>) -> PyResult<()> {
+    detached(py, None, |_| unreachable!("a panic on purpose"))
+}
+
 /// An observer that is stopped by Ctrl-C.
 pub struct Stoppable<'a, O> {
     /// The observer.

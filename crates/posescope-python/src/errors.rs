@@ -1,7 +1,7 @@
 //! Errors as Python's exceptions.
 
-use std::cell::RefCell;
 use std::path::Path;
+use std::sync::{Mutex, PoisonError};
 
 use posescope::localize::LocalizeError;
 use posescope::scene::SceneError;
@@ -12,22 +12,20 @@ use pyo3::prelude::*;
 /// Where the classes of exceptions are.
 const MODULE: &str = "posescope._errors";
 
-thread_local! {
-    /// Where the last panic of this thread came from.
-    static PLACE: RefCell<String> = const { RefCell::new(String::new()) };
-}
+/// Where the last panic came from. It may have been on a thread of a pool.
+static PLACE: Mutex<String> = Mutex::new(String::new());
 
 /// A panic becomes an exception, so nothing is printed.
 pub fn keep_panics_silent() {
     std::panic::set_hook(Box::new(|panic| {
         let place = panic.location().map(|place| format!("{}:{}", place.file(), place.line()));
-        PLACE.with_borrow_mut(|kept| *kept = place.unwrap_or_default());
+        *PLACE.lock().unwrap_or_else(PoisonError::into_inner) = place.unwrap_or_default();
     }));
 }
 
-/// Where the last panic of this thread came from, as file and line.
+/// Where the last panic came from, as file and line.
 pub fn place_of_panic() -> String {
-    PLACE.with_borrow(Clone::clone)
+    PLACE.lock().unwrap_or_else(PoisonError::into_inner).clone()
 }
 
 fn raised(class: &str, arguments: impl for<'py> pyo3::call::PyCallArgs<'py>) -> PyErr {

@@ -37,6 +37,7 @@ fn extension(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(command::evaluate, module)?)?;
     module.add_function(wrap_pyfunction!(command::doctor, module)?)?;
     module.add_function(wrap_pyfunction!(command::write_report, module)?)?;
+    module.add_function(wrap_pyfunction!(detached::panic, module)?)?;
     module.add_function(wrap_pyfunction!(live::check_photo, module)?)?;
     module.add_function(wrap_pyfunction!(live::save_photo, module)?)?;
     module.add_function(wrap_pyfunction!(live::nearest, module)?)?;

@@ -10,11 +10,11 @@ use posescope::foreign::{Foreign, MatchSource};
 use posescope::fusion::Fusion;
 use posescope::localize::{LocalizeError, NoObserver, QueryResult, Request};
 use posescope::report::Witness;
-use posescope::run::Protocol;
+use posescope::run::{Protocol, known};
 use posescope::scene::SceneError;
 use posescope::sink::rerun::{Recorder, Targets};
 use posescope_core::features::{FoundMatches, PairMatches};
-use posescope_core::{Method, Params};
+use posescope_core::{Method, Params, Pose};
 use pyo3::exceptions::PyOSError;
 use pyo3::prelude::*;
 
@@ -40,13 +40,15 @@ pub struct Answer {
 }
 
 impl Answer {
-    fn of(py: Python<'_>, job: Job, threads: Option<NonZeroUsize>) -> PyResult<Self> {
-        let (result, took) = detached(py, threads, |stop| {
+    fn of(py: Python<'_>, asked: &Asked<'_>, threads: Option<NonZeroUsize>) -> PyResult<Self> {
+        let answered = detached(py, threads, |stop| -> PyResult<_> {
             let start = Instant::now();
+            let job = asked.job()?;
             let result = job.run(&mut Stoppable { observer: &mut NoObserver, stop });
-            (result, start.elapsed())
+            let result = result.map_err(|error| errors::localize(&error))?;
+            Ok((job, result, start.elapsed()))
         })?;
-        let result = result.map_err(|error| errors::localize(&error))?;
+        let (job, result, took) = answered?;
         Ok(Self { job, result, threads, took })
     }
 }
@@ -144,67 +146,80 @@ fn found(name: &str, (query, reference, scores): &GivenMatches<'_>) -> PyResult<
     Ok(FoundMatches::new(&in_order(&query), &in_order(&reference), &matched))
 }
 
-/// The matches of each reference, by its name.
-fn by_reference(frames: &Frames, matches: &[GivenMatches<'_>]) -> PyResult<Arc<dyn MatchSource>> {
-    let names = frames.chosen.iter().map(|&frame| frames.references.frames()[frame].clone());
-    let mut found_by_name = BTreeMap::new();
-    for (name, given) in names.zip(matches) {
-        found_by_name.insert(name, found("matches", given)?);
-    }
-    Ok(Arc::new(ByReference(found_by_name)))
+/// The matches of each reference.
+fn all_found(matches: Option<Vec<GivenMatches<'_>>>) -> PyResult<Option<Vec<FoundMatches>>> {
+    let found = |all: Vec<GivenMatches<'_>>| all.iter().map(|one| found("matches", one)).collect();
+    matches.map(found).transpose()
 }
 
-/// Defaults of the scene's size, then what is given.
-fn job(
-    frames: Frames,
+/// What Python asks.
+struct Asked<'a> {
+    query: &'a Query,
+    references: Vec<&'a Reference>,
+    truth: Option<Pose>,
     method: Method,
-    params: &[(String, String)],
+    /// The pose that another system found.
+    estimate: Option<Pose>,
+    matches: Option<Vec<FoundMatches>>,
+    params: Vec<(String, String)>,
     radius: Option<f64>,
-    fusion: Option<&str>,
+    fusion: Option<&'a str>,
     seed: u64,
-) -> PyResult<Job> {
-    let protocol = Protocol::default().at_size(&frames.size);
-    let mut own = Params::at_scale(frames.size.scale);
-    for (key, value) in params {
-        own.set(key, value).map_err(errors::value)?;
-    }
-    let radius_m = radius.unwrap_or_else(|| protocol.radius_m());
-    if !(radius_m.is_finite() && radius_m > 0.0) {
-        return Err(errors::value(format!(
-            "radius: a finite number above 0 expected, {radius_m} given"
-        )));
-    }
-    let fusion = fusion.or_else(|| (frames.chosen.len() > 1).then_some(FUSION));
-    let fusions = match fusion {
-        Some(name) => vec![name.parse::<Fusion>().map_err(errors::value)?],
-        None => Vec::new(),
-    };
-    Ok(Job {
-        request: Request {
+}
+
+impl Asked<'_> {
+    /// Defaults of the scene's size, then what is given.
+    fn job(&self) -> PyResult<Job> {
+        if self.references.is_empty() {
+            return Err(errors::value("references: at least one expected, none given"));
+        }
+        let frames = Frames::of(self.query, &self.references, self.truth.as_ref());
+        let frames = frames.map_err(|error| errors::array(&error))?;
+        let protocol = Protocol::default().at_size(&frames.size);
+        let mut params = Params::at_scale(frames.size.scale);
+        for (key, value) in &self.params {
+            params.set(key, value).map_err(errors::value)?;
+        }
+        let radius_m = self.radius.unwrap_or_else(|| protocol.radius_m());
+        if !(radius_m.is_finite() && radius_m > 0.0) {
+            return Err(errors::value(format!(
+                "radius: a finite number above 0 expected, {radius_m} given"
+            )));
+        }
+        let fusion = self.fusion.or_else(|| (frames.chosen.len() > 1).then_some(FUSION));
+        let fusion = fusion.map(|name| name.parse::<Fusion>().map_err(errors::value));
+        let request = Request {
             radius_m,
             references: frames.chosen.clone().into(),
-            fusions,
+            fusions: fusion.transpose()?.into_iter().collect(),
             setting: None,
-        },
-        frames,
-        method,
-        params: own,
-        seed,
-        right: protocol.right,
-        foreign: Foreign::default(),
-    })
-}
-
-fn frames_of(
-    query: &Query,
-    references: &[PyRef<'_, Reference>],
-    truth: Option<&posescope_core::Pose>,
-) -> PyResult<Frames> {
-    if references.is_empty() {
-        return Err(errors::value("references: at least one expected, none given"));
+        };
+        Ok(Job {
+            foreign: self.foreign(&frames),
+            frames,
+            request,
+            method: self.method,
+            params,
+            seed: self.seed,
+            right: protocol.right,
+        })
     }
-    let references: Vec<&Reference> = references.iter().map(|one| &**one).collect();
-    Frames::of(query, &references, truth).map_err(|error| errors::array(&error))
+
+    /// Pose and matches of another system.
+    fn foreign(&self, frames: &Frames) -> Foreign {
+        let mut foreign = Foreign::default();
+        if let Some(pose) = self.estimate {
+            let estimates = [(self.query.query.name.clone(), pose)].into();
+            foreign = foreign.with_estimates(self.method, estimates);
+        }
+        if let Some(matches) = &self.matches {
+            let names = frames.chosen.iter();
+            let names = names.map(|&frame| frames.references.frames()[frame].clone());
+            let by_name = names.zip(matches.iter().cloned()).collect();
+            foreign = foreign.with_matches(Arc::new(ByReference(by_name)));
+        }
+        foreign
+    }
 }
 
 fn threads_of(threads: Option<usize>) -> PyResult<Option<NonZeroUsize>> {
@@ -236,14 +251,20 @@ pub fn localize(
 ) -> PyResult<Answer> {
     let threads = threads_of(threads)?;
     let method: Method = method.parse().map_err(errors::value)?;
-    posescope::run::known(&[method], &[]).map_err(errors::value)?;
-    let frames = frames_of(query, &references, None)?;
-    let mut foreign = Foreign::default();
-    if let Some(matches) = matches {
-        foreign = foreign.with_matches(by_reference(&frames, &matches)?);
-    }
-    let job = Job { foreign, ..job(frames, method, &params, radius, fusion, seed)? };
-    Answer::of(py, job, threads)
+    known(&[method], &[]).map_err(errors::value)?;
+    let asked = Asked {
+        query,
+        references: references.iter().map(|one| &**one).collect(),
+        truth: None,
+        method,
+        estimate: None,
+        matches: all_found(matches)?,
+        params,
+        radius,
+        fusion,
+        seed,
+    };
+    Answer::of(py, &asked, threads)
 }
 
 /// What the verdicts say of a pose.
@@ -262,19 +283,22 @@ pub fn diagnose(
 ) -> PyResult<Answer> {
     let threads = threads_of(threads)?;
     let method = Method::called(name).map_err(errors::value)?;
-    if posescope::run::known(&[method], &[]).is_ok() {
+    if known(&[method], &[]).is_ok() {
         return Err(errors::value(format!("name: `{name}` is a method of posescope")));
     }
-    let pose = arrays::pose("world_from_camera", world_from_camera)?;
-    let truth = truth.map(|truth| arrays::pose("truth", truth)).transpose()?;
-    let frames = frames_of(query, &references, truth.as_ref())?;
-    let estimates = [(query.query.name.clone(), pose)].into();
-    let mut foreign = Foreign::default().with_estimates(method, estimates);
-    if let Some(matches) = matches {
-        foreign = foreign.with_matches(by_reference(&frames, &matches)?);
-    }
-    let job = Job { foreign, ..job(frames, method, &params, None, None, 0)? };
-    Answer::of(py, job, threads)
+    let asked = Asked {
+        query,
+        references: references.iter().map(|one| &**one).collect(),
+        truth: truth.map(|truth| arrays::pose("truth", truth)).transpose()?,
+        method,
+        estimate: Some(arrays::pose("world_from_camera", world_from_camera)?),
+        matches: all_found(matches)?,
+        params,
+        radius: None,
+        fusion: None,
+        seed: 0,
+    };
+    Answer::of(py, &asked, threads)
 }
 
 /// The names of all methods.

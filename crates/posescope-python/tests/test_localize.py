@@ -146,7 +146,7 @@ def test_files_that_are_missing_are_named(tmp_path: Path, street: posescope.Scen
     assert raised.value.file == str(missing) and "no such file" in raised.value.expected
     with pytest.raises(posescope.InputError) as raised:
         street.query("999999")
-    assert (raised.value.file, raised.value.place) == ("street", "frame 999999")
+    assert (raised.value.file, raised.value.place) == ("street:overcast", "frame 999999")
     with pytest.raises(posescope.InputError, match="night"):
         posescope.Scene.street("nonsense")
 

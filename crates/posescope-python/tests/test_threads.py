@@ -78,3 +78,9 @@ def test_a_forked_process_localises_too(street: posescope.Scene) -> None:
     child.start()
     assert queue.get(timeout=60) == here.to_json()
     child.join()
+
+
+def test_a_panic_is_an_exception_and_prints_nothing(capfd: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(posescope.InternalError, match=r"a panic on purpose \(.*detached\.rs:\d+\)"):
+        posescope._posescope.panic()
+    assert capfd.readouterr() == ("", "")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import html
 import json
+import math
 import os
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Dict, List, Optional, Tuple
@@ -70,6 +71,11 @@ class Confidence:
 
     def __float__(self) -> float:
         return self.probability
+
+    def __str__(self) -> str:
+        # Rounded down, so that a limit that was missed never reads as reached.
+        percent = math.floor(100 * self.probability)
+        return f"{self.word}, {f'{percent} %' if percent else 'under 1 %'} likely within 1 m"
 
 
 class Result:
@@ -228,7 +234,7 @@ class Result:
         lines = [f"<strong>{html.escape(self.headline)}</strong>"]
         known = self.confidence
         if known is not None:
-            lines.append(f"{known.word}, {100 * known.probability:.0f} % likely within 1 m")
+            lines.append(str(known))
         lines += [html.escape(paragraph) for paragraph in self.paragraphs]
         parts = "".join(f"<div>{line}</div>" for line in lines)
         drawn = self.proof()
