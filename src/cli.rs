@@ -11,6 +11,7 @@ mod event_export;
 mod failure;
 mod failures;
 mod host;
+mod hosted;
 mod index;
 mod interrupt;
 mod lesson;
@@ -44,7 +45,8 @@ use args::{Arguments, Command};
 use failure::CliError;
 
 pub use doctor::report as examination_in_words;
-pub use host::{CommandError, Host};
+pub use host::Host;
+pub use hosted::{CommandError, evaluate};
 
 /// Parses the arguments, of which the first is the program's name, runs the command and prints an error in one
 /// line. Returns the exit code.

@@ -45,7 +45,9 @@ pub fn evaluate(
         }
         Ok(())
     };
-    let run = detached_with(py, threads, &Stop::command(&host), tick, |_| host.eval(arguments))?;
+    let run = detached_with(py, threads, &Stop::command(&host), tick, |_| {
+        cli::evaluate(arguments, &host)
+    })?;
     if let Some(progress) = &progress {
         progress.call1(py, host.progress())?;
     }
