@@ -82,12 +82,16 @@ def fields(thing: Any) -> List[str]:
 
 def members(thing: Any) -> List[str]:
     lines: List[str] = fields(thing) if dataclasses.is_dataclass(thing) else []
-    for name, value in vars(thing).items():
-        if name.startswith("_"):
-            continue
+    public = [(name, value) for name, value in vars(thing).items() if not name.startswith("_")]
+    of_rust = [(name, value) for name, value in public if inspect.isgetsetdescriptor(value)]
+    if of_rust:
+        # They have no order.
+        public.sort(key=lambda one: one[0])
+    for name, value in public:
         if isinstance(value, property) or inspect.isgetsetdescriptor(value):
-            lines += [f"- `{name}`: {' '.join(text(value)).strip()}"]
-        elif callable(value) or isinstance(value, staticmethod):
+            lines.append(f"- `{name}`: {' '.join(text(value)).strip()}")
+    for name, value in public:
+        if callable(value) or isinstance(value, staticmethod):
             function = value.__func__ if isinstance(value, staticmethod) else value
             lines += ["", f"#### `{thing.__name__}.{name}{signature(function)}`", "", *text(function)]
     return lines

@@ -61,6 +61,10 @@ impl<'py> Array<'py> {
     }
 
     fn f32s(&self) -> PyResult<Vec<f32>> {
+        if self.element.1 > 4 {
+            // Numpy would warn of a number that is too large.
+            return Ok(self.f64s()?.into_iter().map(|number| number as f32).collect());
+        }
         let bytes = self.bytes("<f4")?;
         Ok(bytes.as_bytes().as_chunks().0.iter().map(|four| f32::from_le_bytes(*four)).collect())
     }
@@ -130,7 +134,6 @@ pub fn cloud(
     let is_finite = |point: &Point3<f32>| point.iter().all(|x| x.is_finite());
     let points = match world_from_camera {
         None => {
-            // Numpy rounds float64 as Rust does.
             let numbers = given.f32s()?;
             let points = numbers.as_chunks().0.iter().copied().map(Point3::from);
             points.filter(is_finite).collect()

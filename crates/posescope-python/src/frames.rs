@@ -1,12 +1,10 @@
 //! Queries and references.
 
-use std::sync::{Arc, OnceLock};
+use std::sync::Arc;
 
-use posescope::scene::{Lengths, SceneSize};
 use posescope_core::{Pose, ReferenceTuple};
 use pyo3::prelude::*;
 
-use crate::held::{Held, HeldFrame};
 use crate::scene::Opened;
 use crate::{arrays, camera::Camera, errors};
 
@@ -107,22 +105,6 @@ pub struct Reference {
     pub reference: Arc<ReferenceTuple>,
     /// The frame that it is, of a scene.
     pub origin: Option<Origin>,
-    size: OnceLock<SceneSize>,
-}
-
-impl Reference {
-    /// A reference, perhaps of a scene.
-    pub fn new(reference: Arc<ReferenceTuple>, origin: Option<Origin>) -> Self {
-        Self { reference, origin, size: OnceLock::new() }
-    }
-
-    /// How large a scene of this reference alone is.
-    pub fn size(&self) -> SceneSize {
-        *self.size.get_or_init(|| match HeldFrame::of_reference(&self.reference) {
-            Ok(frame) => SceneSize::of(&Held::new("", vec![frame], Lengths::Metres)),
-            Err(_) => SceneSize::PAPER,
-        })
-    }
 }
 
 #[pymethods]
@@ -148,7 +130,8 @@ impl Reference {
             }
         };
         let reference = ReferenceTuple::new(name, photo, camera.intrinsics, pose, cloud);
-        Ok(Self::new(Arc::new(reference.map_err(|error| errors::array(&error))?), None))
+        let reference = reference.map_err(|error| errors::array(&error))?;
+        Ok(Self { reference: Arc::new(reference), origin: None })
     }
 
     /// Its name in results.

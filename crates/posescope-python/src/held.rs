@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use posescope::scene::{Lengths, Scene, SceneError};
+use posescope::scene::{Scene, SceneError};
 use posescope_core::{Cloud, Intrinsics, Photo, Pose, Query, ReferenceTuple};
 
 /// A frame: a query, and where its pose or its cloud is known, these.
@@ -33,12 +33,11 @@ impl HeldFrame {
     }
 }
 
-/// A scene of frames that are in memory.
+/// A scene of frames that are in memory. Its scale is that of a street: without a whole scene, nothing can be measured.
 pub struct Held {
     name: String,
     names: Vec<String>,
     frames: Vec<HeldFrame>,
-    lengths: Lengths,
 }
 
 impl Held {
@@ -46,9 +45,9 @@ impl Held {
     pub const ARRAYS: &str = "arrays";
 
     /// A scene of these frames.
-    pub fn new(name: &str, frames: Vec<HeldFrame>, lengths: Lengths) -> Self {
+    pub fn new(name: &str, frames: Vec<HeldFrame>) -> Self {
         let names = frames.iter().map(|frame| frame.query.name.clone()).collect();
-        Self { name: name.to_owned(), names, frames, lengths }
+        Self { name: name.to_owned(), names, frames }
     }
 }
 
@@ -90,9 +89,5 @@ impl Scene for Held {
 
     fn query(&self, frame: usize) -> Result<Arc<Query>, SceneError> {
         Ok(Arc::clone(&self.frames[frame].query))
-    }
-
-    fn lengths(&self) -> Lengths {
-        self.lengths
     }
 }

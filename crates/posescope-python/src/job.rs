@@ -6,7 +6,7 @@ use posescope::diagnosis::Tolerance;
 use posescope::foreign::Foreign;
 use posescope::localize::{LocalizeError, LocalizeObserver, Localizer, QueryResult, Request};
 use posescope::run::Protocol;
-use posescope::scene::{FrameStore, Lengths, LoosePhotos, Scene, SceneSize};
+use posescope::scene::{FrameStore, LoosePhotos, Scene, SceneSize};
 use posescope::sink::SceneNames;
 use posescope::sink::rerun::Identity;
 use posescope_core::{InputError, Method, Params, Pose, ReferenceTuple};
@@ -53,12 +53,8 @@ impl Frames {
                 (Arc::clone(&opened.scene), frames, opened.size())
             }
             None => {
-                let scene = Held::new(Held::ARRAYS, named_apart(references)?, Lengths::Metres);
-                let size = match references {
-                    [only] => only.size(),
-                    _ => SceneSize::of(&scene),
-                };
-                (Arc::new(scene), (0..references.len()).collect(), size)
+                let scene = Held::new(Held::ARRAYS, named_apart(references)?);
+                (Arc::new(scene), (0..references.len()).collect(), SceneSize::PAPER)
             }
         };
         let (queries, at) = match &query.origin {
@@ -68,7 +64,7 @@ impl Frames {
                     origin.as_ref().map_or(LoosePhotos::NAME, |origin| origin.opened.scene.name());
                 let pose = truth.copied().or(query.truth);
                 let frame = HeldFrame { query: Arc::clone(&query.query), pose, reference: None };
-                let held: Arc<dyn Scene> = Arc::new(Held::new(name, vec![frame], Lengths::Metres));
+                let held: Arc<dyn Scene> = Arc::new(Held::new(name, vec![frame]));
                 (held, 0)
             }
         };
@@ -139,9 +135,24 @@ impl Job {
     /// # Errors
     /// A frame that cannot be read, and a run that its observer stopped.
     pub fn run(&self, observer: &mut dyn LocalizeObserver) -> Result<QueryResult, LocalizeError> {
-        let Frames { references, queries, query, store, .. } = &self.frames;
         // Of frames that Python holds nothing is kept, so that a result stays small.
-        let store = store.clone().unwrap_or_default();
+        self.run_with(&self.frames.store.clone().unwrap_or_default(), observer)
+    }
+
+    /// Localises the query as if nothing were cached: the events are those of the command.
+    ///
+    /// # Errors
+    /// Those of [`Self::run`].
+    pub fn watch(&self, observer: &mut dyn LocalizeObserver) -> Result<QueryResult, LocalizeError> {
+        self.run_with(&Arc::default(), observer)
+    }
+
+    fn run_with(
+        &self,
+        store: &Arc<FrameStore>,
+        observer: &mut dyn LocalizeObserver,
+    ) -> Result<QueryResult, LocalizeError> {
+        let Frames { references, queries, query, .. } = &self.frames;
         let scenes = (store.of(references), store.of(queries));
         let localizer = Localizer::with_cached_scenes(scenes, &self.params, self.seed)
             .with_foreign(self.foreign.clone())

@@ -84,7 +84,7 @@ impl Answer {
     fn events(&self, py: Python<'_>) -> PyResult<String> {
         let mut lines = EventLines::new(self.job.frames.scene_names());
         let run = detached(py, self.threads, |stop| {
-            self.job.run(&mut Stoppable { observer: &mut lines, stop })
+            self.job.watch(&mut Stoppable { observer: &mut lines, stop })
         })?;
         run.map_err(|error| errors::localize(&error))?;
         Ok(lines.into_text())
@@ -98,7 +98,7 @@ impl Answer {
                 |error: posescope::sink::rerun::RecordError| PyOSError::new_err(error.to_string());
             let mut recorder =
                 Recorder::open(&targets, &identity, &[self.job.method]).map_err(failed)?;
-            let run = self.job.run(&mut Stoppable { observer: &mut recorder, stop });
+            let run = self.job.watch(&mut Stoppable { observer: &mut recorder, stop });
             recorder.close().map_err(failed)?;
             run.map(drop).map_err(|error| errors::localize(&error))
         })?;
@@ -109,7 +109,7 @@ impl Answer {
     fn proof(&self, py: Python<'_>) -> PyResult<Option<(String, String)>> {
         let mut witness = Witness::default();
         let drawn = detached(py, self.threads, |stop| -> Result<_, LocalizeError> {
-            self.job.run(&mut Stoppable { observer: &mut witness, stop })?;
+            self.job.watch(&mut Stoppable { observer: &mut witness, stop })?;
             Ok(witness.proof(self.job.truth().as_ref(), &self.result, &self.job.params))
         })?;
         let drawn = drawn.map_err(|error| errors::localize(&error))?;

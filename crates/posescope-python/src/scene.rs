@@ -136,7 +136,7 @@ impl Scene {
             opened.store.of(&opened.scene).reference(*frame)
         })?;
         let reference = read.map_err(|error| errors::scene(&error))?;
-        Ok(Reference::new(reference, Some(origin)))
+        Ok(Reference { reference, origin: Some(origin) })
     }
 
     fn __len__(&self) -> usize {

@@ -36,7 +36,7 @@ def test_no_pose_is_a_failure_and_no_exception(
     result = posescope.localize(query, reference, method="fb")
     assert result.pose is None and result.confidence is None and result.grade == "no pose"
     assert result.failure is not None and result.failure.code == "R2"
-    assert result.failure.numbers["query"] == 0
+    assert result.failure.numbers["query_keypoints"] == 0
     assert result.verdicts[0].code == "R2"
 
 

@@ -22,6 +22,10 @@ class Draw:
     def of(self, choices: List[Callable[[], Any]]) -> Any:
         return choices[self.random.integers(len(choices))]()
 
+    def mostly(self, choices: List[Callable[[], Any]]) -> Any:
+        """Mostly what is right."""
+        return self.of(choices) if self.random.random() < 0.9 else self.garbage()
+
     def strided(self, array: np.ndarray) -> np.ndarray:
         """The same elements in another order in memory."""
         flipped = array[::-1]
@@ -53,18 +57,17 @@ class Draw:
 
     def photo(self) -> Any:
         pixels = self.random.integers(0, 256, (*SIZE, 3), np.uint8)
-        return self.of([lambda: self.strided(pixels), lambda: self.strided(pixels[..., 0]), self.garbage])
+        return self.mostly([lambda: self.strided(pixels), lambda: self.strided(pixels[..., 0])])
 
     def cloud(self) -> Any:
         points = self.random.normal(0, 5, (40, 3)) + [0, 0, 9]
         holes = np.where(self.random.random((40, 3)) < 0.1, np.nan, points)
-        return self.of(
+        return self.mostly(
             [
                 lambda: self.strided(points),
                 lambda: self.strided(holes.astype(np.float32)),
                 lambda: np.zeros((0, 3)),
                 lambda: points * 1e300,
-                self.garbage,
             ]
         )
 
@@ -73,9 +76,7 @@ class Draw:
         pose = np.eye(4)
         pose[:2, :2] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
         pose[:3, 3] = self.random.normal(0, 3, 3)
-        return self.of(
-            [lambda: pose, lambda: self.strided(pose), lambda: pose[:3], lambda: pose * np.nan, self.garbage]
-        )
+        return self.mostly([lambda: pose, lambda: np.asfortranarray(pose), lambda: pose[:3]])
 
     def matches(self) -> Any:
         count = int(self.random.integers(0, 9))
@@ -94,16 +95,16 @@ class Draw:
 
 
 def attempt(draw: Draw) -> str:
-    number = lambda right: draw.of([lambda: right, lambda: right, lambda: right, draw.garbage])  # noqa: E731
+    number = lambda right: right if draw.random.random() < 0.97 else draw.garbage()  # noqa: E731
     camera = posescope.Camera(number(30.0), number(30.0), 15.5, 11.5, number(SIZE[1]), number(SIZE[0]))
-    query = posescope.Query(draw.photo(), camera, truth=draw.of([lambda: None, draw.pose]))
-    frame = draw.of([lambda: "camera", lambda: "world", lambda: "x"])
+    query = posescope.Query(draw.photo(), camera, truth=draw.mostly([lambda: None, draw.pose]))
+    frame = draw.mostly([lambda: "camera", lambda: "world"])
     reference = posescope.Reference(draw.photo(), camera, draw.pose(), draw.cloud(), cloud_frame=frame)
     matches = draw.matches()
     if draw.random.random() < 0.3:
         return posescope.diagnose(query, reference, draw.pose(), truth=None, matches=matches).grade
-    method = draw.of([lambda: None, lambda: "fb", lambda: "hy", lambda: "mi", lambda: "x"])
-    radius = draw.of([lambda: None, lambda: 1.0, lambda: -1.0, lambda: float("inf")])
+    method = draw.mostly([lambda: None, lambda: "fb", lambda: "hy", lambda: "mi"])
+    radius = draw.mostly([lambda: 2.0, lambda: 1.0])
     return posescope.localize(query, reference, method, radius=radius, matches=matches, threads=1).grade
 
 
@@ -116,4 +117,4 @@ def test_a_thousand_random_arguments_crash_nothing() -> None:
             seen[type(error).__name__] += 1
     # Some of each went through, or the test tests nothing.
     assert seen["ValueError"] > 100
-    assert seen["no pose"] + seen["unmeasured"] + seen["wrong"] + seen["right"] > 20, seen
+    assert seen["no pose"] + seen["unmeasured"] + seen["wrong"] + seen["right"] > 100, seen

@@ -30,7 +30,7 @@ def test_a_recording_is_a_run_with_verdicts(street: posescope.Scene, tmp_path: P
     run = posescope.Run.open(tmp_path / "live")
     assert [row["query"] for row in run.rows()] == ["000070", "000072", "000074", "lost"]
     assert [row["grade"] for row in run.rows()] == ["right", "right", "wrong", "no pose"]
-    assert run.rows()[2]["diagnosis"] and run.rows()[2]["references"] == ["000074"]
+    assert run.rows()[2]["diagnosis"] and run.rows()[0]["references"] == ["000070"]
     assert [file.name for file in (run.path / "failures").iterdir()] == ["000074-live.rrd"]
     assert len(list((run.path / "queries" / "photos").iterdir())) == 4
     photos = posescope.Scene.open(run.path / "queries")

@@ -43,8 +43,8 @@ def localize(
         method: ``fb``, ``pm``, ``mi``, ``hy`` as in the paper, ``fb2``, ``mi6``, ``nid``, or ``robust``. By default
             ``robust``; ``fb`` where matches are given.
         params: Parameters by name, such as ``{"fb.ratio": 0.7}``; ``posescope params`` lists them.
-        radius: How far from the reference the direct methods search [m]. By default 15 m on a street, and in other
-            scenes what suits the depth of their clouds.
+        radius: How far from the reference the direct methods search [m]. By default 15 m; in scenes that are no
+            street, what suits the depth of their clouds.
         matches: Matches that take the place of SURF's in ``fb`` and ``hy``: query points, reference points, and
             perhaps scores. Points are N x 2 [px], and (0, 0) is the centre of the top-left pixel. For several
             references, a list with one entry each. Or a callable that takes both photos (uint8, H x W x 3 where they

@@ -28,7 +28,7 @@ class Failure:
     text: str
     """The reason in one sentence."""
     numbers: Dict[str, Any] = field(default_factory=dict)
-    """The numbers that the sentence is made from. Names end in their unit."""
+    """The evidence of the verdict; without any, the counts of features. Names end in their unit."""
 
 
 @dataclass(frozen=True)
@@ -124,7 +124,7 @@ class Result:
             return None
         same = (one for one in self._row["diagnosis"] if one["code"] == reason["code"])
         found: Dict[str, Any] = next(same, {})
-        numbers = found.get("evidence") or {}
+        numbers = found.get("evidence") or self.counts or {}
         return Failure(reason["code"], reason["text"], numbers)
 
     @property
