@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import json
 import os
 import subprocess
@@ -168,3 +169,11 @@ assert not drivers, drivers
         [sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True
     )
     assert (run.stdout, run.stderr) == ("", "")
+
+
+def test_the_viewer_of_notebooks_opens_or_says_how_to_install_it(right: posescope.Result) -> None:
+    if importlib.util.find_spec("rerun_notebook"):
+        assert right.show() is not None
+    else:
+        with pytest.raises(ImportError, match="pip install"):
+            right.show()

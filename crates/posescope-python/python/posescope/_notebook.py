@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import os
 import tempfile
+import weakref
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -17,12 +18,16 @@ def show(result: "Result") -> Any:
     """The recording of a result in Rerun's notebook viewer."""
     try:
         rerun: Any = importlib.import_module("rerun")
+        notebook: Any = importlib.import_module("rerun.notebook")
         importlib.import_module("rerun_notebook")
     except ImportError as missing:
         raise ImportError(_INSTALL) from missing
-    folder = tempfile.mkdtemp(prefix="posescope-")
-    path = os.path.join(folder, "result.rrd")
+    folder = tempfile.TemporaryDirectory(prefix="posescope-")
+    path = os.path.join(folder.name, "result.rrd")
     result.save(path)
     stream = rerun.RecordingStream("posescope")
     stream.log_file_from_path(path)
-    return rerun.notebook.Viewer(recording=stream)
+    viewer = notebook.Viewer(recording=stream)
+    # Rerun reads the file while the viewer opens.
+    weakref.finalize(viewer, folder.cleanup)
+    return viewer
