@@ -26,7 +26,7 @@ fn bench(bencher: Bencher, stage: &str) {
     measured.expect("the name of a stage");
 }
 
-#[divan::bench(args = ["surf", "surf_upright", "match"])]
+#[divan::bench(args = ["surf", "surf_upright", "sift", "sift_upright", "match"])]
 fn features(bencher: Bencher, stage: &str) {
     bench(bencher, stage);
 }

@@ -119,6 +119,62 @@ def opencv_matching(folder):
     return {f"OpenCV {cv2.__version__} BFMatcher": run}
 
 
+def opencv_sift(folder, meta):
+    import cv2
+    import numpy as np
+
+    cv2.setNumThreads(1)
+    count = len(sift_of(folder, "reference")[0])
+
+    def detector(most):
+        # OpenCV divides its threshold by the three scales of an octave: posescope's is 0.012.
+        return cv2.SIFT_create(nfeatures=most, contrastThreshold=0.036)
+
+    def image(name, width, height):
+        return np.fromfile(folder / f"{name}.u8", np.uint8).reshape(height, width)
+
+    reference, warped = image("reference", meta["width"], meta["height"]), image("warped", *meta["warped"])
+
+    def features(photo):
+        keypoints, descriptors = detector(0).detectAndCompute(photo, None)
+        order = np.argsort([-keypoint.response for keypoint in keypoints], kind="stable")
+        return np.array([keypoints[i].pt for i in order]), np.sqrt(descriptors / descriptors.sum(1, keepdims=True))[order]
+
+    outcome = repeated(features(reference), features(warped), meta)
+
+    def run():
+        sift = detector(count)
+        seconds, found = timed(lambda: sift.detectAndCompute(reference, None))
+        return seconds, len(found[0]), outcome
+
+    return {f"OpenCV {cv2.__version__} SIFT": run}
+
+
+def sift_of(folder, name):
+    """Positions and descriptors of ours, the strongest first."""
+    import numpy as np
+
+    numbers = np.fromfile(folder / f"{name}_sift.f32", np.float32).reshape(-1, 130)
+    return numbers[:, :2], numbers[:, 2:]
+
+
+def repeated(of_image, of_warped, meta, count=2000):
+    """How many of the strongest are found again in the image turned by 15° and enlarged 1.3 times, and how many of the
+    matches of ratio 0.8 are right."""
+    import numpy as np
+
+    (points, descriptors), (there, others) = [(points[:count], descriptors[:count]) for points, descriptors in (of_image, of_warped)]
+    warp = np.array(meta["to_warped"]).reshape(2, 3)
+    truth = points @ warp[:, :2].T + warp[:, 2]
+    apart = np.sqrt(((truth[:, None] - there[None]) ** 2).sum(2))
+    distances = 2 - 2 * descriptors @ others.T
+    nearest = np.argsort(distances, axis=1)[:, :2]
+    first, second = np.take_along_axis(distances, nearest, 1).T
+    passed = first < 0.8**2 * second
+    right = np.take_along_axis(apart, nearest[:, :1], 1)[:, 0] < 3
+    return {"repeated": float((apart.min(1) < 2).mean()), "right": float(right[passed].mean()), "recall": float((right & passed).mean())}
+
+
 def poses(folder, meta, case):
     import numpy as np
 
@@ -203,6 +259,8 @@ def measure(program, environment, folder, only, rounds):
         ("both costs, 3 px", "hypothesis", "both_3", {"C++ loop, depth test": of(loops, "depth_3")}),
         ("SURF, turning", "keypoint", "surf", {"dlib": of(dlib, "surf")}),
         ("SURF, upright", "keypoint", "surf_upright", {}),
+        ("SIFT, turning", "keypoint", "sift", opencv_sift(folder, meta)),
+        ("SIFT, upright", "keypoint", "sift_upright", {}),
         ("matching, one way", "pair", "match", faiss_matching(folder) | opencv_matching(folder)),
         ("P3P", "problem", "p3p", {}),
         *((f"robust pose, {case.split('_')[1]} % false of {case.split('_')[2]}", "problem", case, poselib_poses(folder, meta, case)) for case in meta["cases"]),
@@ -210,6 +268,7 @@ def measure(program, environment, folder, only, rounds):
         ("PM, whole", "query", "pm", {}),
         ("MI, whole", "query", "mi", {}),
     ]
+    known = {"sift": repeated(sift_of(folder, "reference"), sift_of(folder, "warped"), meta)}
     print(f"\n{meta['query']} <- {meta['reference']}, {meta['points']} coloured points, {meta['poses']} poses; medians of {rounds} rounds\n")
     print(f"| stage | posescope | peer | its time | ratio |\n|---|---|---|---|---|")
     for stage, unit, name, peers in stages:
@@ -223,7 +282,7 @@ def measure(program, environment, folder, only, rounds):
         for _ in range(rounds):
             seconds, items, outcome = ours(name)
             times.append(seconds / items)
-            outcomes["posescope"] = outcome
+            outcomes["posescope"] = known.get(name, outcome)
             for peer, run in peers.items():
                 seconds, items, outcome = run()
                 theirs[peer].append(seconds / items)
@@ -243,6 +302,8 @@ def quality(outcome):
     match outcome:
         case {"found": found, "median_m": median}:
             return f" ({found} found, {100 * median:.1f} cm)"
+        case {"repeated": repeated, "right": right, "recall": recall}:
+            return f" (repeated {repeated:.3f}, right {right:.3f}, recall {recall:.3f})"
         case _:
             return ""
 

@@ -3,6 +3,7 @@
 mod believed;
 mod calibration;
 mod cases;
+mod exported;
 mod faults;
 mod frames;
 mod fusions;

@@ -7,6 +7,7 @@ use std::time::Instant;
 use posescope::diagnosis::{Evidence, Subject, confidence};
 use posescope::estimator;
 use posescope::geometry::PoseError;
+use posescope::localize::{StageTimes, StageTimings};
 use posescope::method::Method;
 use posescope::params::Params;
 use posescope::scene::Scene;
@@ -15,6 +16,7 @@ use posescope::trace::Trace;
 
 use crate::Failure;
 use crate::cases::{Case, Plan};
+use crate::exported::{self, Answer};
 use crate::numbers::{SUMMARY, at_places, mean, median, percent, print_table, summary};
 use crate::truth;
 
@@ -52,6 +54,13 @@ pub struct Options {
     /// Print each method's shares by the condition of reference and query too, and what MI's cost is at the truth.
     #[arg(long)]
     matrices: bool,
+    /// Write each case with what the methods made of it into a folder of its own in this one, for
+    /// studies/peers/queries.py. Nothing that one method computed serves the next then, so that times can be compared.
+    #[arg(long)]
+    export: Option<PathBuf>,
+    /// Print the mean time of each stage too, with nothing computed before.
+    #[arg(long)]
+    stages: bool,
 }
 
 /// A method with its settings, as given.
@@ -83,6 +92,8 @@ struct Measured {
     method: usize,
     error: Option<PoseError>,
     seconds: f64,
+    /// What each stage took; empty unless asked for.
+    stages: StageTimes,
     /// Normalised mutual information of the true pose, the pose found, and shuffled pixels; tested of MI alone.
     information: Option<[f64; 3]>,
 }
@@ -116,6 +127,9 @@ pub fn run(options: &Options) -> Result<(), Failure> {
     };
     let measured: Vec<Measured> = measured.into_iter().flatten().collect();
     print(&measured, options);
+    if options.stages {
+        print_stages(&measured, options);
+    }
     if options.matrices {
         print_matrices(&measured, options)?;
     }
@@ -147,8 +161,12 @@ fn cells(words: &[String]) -> Result<Vec<[String; 2]>, Failure> {
 fn measure(cases: &[Case], options: &Options) -> Result<Vec<Measured>, Failure> {
     let mut measured = Vec::new();
     for case in cases {
+        let before = measured.len();
         for (method, tested) in options.method.iter().enumerate() {
-            let problem = &case.problem;
+            let problem = match options.export {
+                Some(_) => &exported::forgetful(&case.problem),
+                None => &case.problem,
+            };
             let started = Instant::now();
             let mut evidence = Evidence::default();
             let estimator = estimator::entry(tested.method).make(&tested.params);
@@ -164,13 +182,27 @@ fn measure(cases: &[Case], options: &Options) -> Result<Vec<Measured>, Failure> 
                 Some(costs.map(|cost| 1.0 - cost))
             };
             let is_wanted = options.matrices && tested.method == Method::MI;
+            let mut stages = StageTimings::default();
+            if options.stages {
+                let problem = exported::forgetful(problem);
+                estimator.estimate(&problem, &mut Trace::to(&mut stages))?;
+            }
             measured.push(Measured {
                 rows: case.rows.clone(),
                 method,
                 error: error.map(|pose| PoseError::between(&case.truth, pose)),
                 seconds,
+                stages: stages.into_times(),
                 information: is_wanted.then(information).flatten(),
             });
+        }
+        if let Some(folder) = &options.export {
+            let result = |one: &Measured| Answer {
+                method: options.method[one.method].label.clone(),
+                seconds: one.seconds,
+                error: one.error,
+            };
+            exported::write(folder, case, measured[before..].iter().map(result))?;
         }
     }
     Ok(measured)
@@ -190,6 +222,18 @@ fn print(measured: &[Measured], options: &Options) {
         [names, summary(&errors), vec![time]].concat()
     });
     print_table(&format!(",method,{SUMMARY},time"), &rows.collect::<Vec<_>>());
+}
+
+fn print_stages(measured: &[Measured], options: &Options) {
+    for (method, tested) in options.method.iter().enumerate() {
+        let own: Vec<_> = measured.iter().filter(|one| one.method == method).collect();
+        let sum = StageTimes::sum(own.iter().map(|one| &one.stages));
+        let rows = sum.iter().map(|(stage, time)| {
+            let milliseconds = 1e3 * time.as_secs_f64() / own.len().max(1) as f64;
+            vec![stage.to_owned(), format!("{milliseconds:.1} ms")]
+        });
+        print_table(&format!("{},time", tested.label), &rows.collect::<Vec<_>>());
+    }
 }
 
 /// A table for each method, of the reference's condition (rows) by the query's (columns), and one that asks why MI

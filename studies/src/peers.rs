@@ -3,10 +3,13 @@ use std::io::{BufRead as _, Write as _};
 use std::path::{Path, PathBuf};
 
 use cpu_time::ProcessTime;
-use posescope::features::surf;
+use image::{GrayImage, Luma};
+use nalgebra::{Point2, Rotation2};
+use posescope::features::{sift, surf};
 use posescope::geometry::Pose;
+use posescope::image::cubic_interpolated;
 use posescope::robust::MlesacParams;
-use posescope_studies::stages::{TRIALS, turning, with_stage};
+use posescope_studies::stages::{TRIALS, turning, turning_sift, with_stage};
 use posescope_studies::{Outliers, PAIR, poses_of_a_disc, registered_cost, seen_by};
 use serde_json::json;
 
@@ -58,6 +61,14 @@ fn export(folder: &Path) -> Result<(), Failure> {
         let numbers = descriptors.as_flattened().iter().copied();
         floats(&format!("{name}_descriptors"), &mut { numbers })?;
     }
+    let (warped, to_warped) = warped(&PAIR.reference.photo.gray);
+    write("warped.u8", warped.as_raw().clone())?;
+    for (name, photo) in [("reference", &PAIR.reference.photo.gray), ("warped", &warped)] {
+        let found = sift(photo, &turning_sift());
+        let both = found.keypoints.iter().zip(&found.descriptors);
+        let numbers = both.flat_map(|(at, of)| [at.x, at.y].into_iter().chain(of.iter().copied()));
+        floats(&format!("{name}_sift"), &mut { numbers })?;
+    }
     let (query, cloud) = seen_by(registered_cost("mi").as_ref());
     floats("query_channel", &mut query.iter().copied())?;
     let points = || cloud.points.iter();
@@ -83,6 +94,8 @@ fn export(folder: &Path) -> Result<(), Failure> {
         "width": intrinsics.width,
         "height": intrinsics.height,
         "camera": [intrinsics.fx, intrinsics.fy, intrinsics.cx, intrinsics.cy],
+        "warped": [warped.width(), warped.height()],
+        "to_warped": to_warped,
         "points": cloud.points.len(),
         "poses": poses.len(),
         "trials": TRIALS,
@@ -93,6 +106,24 @@ fn export(folder: &Path) -> Result<(), Failure> {
     });
     fs::write(folder.join("meta.json"), serde_json::to_vec_pretty(&meta)?)?;
     Ok(())
+}
+
+/// The photo turned by 15° and enlarged 1.3 times, large enough for all of it; and what takes one of its pixels there,
+/// two rows of three numbers.
+fn warped(photo: &GrayImage) -> (GrayImage, [f32; 6]) {
+    let turn = Rotation2::new(15_f32.to_radians()).into_inner() * 1.3;
+    let (right, bottom) = ((photo.width() - 1) as f32, (photo.height() - 1) as f32);
+    let corners = [(0.0, 0.0), (right, 0.0), (0.0, bottom), (right, bottom)];
+    let corners = corners.map(|(x, y)| turn * Point2::new(x, y));
+    let low = corners.iter().fold(corners[0], |low, corner| low.inf(corner));
+    let high = corners.iter().fold(corners[0], |high, corner| high.sup(corner));
+    let size = (high - low).map(|side| side.ceil() as u32 + 1);
+    let back = turn.transpose() / (1.3 * 1.3);
+    let copy = GrayImage::from_fn(size.x, size.y, |x, y| {
+        let at = back * (Point2::new(x as f32, y as f32) + low.coords);
+        Luma([cubic_interpolated(photo, at.x, at.y).round().clamp(0.0, 255.0) as u8])
+    });
+    (copy, [turn.m11, turn.m12, -low.x, turn.m21, turn.m22, -low.y])
 }
 
 /// Rotation and translation, row by row.

@@ -4,7 +4,7 @@ use posescope::cost::{
     self, BinPair, Entropies, IntensityPair, LesserHalfFinder, Statistic, byte_bin,
 };
 use posescope::estimator;
-use posescope::features::{SurfParams, nearest_neighbours, surf};
+use posescope::features::{SiftParams, SurfParams, nearest_neighbours, sift, surf};
 use posescope::geometry::Pose;
 use posescope::method::Method;
 use posescope::params::Params;
@@ -29,13 +29,20 @@ pub fn turning() -> SurfParams {
     params
 }
 
+/// SIFT's that turn with the image, all of them.
+pub fn turning_sift() -> SiftParams {
+    let mut params = SiftParams::default();
+    (params.upright, params.max_keypoints) = (false, 0);
+    params
+}
+
 /// What a stage does each time it is called; how good the outcome is.
 pub type Work<'a> = dyn FnMut() -> Value + 'a;
 
 /// Prepares the stage of a name and hands `measure` its work and how many items one call takes; `None` where no stage
 /// is called so.
 ///
-/// Stages are `surf`, `surf_upright`, `match`, `p3p`, `pose_PERCENT_MATCHES`, `COST_SPLAT` with a cost of
+/// Stages are `surf`, `surf_upright`, `sift`, `sift_upright`, `match`, `p3p`, `pose_PERCENT_MATCHES`, `COST_SPLAT` with a cost of
 /// the direct methods or `both`, and the methods themselves.
 pub fn with_stage<R>(name: &str, measure: impl FnOnce(usize, &mut Work<'_>) -> R) -> Option<R> {
     let (query, reference) = (&PAIR.query.photo.gray, &PAIR.reference.photo.gray);
@@ -58,6 +65,12 @@ pub fn with_stage<R>(name: &str, measure: impl FnOnce(usize, &mut Work<'_>) -> R
             let params = if name == "surf" { turning() } else { SurfParams::default() };
             let items = surf(reference, &params).keypoints.len();
             measure(items, &mut || json!(surf(reference, &params).keypoints.len()))
+        }
+        "sift" | "sift_upright" => {
+            let mut params = turning_sift();
+            params.upright = name == "sift_upright";
+            let items = sift(reference, &params).keypoints.len();
+            measure(items, &mut || json!(sift(reference, &params).keypoints.len()))
         }
         "match" => {
             let [query, reference] =

@@ -153,7 +153,7 @@ impl Responses {
 /// once and round alike on all processors: the polynomial of Hastings, *Approximations for Digital
 /// Computers*, 1955, sheet 13, on the octant next to the x axis.
 #[inline(always)]
-fn direction(y: f32, x: f32) -> f32 {
+pub(super) fn direction(y: f32, x: f32) -> f32 {
     const COEFFICIENTS: [f32; 8] = [
         -0.333_331_45,
         0.199_935_51,

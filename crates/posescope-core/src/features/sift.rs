@@ -5,16 +5,19 @@
 
 mod description;
 mod octave;
+mod plane;
 
 use std::convert::Infallible;
 
-use image::{GrayImage, Luma};
+use image::GrayImage;
 use rayon::prelude::*;
 
+use super::surf::strongest_first;
 use super::{Features, Keypoint};
 use crate::describe::parameters;
-use crate::image::FloatImage;
-use octave::{BASE_SIGMA, Extremum, Octave, blurred, halved};
+use description::{Describer, Grid};
+use octave::{BASE_SIGMA, Extremum, Octave};
+use plane::{Gaussian, Plane, SMALLEST_SIDE};
 
 parameters! {
     /// What [`sift`] looks for.
@@ -45,10 +48,8 @@ pub type SiftFeatures = Features<128>;
 
 /// Smoothing that photos have by themselves \[px\].
 const CAMERA_SIGMA: f64 = 0.5;
-/// Octaves end before their images have a side shorter than this \[px\].
-const SMALLEST_SIDE: u32 = 16;
 /// Keypoints described between two checkpoints.
-const KEYPOINTS_AT_A_TIME: usize = 256;
+const KEYPOINTS_AT_A_TIME: usize = 1024;
 
 /// Finds the SIFT features of an image. The strongest come first; of equally strong ones, the topmost
 /// and then leftmost.
@@ -57,7 +58,7 @@ pub fn sift(image: &GrayImage, params: &SiftParams) -> SiftFeatures {
     features
 }
 
-/// Finds what [`sift`] does. `checkpoint` is called before each pass over the image and each 256
+/// Finds what [`sift`] does. `checkpoint` is called before each pass over the image and each thousand
 /// keypoints, and can stop the search.
 ///
 /// # Errors
@@ -68,65 +69,75 @@ pub fn sift_interruptible<E>(
     mut checkpoint: impl FnMut() -> Result<(), E>,
 ) -> Result<SiftFeatures, E> {
     checkpoint()?;
-    let (mut base, mut pixel) = base(image, params);
+    let (mut base, mut pixel) = enlarged(image, params);
+    let has_room = |base: &Plane| base.width.min(base.height) >= SMALLEST_SIDE;
+    if has_room(&base) {
+        let has = CAMERA_SIGMA / f64::from(pixel);
+        base = Gaussian::new((BASE_SIGMA * BASE_SIGMA - has * has).sqrt()).smoothed(&base);
+    }
     let mut octaves = Vec::new();
-    while base.width().min(base.height()) >= SMALLEST_SIDE {
-        let octave = Octave::of(base, pixel, params, &mut checkpoint)?;
-        base = halved(&octave.smoothed[params.intervals]);
+    let mut found: Vec<(usize, Extremum)> = Vec::new();
+    while has_room(&base) {
+        let mut octave = Octave::of(base, pixel, params, &mut checkpoint)?;
+        checkpoint()?;
+        let number = octaves.len();
+        found.extend(octave.extrema(params).into_iter().map(|extremum| (number, extremum)));
+        base = octave.smoothed[params.intervals].halved();
         pixel *= 2.0;
+        octave.keep_described(params);
         octaves.push(octave);
     }
-    let mut found: Vec<(usize, Extremum)> = Vec::new();
-    for (number, octave) in octaves.iter().enumerate() {
-        checkpoint()?;
-        found.extend(octave.extrema(params).into_iter().map(|extremum| (number, extremum)));
-    }
-    found.sort_by(|(_, a), (_, b)| {
-        let strength = b.response.total_cmp(&a.response);
-        strength.then(a.y.total_cmp(&b.y)).then(a.x.total_cmp(&b.x))
-    });
     if params.max_keypoints > 0 {
+        found.sort_by(|(_, a), (_, b)| b.response.total_cmp(&a.response));
         found.truncate(params.max_keypoints);
     }
-    let mut features = SiftFeatures::default();
+    // In the order of the images' rows, whose pixels then are still in the cache.
+    found.sort_by(|(a, one), (b, other)| a.cmp(b).then(one.y.total_cmp(&other.y)));
+    let describer = Describer::new();
+    let mut described: Vec<(Keypoint, SiftDescriptor)> = Vec::new();
     for some in found.chunks(KEYPOINTS_AT_A_TIME) {
         checkpoint()?;
-        let described: Vec<(Keypoint, SiftDescriptor)> = some
-            .par_iter()
-            .flat_map_iter(|(number, extremum)| octaves[*number].described(extremum, params))
-            .collect();
-        let (keypoints, descriptors): (Vec<_>, Vec<_>) = described.into_iter().unzip();
-        features.keypoints.extend(keypoints);
-        features.descriptors.extend(descriptors);
+        let of_some = some.par_iter().fold(Default::default, |(mut grid, mut into), of| {
+            let (number, extremum) = of;
+            let level = (extremum.level.round() as usize).clamp(1, params.intervals);
+            let Octave { smoothed, pixel } = &octaves[*number];
+            describer.describe(&smoothed[level], *pixel, extremum, params, &mut grid, &mut into);
+            (grid, into)
+        });
+        described.par_extend(of_some.flat_map_iter(|(_, of_some): (Grid, Vec<_>)| of_some));
     }
-    Ok(features)
+    let mut order: Vec<usize> = (0..described.len()).collect();
+    order.sort_by(|&a, &b| strongest_first(&described[a].0, &described[b].0));
+    Ok(Features {
+        keypoints: order.iter().map(|&place| described[place].0).collect(),
+        descriptors: order.iter().map(|&place| described[place].1).collect(),
+    })
 }
 
-/// The base image of the first octave, 0 … 1, and the size of its pixels in those of the photo.
-fn base(image: &GrayImage, params: &SiftParams) -> (FloatImage, f32) {
-    let value = |x: u32, y: u32| f32::from(image.get_pixel(x, y).0[0]) / 255.0;
-    if image.width() == 0 || image.height() == 0 {
-        return (FloatImage::new(0, 0), 1.0);
+/// The image of the first octave before any smoothing, 0 … 1, and the size of its pixels in those of the photo.
+fn enlarged(image: &GrayImage, params: &SiftParams) -> (Plane, f32) {
+    let (width, height) = (image.width() as usize, image.height() as usize);
+    let values = image.as_raw().iter().map(|&value| f32::from(value) / 255.0).collect();
+    let same = Plane { width, height, values };
+    if !params.enlarge || width == 0 || height == 0 {
+        return (same, 1.0);
     }
-    let (enlarged, pixel, has) = if params.enlarge {
-        let (last_x, last_y) = (image.width() - 1, image.height() - 1);
-        let enlarged = FloatImage::from_fn(2 * image.width(), 2 * image.height(), |x, y| {
-            let (left, top) = (x / 2, y / 2);
-            let (right, bottom) = ((left + x % 2).min(last_x), (top + y % 2).min(last_y));
-            let sum = value(left, top) + value(right, top) + value(left, bottom);
-            Luma([0.25 * (sum + value(right, bottom))])
-        });
-        (enlarged, 0.5, 2.0 * CAMERA_SIGMA)
-    } else {
-        let same = FloatImage::from_fn(image.width(), image.height(), |x, y| Luma([value(x, y)]));
-        (same, 1.0, CAMERA_SIGMA)
-    };
-    let missing = (BASE_SIGMA * BASE_SIGMA - has * has).sqrt();
-    (blurred(&enlarged, missing as f32), pixel)
+    let mut twice = Plane::new(2 * width, 2 * height);
+    twice.values.par_chunks_mut(2 * width).enumerate().for_each(|(y, into)| {
+        let (above, below) = (same.row(y / 2), same.row((y / 2 + y % 2).min(height - 1)));
+        let down = |x: usize| above[x] + below[x];
+        for (x, into) in into.as_chunks_mut::<2>().0.iter_mut().enumerate() {
+            let (left, right) = (down(x), down((x + 1).min(width - 1)));
+            *into = [0.5 * left, 0.25 * (left + right)];
+        }
+    });
+    (twice, 0.5)
 }
 
 #[cfg(test)]
 mod tests {
+    use image::Luma;
+
     use super::*;
     use crate::features::nearest_neighbours;
 

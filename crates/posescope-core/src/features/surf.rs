@@ -89,7 +89,7 @@ pub(crate) fn kept_surf<E>(
     memo.try_recall(params, Features::heap_bytes, || surf_interruptible(image, params, checkpoint))
 }
 
-fn strongest_first(a: &Keypoint, b: &Keypoint) -> std::cmp::Ordering {
+pub(super) fn strongest_first(a: &Keypoint, b: &Keypoint) -> std::cmp::Ordering {
     (b.response.total_cmp(&a.response))
         .then(a.y.total_cmp(&b.y))
         .then(a.x.total_cmp(&b.x))

@@ -1,67 +1,26 @@
 //! One octave of the scale space: its images, and the extrema of their differences.
 
-use nalgebra::{Matrix3, Point2, Vector3};
+use fearless_simd::{Level, Simd, SimdBase as _, SimdFloat as _, SimdMask as _, dispatch, f32x8};
+use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 
-use super::description::{descriptor, directions};
-use super::{SiftDescriptor, SiftParams};
-use crate::features::Keypoint;
-use crate::image::FloatImage;
+use super::SiftParams;
+use super::plane::{Gaussian, Plane};
 
 /// Smoothing of the first image of every octave (section 3.3) \[px of that octave\].
 pub(super) const BASE_SIGMA: f64 = 1.6;
 /// Steps of the interpolation of an extremum, after which it is dropped.
 const MAX_STEPS: usize = 5;
 /// Distance of extrema from the border \[px\].
-const BORDER: u32 = 5;
-/// The image convolved with a Gaussian of `sigma` \[px\], the outermost pixels repeated. An image library's
-/// blur takes four times as long, and half of the time of all of SIFT is this.
-pub(super) fn blurred(image: &FloatImage, sigma: f32) -> FloatImage {
-    let reach = (4.0 * sigma).ceil().max(1.0) as usize;
-    let weight = |away: usize| (-((away * away) as f32) / (2.0 * sigma * sigma)).exp();
-    let sum: f32 = weight(0) + 2.0 * (1..=reach).map(weight).sum::<f32>();
-    let kernel: Vec<f32> =
-        (0..=2 * reach).map(|place| weight(place.abs_diff(reach)) / sum).collect();
-    let (width, height) = (image.width() as usize, image.height() as usize);
-    let values = image.as_raw();
-    let mut along = vec![0.0; width * height];
-    along.par_chunks_mut(width).zip(values.par_chunks(width)).for_each(|(to, from)| {
-        let mut row = vec![from[0]; reach];
-        row.extend_from_slice(from);
-        row.extend(std::iter::repeat_n(from[width - 1], reach));
-        for (place, weight) in kernel.iter().enumerate() {
-            for (to, from) in to.iter_mut().zip(&row[place..]) {
-                *to += weight * from;
-            }
-        }
-    });
-    let mut down = vec![0.0; width * height];
-    down.par_chunks_mut(width).enumerate().for_each(|(y, to)| {
-        for (place, weight) in kernel.iter().enumerate() {
-            let row = (y + place).saturating_sub(reach).min(height - 1);
-            let from = &along[row * width..][..width];
-            for (to, from) in to.iter_mut().zip(from) {
-                *to += weight * from;
-            }
-        }
-    });
-    FloatImage::from_raw(image.width(), image.height(), down).expect("as many values as pixels")
-}
-
-/// Every second pixel of every second row.
-pub(super) fn halved(image: &FloatImage) -> FloatImage {
-    FloatImage::from_fn(image.width() / 2, image.height() / 2, |x, y| {
-        *image.get_pixel(2 * x, 2 * y)
-    })
-}
+const BORDER: usize = 5;
+/// Rows that a thread searches at a time.
+const ROWS: usize = 32;
 
 /// Images of one size, each smoother than the one before.
 pub(super) struct Octave {
     /// Size of a pixel in those of the photo.
-    pixel: f32,
-    pub(super) smoothed: Vec<FloatImage>,
-    /// Each of the smoothed less the one before it.
-    differences: Vec<FloatImage>,
+    pub(super) pixel: f32,
+    pub(super) smoothed: Vec<Plane>,
 }
 
 /// An extremum of the differences, in pixels of its octave.
@@ -70,14 +29,14 @@ pub(super) struct Extremum {
     pub(super) x: f32,
     pub(super) y: f32,
     /// The place among the smoothed images.
-    level: f32,
+    pub(super) level: f32,
     pub(super) response: f32,
-    is_dark: bool,
+    pub(super) is_dark: bool,
 }
 
 impl Octave {
     pub(super) fn of<E>(
-        base: FloatImage,
+        base: Plane,
         pixel: f32,
         params: &SiftParams,
         checkpoint: &mut impl FnMut() -> Result<(), E>,
@@ -87,66 +46,98 @@ impl Octave {
         let mut sigma = BASE_SIGMA;
         for level in 0..params.intervals + 2 {
             checkpoint()?;
-            let more = sigma * (step * step - 1.0).sqrt();
-            smoothed.push(blurred(&smoothed[level], more as f32));
+            let more = Gaussian::new(sigma * (step * step - 1.0).sqrt());
+            smoothed.push(more.smoothed(&smoothed[level]));
             sigma *= step;
         }
-        let differences = smoothed.windows(2).map(|pair| {
-            let values = pair[1].as_raw().iter().zip(pair[0].as_raw());
-            let values: Vec<f32> = values.map(|(after, before)| after - before).collect();
-            FloatImage::from_raw(pair[0].width(), pair[0].height(), values)
-                .expect("as many values as pixels")
-        });
-        Ok(Self { pixel, differences: differences.collect(), smoothed })
+        Ok(Self { pixel, smoothed })
     }
 
-    fn at(&self, level: usize, x: u32, y: u32) -> f32 {
-        self.differences[level].get_pixel(x, y).0[0]
+    /// Drops what only the extrema are found with.
+    pub(super) fn keep_described(&mut self, params: &SiftParams) {
+        let last = params.intervals;
+        for (level, plane) in self.smoothed.iter_mut().enumerate() {
+            if level == 0 || level > last {
+                *plane = Plane::new(0, 0);
+            }
+        }
+    }
+
+    /// The difference of two smoothed images: of one and the one before it.
+    fn at(&self, level: usize, x: usize, y: usize) -> f32 {
+        self.smoothed[level + 1].at(x, y) - self.smoothed[level].at(x, y)
+    }
+
+    fn size(&self) -> (usize, usize) {
+        (self.smoothed[0].width, self.smoothed[0].height)
     }
 
     /// Extrema among their 26 neighbours, interpolated, distinct and not on an edge (sections 3.1, 4).
     pub(super) fn extrema(&self, params: &SiftParams) -> Vec<Extremum> {
-        let (width, height) = self.differences[0].dimensions();
+        let (width, height) = self.size();
         if width <= 2 * BORDER || height <= 2 * BORDER {
             return Vec::new();
         }
         let least = (0.5 * params.contrast) as f32;
-        let rows: Vec<(usize, u32)> = (1..=params.intervals)
-            .flat_map(|level| (BORDER..height - BORDER).map(move |y| (level, y)))
-            .collect();
-        rows.par_iter()
-            .flat_map_iter(|&(level, y)| {
-                (BORDER..width - BORDER)
-                    .filter(move |&x| self.is_extremum(level, x, y, least))
-                    .filter_map(move |x| self.interpolated(level, x, y, params))
-            })
+        let simd = Level::new();
+        let bands: Vec<usize> = (BORDER..height - BORDER).step_by(ROWS).collect();
+        let of_band = |differences: &mut Differences, &top: &usize| {
+            let rows = top..(top + ROWS).min(height - BORDER);
+            let mut found = Vec::new();
+            dispatch!(simd, simd => self.among_neighbours(simd, rows, least, differences, &mut found));
+            found
+                .into_iter()
+                .filter_map(|[level, x, y]| self.interpolated(level, x, y, params))
+                .collect::<Vec<_>>()
+        };
+        bands
+            .par_iter()
+            .map_init(|| Differences::new(self.smoothed.len() - 1, width), of_band)
+            .flatten_iter()
             .collect()
     }
 
-    fn is_extremum(&self, level: usize, x: u32, y: u32, least: f32) -> bool {
-        let value = self.at(level, x, y);
-        if value.abs() < least {
-            return false;
+    /// Level, column and row of what exceeds all its neighbours in some rows.
+    #[inline(always)]
+    fn among_neighbours<S: Simd>(
+        &self,
+        simd: S,
+        rows: std::ops::Range<usize>,
+        least: f32,
+        differences: &mut Differences,
+        found: &mut Vec<[usize; 3]>,
+    ) {
+        let last = self.size().0 - BORDER;
+        for y in [rows.start - 1, rows.start] {
+            differences.fill(&self.smoothed, y);
         }
-        let sign = value.signum();
-        let mut neighbours = (level - 1..=level + 1).flat_map(|level| {
-            (y - 1..=y + 1).flat_map(move |y| (x - 1..=x + 1).map(move |x| (level, x, y)))
-        });
-        neighbours
-            .all(|(l, u, v)| (l, u, v) == (level, x, y) || sign * self.at(l, u, v) < sign * value)
+        for y in rows {
+            differences.fill(&self.smoothed, y + 1);
+            for level in 1..self.smoothed.len() - 2 {
+                let near = differences.around(level, y);
+                for x in (BORDER..last).step_by(8) {
+                    if !is_promising(simd, &near, x, least) {
+                        continue;
+                    }
+                    let lanes = x..last.min(x + 8);
+                    let extrema = lanes.filter(|&x| is_extremum(&near, x, least));
+                    found.extend(extrema.map(|x| [level, x, y]));
+                }
+            }
+        }
     }
 
     /// The extremum of the parabola through the neighbours (section 4).
     fn interpolated(
         &self,
         mut level: usize,
-        mut x: u32,
-        mut y: u32,
+        mut x: usize,
+        mut y: usize,
         params: &SiftParams,
     ) -> Option<Extremum> {
-        let (width, height) = self.differences[0].dimensions();
+        let (width, height) = self.size();
         for _ in 0..MAX_STEPS {
-            let value = |dx: i32, dy: i32, ds: isize| {
+            let value = |dx: isize, dy: isize, ds: isize| {
                 let (x, y) = (x.wrapping_add_signed(dx), y.wrapping_add_signed(dy));
                 self.at(level.wrapping_add_signed(ds), x, y)
             };
@@ -180,9 +171,9 @@ impl Octave {
                     is_dark: here > 0.0,
                 });
             }
-            let moved = |place: u32, by: f32| place.checked_add_signed(by.round() as i32);
+            let moved = |place: usize, by: f32| place.checked_add_signed(by.round() as isize);
             (x, y) = (moved(x, by.x)?, moved(y, by.y)?);
-            level = level.checked_add_signed(by.z.round() as isize)?;
+            level = moved(level, by.z)?;
             let is_inside = (1..=params.intervals).contains(&level)
                 && (BORDER..width - BORDER).contains(&x)
                 && (BORDER..height - BORDER).contains(&y);
@@ -192,33 +183,69 @@ impl Octave {
         }
         None
     }
+}
 
-    /// The features of an extremum: one for each of its dominant directions.
-    pub(super) fn described(
-        &self,
-        extremum: &Extremum,
-        params: &SiftParams,
-    ) -> Vec<(Keypoint, SiftDescriptor)> {
-        let step = 2.0_f32.powf(extremum.level / params.intervals as f32);
-        let sigma = BASE_SIGMA as f32 * step;
-        let level = (extremum.level.round() as usize).min(self.smoothed.len() - 1);
-        let image = &self.smoothed[level];
-        let at = Point2::new(extremum.x, extremum.y);
-        let angles = if params.upright { vec![0.0] } else { directions(image, at, sigma) };
-        // The first octave of an enlarged image has its pixels at even halves of the photo's.
-        angles
-            .into_iter()
-            .map(|angle| {
-                let keypoint = Keypoint {
-                    x: extremum.x * self.pixel,
-                    y: extremum.y * self.pixel,
-                    scale: sigma * self.pixel,
-                    angle,
-                    response: extremum.response,
-                    laplacian_positive: extremum.is_dark,
-                };
-                (keypoint, descriptor(image, at, sigma, angle))
-            })
-            .collect()
+/// Three rows of each difference of two smoothed images; whole images of them would be written and read once, in
+/// more time than their numbers take to compute.
+struct Differences {
+    /// For each level the rows whose numbers leave 0, 1 and 2 when divided by three.
+    rows: Vec<[Vec<f32>; 3]>,
+}
+
+/// The rows above, at and below a place, of the level before, its own and the level behind.
+type Near<'a> = [[&'a [f32]; 3]; 3];
+
+impl Differences {
+    fn new(levels: usize, width: usize) -> Self {
+        // Eight columns at a time end behind the last.
+        let row = || vec![0.0; width + 8];
+        Self { rows: (0..levels).map(|_| std::array::from_fn(|_| row())).collect() }
     }
+
+    #[inline(always)]
+    fn fill(&mut self, smoothed: &[Plane], y: usize) {
+        for (pair, rows) in smoothed.windows(2).zip(&mut self.rows) {
+            let both = pair[1].row(y).iter().zip(pair[0].row(y));
+            for (to, (after, before)) in rows[y % 3].iter_mut().zip(both) {
+                *to = after - before;
+            }
+        }
+    }
+
+    fn around(&self, level: usize, y: usize) -> Near<'_> {
+        [level - 1, level, level + 1]
+            .map(|level| [y - 1, y, y + 1].map(|y| self.rows[level][y % 3].as_slice()))
+    }
+}
+
+/// Whether one of eight values is large and exceeds its six nearest neighbours. Few do, and of most that do not this
+/// is seen at once.
+#[inline(always)]
+fn is_promising<S: Simd>(simd: S, near: &Near<'_>, x: usize, least: f32) -> bool {
+    let lanes = |row: &[f32], x: usize| f32x8::from_slice(simd, &row[x..][..8]);
+    let [[_, before, _], [above, row, below], [_, behind, _]] = *near;
+    let here = lanes(row, x);
+    let (left, right) = (lanes(row, x - 1), lanes(row, x + 1));
+    let (above, below) = (lanes(above, x), lanes(below, x));
+    let (before, behind) = (lanes(before, x), lanes(behind, x));
+    let most = left.max(right).max(above.max(below)).max(before.max(behind));
+    let fewest = left.min(right).min(above.min(below)).min(before.min(behind));
+    let is_outside = here.simd_gt(most) | here.simd_lt(fewest);
+    (is_outside & here.abs().simd_ge(least)).any_true()
+}
+
+/// Whether a value is large and exceeds its 26 neighbours.
+fn is_extremum(near: &Near<'_>, x: usize, least: f32) -> bool {
+    let value = near[1][1][x];
+    if value.abs() < least {
+        return false;
+    }
+    let sign = value.signum();
+    let exceeds = |&other: &f32| sign * other < sign * value;
+    near.iter().enumerate().all(|(level, rows)| {
+        rows.iter().enumerate().all(|(y, row)| match (level, y) {
+            (1, 1) => exceeds(&row[x - 1]) && exceeds(&row[x + 1]),
+            _ => row[x - 1..=x + 1].iter().all(exceeds),
+        })
+    })
 }
