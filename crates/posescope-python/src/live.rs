@@ -90,7 +90,6 @@ pub fn unjudged(
 
 /// The text of `run.toml`: the poses of `estimates` are those of a method, the queries are photos of another scene.
 #[pyfunction]
-#[expect(clippy::too_many_arguments, reason = "Python names them")]
 pub fn run_text(
     scene: &Scene,
     query_scene: &str,

@@ -92,7 +92,7 @@ impl Answer {
 
     /// Saves a recording for the Rerun viewer.
     fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
-        let saved = detached(py, self.threads, |stop| -> Result<_, PyErr> {
+        detached(py, self.threads, |stop| -> Result<_, PyErr> {
             let (targets, identity) = (Targets::file(&path), self.job.identity());
             let failed =
                 |error: posescope::sink::rerun::RecordError| PyOSError::new_err(error.to_string());
@@ -101,8 +101,7 @@ impl Answer {
             let run = self.job.watch(&mut Stoppable { observer: &mut recorder, stop });
             recorder.close().map_err(failed)?;
             run.map(drop).map_err(|error| errors::localize(&error))
-        })?;
-        saved
+        })?
     }
 
     /// The picture that proves the primary verdict, or shows what decided: a data URI and a description.
