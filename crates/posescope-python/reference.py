@@ -38,6 +38,7 @@ ORDER = [
     "methods",
     "main",
 ]
+MADE_BY_CALLERS = {"Camera", "Query", "Reference"}
 SECTION = re.compile(r"^(Args|Returns|Raises|Attributes):$")
 
 
@@ -53,14 +54,14 @@ def signature(thing: Any) -> str:
 def text(thing: Any) -> List[str]:
     """A docstring with its sections as lists."""
     lines: List[str] = []
-    in_section = False
+    in_section = has_entries = False
     for line in (inspect.getdoc(thing) or "").splitlines():
         section = SECTION.match(line)
         entry = re.match(r"^    (\S[^:]*): (.*)$", line)
         if section:
-            in_section = True
+            in_section, has_entries = True, section.group(1) != "Returns"
             lines += [f"*{section.group(1)}*", ""]
-        elif in_section and entry:
+        elif has_entries and entry:
             lines.append(f"- `{entry.group(1)}`: {entry.group(2)}")
         else:
             lines.append("  " + line.strip() if in_section and line.strip() else line.strip())
@@ -103,7 +104,9 @@ def page() -> str:
     lines = ["# Python reference", "", "Made from the docstrings. [How to use it](python.md)."]
     for name in ORDER:
         thing = getattr(posescope, name)
-        lines += ["", f"## `{name}{signature(thing)}`", "", *text(thing)]
+        shows_call = not inspect.isclass(thing) or name in MADE_BY_CALLERS
+        call = signature(thing) if shows_call else ""
+        lines += ["", f"## `{name}{call}`", "", *text(thing)]
         if inspect.isclass(thing) and not issubclass(thing, Exception):
             lines += ["", *members(thing)]
     return re.sub(r"\n{3,}", "\n\n", "\n".join(lines)) + "\n"
