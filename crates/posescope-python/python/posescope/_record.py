@@ -259,7 +259,10 @@ class Recording:
         if not isinstance(reference, Reference):
             reference = self._scene.reference(reference)
         query = Query(logged.photo, self._camera, logged.name, logged.truth)
-        result = diagnose(query, reference, pose, matches=logged.matches, name=self._name)
+        # One thread, so that the caller keeps the others.
+        result = diagnose(
+            query, reference, pose, matches=logged.matches, name=self._name, threads=1
+        )
         if self._keep > 0:
             entry = (_badness(result), next(self._order), result)
             if len(self._worst) < self._keep:
