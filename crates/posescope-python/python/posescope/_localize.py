@@ -150,7 +150,8 @@ def _matches_of(
         given: Sequence[Any] = [matches(photo, reference.photo) for reference in references]
     else:
         several = len(references) > 1 or _is_nested(matches)
-        given = list(matches) if several else [matches]
+        given = matches if several else [matches]
+    # Counted first: an array may have any number of rows.
     if len(given) != len(references):
         raise ValueError(
             f"matches: one entry per reference expected, {len(given)} for {len(references)} references given"
@@ -164,9 +165,10 @@ def _is_nested(matches: Any) -> bool:
 
 
 def _triple(matches: Any) -> Tuple[Any, Any, Any]:
-    parts = tuple(matches)
-    if len(parts) not in (2, 3):
+    count = len(matches)
+    if count not in (2, 3):
         raise ValueError(
-            f"matches: query points, reference points and perhaps scores expected, {len(parts)} parts given"
+            f"matches: query points, reference points and perhaps scores expected, {count} parts given"
         )
+    parts = tuple(matches)
     return parts[0], parts[1], parts[2] if len(parts) == 3 else None
