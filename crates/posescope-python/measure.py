@@ -85,19 +85,25 @@ def two_threads(street: posescope.Scene) -> None:
     say("two Python threads with threads=1, to one", best / alone, "x", "1.15")
 
 
-def memory(street: posescope.Scene) -> None:
-    query, reference = street.query("70"), street.reference("62")
-    arrays = posescope.Query(query.photo, query.camera)
+def memory() -> None:
+    random = np.random.default_rng(1)
+    camera = posescope.Camera(150, 150, 119.5, 79.5, 240, 160)
+    photo = random.integers(0, 256, (160, 240), np.uint8)
+    cloud = random.uniform([-9, -2, 4], [9, 2, 30], (5_000, 3)).astype(np.float32)
+
+    def work() -> None:
+        query = posescope.Query(photo, camera)
+        posescope.localize(query, posescope.Reference(photo, camera, np.eye(4), cloud), method="fb").to_dict()
 
     def resident() -> float:
         pages = int(Path("/proc/self/statm").read_text().split()[1])
         return pages * resource.getpagesize() / 2**20
 
     for _ in range(100):
-        posescope.localize(arrays, reference, method="fb")
+        work()
     before = resident()
     for _ in range(1000):
-        posescope.localize(arrays, reference, method="fb")
+        work()
     say("memory after 1,000 calls, less before", resident() - before, "MB", "flat")
 
 
@@ -142,9 +148,9 @@ def main() -> None:
     street = posescope.Scene.street()
     overhead()
     two_threads(street)
-    memory(street)
     ctrl_c(street)
     live(street)
+    memory()
 
 
 if __name__ == "__main__":
