@@ -66,6 +66,8 @@ def localize(
     references = _list_of(reference)
     if method is None:
         method = "robust" if matches is None else _USES_MATCHES[0]
+    if not isinstance(method, str):
+        raise TypeError(f"method: a name expected, {type(method).__name__} given")
     if matches is not None and method not in _USES_MATCHES:
         raise ValueError(f"matches: the methods that use them are fb and hy, `{method}` given")
     answer = _posescope.localize(
