@@ -73,7 +73,7 @@ pub fn report(scene: &dyn Scene, found: &Examination, width: Option<usize>) -> S
     let there = &found.inventory;
     let mut line = |what: &str, words: &str| {
         const LABEL: &str = "           ";
-        let words = format!("{LABEL}{words}");
+        let words = format!("{LABEL}{}", scene.lengths().unit().words(words));
         let lines = wrapped(&words, width.unwrap_or(usize::MAX), LABEL);
         text += &format!("{what:<11}{}", &lines[LABEL.len()..]);
     };

@@ -228,6 +228,7 @@ fn a_room_is_searched_at_its_own_scale() {
     says_no_metres(&ran.out);
     says_no_metres(&ran.err);
     says_no_metres(&sequence.text("model.jsonl"));
+    says_no_metres(&sequence.run(&format!("doctor {}", model.display())).out);
     let limits = "--limit 4 --method fb,mi --right 0.1,5deg --keep-failures 1";
     let ran = sequence.run(&format!("eval {} {limits} --out model", model.display()));
     for text in [ran.out, ran.err, sequence.text("model/report.html")] {

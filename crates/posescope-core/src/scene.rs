@@ -21,6 +21,7 @@ use crate::cloud::Cloud;
 use crate::geometry::Pose;
 use crate::image::Photo;
 use crate::problem::{Query, ReferenceTuple};
+use crate::scale::LengthUnit;
 
 /// A sequence of frames in one world frame. Frames are addressed by position, `0..frames().len()`.
 pub trait Scene: Send + Sync {
@@ -109,6 +110,16 @@ pub enum Lengths {
     Metres,
     /// The unit of a model that was made from photos alone.
     Model,
+}
+
+impl Lengths {
+    /// The unit that sentences name.
+    pub fn unit(self) -> LengthUnit {
+        match self {
+            Self::Street | Self::Metres => LengthUnit::Metre,
+            Self::Model => LengthUnit::Model,
+        }
+    }
 }
 
 fn pose_of(scene: &(impl Scene + ?Sized), frame: usize) -> Result<Pose, SceneError> {
