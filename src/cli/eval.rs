@@ -72,7 +72,7 @@ pub fn eval(args: &EvalArgs, terminal: &Terminal) -> Result<(), CliError> {
     }
     let Executed { run, scenes } = execute(args, None, &folder, terminal)?;
     let again = args.rerun_failed.as_deref();
-    let examined = examined(&scenes, &folder)?;
+    let examined = examined(&run, &scenes, &folder)?;
     finish(&args.judging, again, &folder, &run, &examined, terminal)
 }
 
@@ -97,12 +97,14 @@ struct Executed {
     scenes: Scenes,
 }
 
-/// What `posescope doctor` says of scenes whose queries fail often.
-fn examined(scenes: &Scenes, folder: &Path) -> Result<Vec<Finding>, CliError> {
+/// What `posescope doctor` says of scenes whose queries fail often. A part of a run asks about each scene: how often its
+/// queries fail is known only when all parts are there.
+fn examined(run: &RunFile, scenes: &Scenes, folder: &Path) -> Result<Vec<Finding>, CliError> {
     let rows = read_rows(folder)?;
     let failing = failing_scenes(&rows.iter().collect::<Vec<_>>());
     let mut examined = Vec::new();
-    for scene in scenes.references.iter().filter(|scene| failing.contains(scene.name())) {
+    let is_asked = |name: &str| run.shard.is_some() || failing.contains(name);
+    for scene in scenes.references.iter().filter(|scene| is_asked(scene.name())) {
         let found = mistake(scene.as_ref())?;
         examined.extend(found.map(|found| of_examination(scene.name(), &found)));
     }

@@ -161,14 +161,15 @@ pub fn write_report(
     let of_run: Vec<&QueryResult> = rows.iter().collect();
     let findings = findings(&of_run, examined);
     let failing = failing_scenes(&of_run);
-    let examined = examined.iter().filter(|one| failing.contains(&one.of));
+    let is_kept = |one: &&Finding| run.shard.is_some() || failing.contains(&one.of);
+    let doctor: Vec<Finding> = examined.iter().filter(is_kept).cloned().collect();
     let summary = Summary {
         schema: SUMMARY_SCHEMA,
         failure_radius_m: run.failure_radius_m(),
         groups: &measures,
         gates: &gate_results,
         findings: &findings,
-        doctor: &examined.cloned().collect::<Vec<_>>(),
+        doctor: &doctor,
     };
     let json = serde_json::to_vec_pretty(&summary);
     let json = json.map_err(|error| FolderError::io(folder)(error.into()))?;

@@ -16,10 +16,13 @@ use posescope::run::{
     Draw, Execution, Limit, Protocol, RUN_SCHEMA, Reference, RunFile, RunFolder, RunObserver,
     Scenes, read_results, read_run,
 };
+use posescope::scene::street::{Size, Street};
 use posescope::scene::{Scene, SceneError};
+use tempfile::TempDir;
 
-use crate::binary::{background_in, has, lines, objects, refused, write};
+use crate::binary::{background_in, has, lines, objects, refused, run_in, text, write};
 use crate::damage::open;
+use crate::planted::{Fault, Planted};
 use crate::small_sequence::SmallSequence;
 use crate::walls_scene::{TwoCameras, Walls};
 
@@ -126,6 +129,26 @@ fn threads_kills_and_shards_make_no_difference() {
     assert!(child.wait_with_output().expect("it ends").status.success());
     sequence.run("eval merge --out merged part-1 part-2").ok();
     assert_same(&folder("plain"), &folder("merged"));
+}
+
+#[test]
+fn what_doctor_says_of_a_failing_scene_is_a_finding_of_the_run_and_of_its_merged_parts() {
+    let root = TempDir::new().expect("a temporary folder");
+    let street = Street::new("overcast", Size::Half).expect("is built in");
+    Planted::new(&street, Fault::InversePose, 0, 12).write_to(&root.path().join("inverse"));
+    let run = |line: &str| run_in(root.path(), line).ok();
+    let eval = "eval inverse --limit 8 --method fb --keep-failures 0 --out";
+    run(&format!("{eval} whole"));
+    let summary = text(root.path().join("whole/summary.json"));
+    let summary: serde_json::Value = serde_json::from_str(&summary).expect("JSON");
+    let found = &summary["findings"][0];
+    assert_eq!((&found["doctor"], &found["about"]), (&true.into(), &"poses".into()), "{found}");
+    // With two queries each, no part alone knows that the scene fails often.
+    for part in 1..=4 {
+        run(&format!("{eval} part-{part} --shard {part}/4"));
+    }
+    run("eval merge --out merged part-1 part-2 part-3 part-4");
+    assert_same(&root.path().join("whole"), &root.path().join("merged"));
 }
 
 #[test]

@@ -1,11 +1,16 @@
 //! A scene with one of the usual mistakes in it.
 
+use std::fs;
+use std::path::Path;
+
 use nalgebra::{Matrix3, Point3, Quaternion, Rotation3, Translation3, UnitQuaternion, Vector3};
 use posescope::camera::Intrinsics;
 use posescope::cloud::Cloud;
 use posescope::geometry::Pose;
 use posescope::image::{GrayImage, Photo};
 use posescope::scene::{Scene, SceneError};
+
+use crate::binary::write;
 
 /// What is planted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -41,6 +46,31 @@ pub struct Planted<'a> {
 impl<'a> Planted<'a> {
     pub fn new(scene: &'a dyn Scene, fault: Fault, first: usize, count: usize) -> Self {
         Self { scene, fault, first, names: scene.frames()[first..first + count].to_vec() }
+    }
+
+    /// Writes it as a `scene.toml` with a text of points for each frame.
+    pub fn write_to(&self, folder: &Path) {
+        for kind in ["photos", "scans"] {
+            fs::create_dir_all(folder.join(kind)).expect("writable");
+        }
+        let mut poses = "name x y z qx qy qz qw\n".to_owned();
+        for (frame, name) in self.names.iter().enumerate() {
+            let photo = self.photo(frame).expect("readable").gray;
+            photo.save(folder.join(format!("photos/{name}.png"))).expect("writable");
+            let points = self.cloud(frame).expect("readable").points;
+            let lines = points.iter().map(|p| format!("{} {} {}\n", p.x, p.y, p.z));
+            write(folder.join(format!("scans/{name}.txt")), lines.collect::<String>());
+            let pose = self.pose(frame).expect("has a pose");
+            let (t, q) = (pose.translation.vector, pose.rotation.coords);
+            poses += &format!("{name} {} {} {} {} {} {} {}\n", t.x, t.y, t.z, q.x, q.y, q.z, q.w);
+        }
+        write(folder.join("poses.txt"), poses);
+        let Intrinsics { fx, fy, cx, cy, .. } = self.intrinsics(0);
+        let scene = format!(
+            "images = \"photos/*.png\"\nposes = \"poses.txt\"\n[camera]\nfx = {fx}\nfy = {fy}\ncx = {cx}\ncy = {cy}\n\
+             [clouds]\nfiles = \"scans/*.txt\"\n"
+        );
+        write(folder.join("scene.toml"), scene);
     }
 
     fn true_pose(&self, frame: usize) -> Option<Pose> {

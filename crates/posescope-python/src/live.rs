@@ -4,7 +4,6 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use nalgebra::Point3;
-use posescope::diagnosis::Tolerance;
 use posescope::estimator::Failure;
 use posescope::localize::{QueryResult, frames_within};
 use posescope::measure::{KnownFailures, write_report};
@@ -49,10 +48,6 @@ pub fn nearest(scene: &Scene, world_from_camera: &Bound<'_, PyAny>) -> PyResult<
     Ok(frames.first().map(|&frame| scene.frames()[frame].clone()))
 }
 
-fn right(scene: &Scene) -> Tolerance {
-    Protocol::default().at_size(&scene.opened.size()).right
-}
-
 /// A result without verdicts, as a line of `results.jsonl`.
 #[pyfunction]
 pub fn unjudged(
@@ -71,9 +66,12 @@ pub fn unjudged(
         missing: format!("pose of {query}"),
     };
     let name = scene.opened.scene.name();
-    let right = right(scene);
+    let size = scene.opened.size();
+    let right = Protocol::default().at_size(&size).right;
     let result = QueryResult {
         query_scene: Some(query_scene.to_owned()),
+        unit: size.scale.unit(),
+        scale: size.scale.metre(),
         per_reference: None,
         ..QueryResult::new(
             name,

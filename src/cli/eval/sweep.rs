@@ -5,7 +5,7 @@ use std::path::Path;
 use posescope::measure::{SweptRun, write_sweep};
 use posescope::run::Sweep;
 
-use super::{Executed, Judged, execute, good_unless, step_summary};
+use super::{Executed, Judged, examined, execute, good_unless, step_summary};
 use crate::cli::args::EvalArgs;
 use crate::cli::failure::CliError;
 use crate::cli::terminal::Terminal;
@@ -23,8 +23,9 @@ pub fn sweep(
     for value in sweep.values() {
         let name = format!("{}={value}", sweep.key());
         let path = folder.join(&name);
-        let Executed { run, .. } = execute(args, Some((sweep, value)), &path, terminal)?;
-        let judged = Judged::of(&args.judging, None, &path, &run, &[])?;
+        let Executed { run, scenes } = execute(args, Some((sweep, value)), &path, terminal)?;
+        let examined = examined(&run, &scenes, &path)?;
+        let judged = Judged::of(&args.judging, None, &path, &run, &examined)?;
         let of_run = judged.failures.iter();
         failures.extend(of_run.map(|failure| format!("{name}: {failure}")));
         runs.push(SweptRun { value: value.clone(), measures: judged.report.measures });
