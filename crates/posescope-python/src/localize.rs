@@ -1,6 +1,6 @@
 //! Localising a query, and judging somebody else's pose of it.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap, HashSet};
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -140,9 +140,21 @@ fn found(name: &str, (query, reference, scores): &GivenMatches<'_>) -> PyResult<
         let scores = arrays::scores(&format!("{name}[2]"), scores, query.len())?;
         order.sort_by(|&a, &b| scores[b].total_cmp(&scores[a]));
     }
-    let in_order = |points: &[[f32; 2]]| order.iter().map(|&at| points[at]).collect::<Vec<_>>();
-    let matched: Vec<Option<usize>> = (0..query.len()).map(Some).collect();
-    Ok(FoundMatches::new(&in_order(&query), &in_order(&reference), &matched))
+    // Equal points are one keypoint.
+    let bits = |[x, y]: [f32; 2]| [x.to_bits(), y.to_bits()];
+    let (mut queries, mut references, mut partners) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut matched, mut places) = (HashSet::new(), HashMap::new());
+    for at in order {
+        if matched.insert(bits(query[at])) {
+            let place = places.entry(bits(reference[at])).or_insert_with(|| {
+                references.push(reference[at]);
+                references.len() - 1
+            });
+            queries.push(query[at]);
+            partners.push(Some(*place));
+        }
+    }
+    Ok(FoundMatches::new(&queries, &references, &partners))
 }
 
 /// The matches of each reference.
@@ -275,7 +287,6 @@ pub fn diagnose(
     references: Vec<PyRef<'_, Reference>>,
     world_from_camera: &Bound<'_, PyAny>,
     truth: Option<&Bound<'_, PyAny>>,
-    matches: Option<Vec<GivenMatches<'_>>>,
     params: Vec<(String, String)>,
     name: &str,
     threads: Option<usize>,
@@ -291,7 +302,7 @@ pub fn diagnose(
         truth: truth.map(|truth| arrays::pose("truth", truth)).transpose()?,
         method,
         estimate: Some(arrays::pose("world_from_camera", world_from_camera)?),
-        matches: all_found(matches)?,
+        matches: None,
         params,
         radius: None,
         fusion: None,

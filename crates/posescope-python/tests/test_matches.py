@@ -64,6 +64,20 @@ def test_a_callable_gets_both_photos(
         posescope.localize(*pair, matches=fails)
 
 
+def test_a_point_that_two_matches_claim_goes_to_the_better_score(
+    pair: Tuple[posescope.Query, posescope.Reference], surf: Tuple[np.ndarray, np.ndarray]
+) -> None:
+    query, reference = surf
+    true, false = np.full(len(query), 0.9), np.full(len(query), 0.5)
+    both = np.vstack([query, query]), np.vstack([reference, np.roll(reference, len(reference) // 2, axis=0)])
+    alone = posescope.localize(*pair, matches=surf)
+    better = posescope.localize(*pair, matches=(*both, np.concatenate([true, false])))
+    worse = posescope.localize(*pair, matches=(*both, np.concatenate([false, true])))
+    assert alone.counts is not None and worse.counts is not None
+    assert better.counts == alone.counts and better.grade == "right"
+    assert worse.counts["unique"] <= alone.counts["unique"] and worse.grade != "right"
+
+
 @pytest.mark.parametrize(
     ("matches", "words"),
     [
@@ -109,7 +123,11 @@ def test_somebody_elses_pose_gets_verdicts(
     wrong = posescope.diagnose(query, reference, moved, matches=surf, name="mine")
     assert wrong.grade == "wrong" and wrong.verdicts and wrong.method == "mine"
     assert wrong.error is not None and wrong.error.translation_m == pytest.approx(6.0)
+    assert right.from_matches is None and wrong.from_matches is not None
+    assert wrong.from_matches.method == "fb" and wrong.from_matches.grade == "right"
     unknown = posescope.Query(query.photo, query.camera)
+    given = posescope.diagnose(unknown, reference, moved, truth=truth, matches=surf)
+    assert given.from_matches is not None and given.from_matches.grade == "right"
     assert posescope.diagnose(unknown, reference, moved).grade == "unmeasured"
     assert posescope.diagnose(unknown, reference, moved, truth=truth).grade == "wrong"
     with pytest.raises(ValueError, match="method of posescope"):

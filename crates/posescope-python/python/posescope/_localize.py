@@ -101,7 +101,8 @@ def diagnose(
         references: One reference, or several.
         world_from_camera: The pose to judge, 4 x 4 [m].
         truth: The true pose, 4 x 4, where the query does not know it.
-        matches: As in :func:`localize`.
+        matches: As in :func:`localize`. They have no part in the verdicts on the pose; ``from_matches`` of the result is
+            what ``fb`` makes of them.
         params: Parameters by name.
         name: What the other system is called in the result.
         threads: The number of threads; by default one per core.
@@ -114,18 +115,14 @@ def diagnose(
         InputError: A frame of a scene cannot be read.
         InternalError: A bug of posescope.
     """
-    all_references = _list_of(references)
-    answer = _posescope.diagnose(
-        query,
-        all_references,
-        world_from_camera,
-        truth,
-        _matches_of(query, all_references, matches),
-        _texts(params),
-        name,
-        threads,
-    )
-    return Result(answer)
+    all_references, texts = _list_of(references), _texts(params)
+    answer = _posescope.diagnose(query, all_references, world_from_camera, truth, texts, name, threads)
+    if matches is None:
+        return Result(answer)
+    judged = query if truth is None else Query(query.photo, query.camera, query.name, truth)
+    given = _matches_of(query, all_references, matches)
+    found = _posescope.localize(judged, all_references, "fb", texts, None, given, None, 0, threads)
+    return Result(answer, Result(found))
 
 
 def _list_of(reference: "Reference | Sequence[Reference]") -> List[Reference]:

@@ -111,7 +111,6 @@ def diagnose(
     references: Sequence[Reference],
     world_from_camera: ArrayLike,
     truth: Optional[ArrayLike],
-    matches: Optional[_Matches],
     params: Sequence[Tuple[str, str]],
     name: str,
     threads: Optional[int],

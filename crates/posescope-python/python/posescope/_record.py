@@ -41,7 +41,6 @@ class _Logged:
     truth: "Optional[NDArray[np.float64]]"
     photo: "Optional[NDArray[np.uint8]]"
     reference: "Optional[str | Reference]"
-    matches: Optional[Tuple[Any, ...]]
 
 
 def record(
@@ -85,7 +84,6 @@ class Recording:
         self._photos.mkdir(parents=True, exist_ok=True)
         self._camera: Optional[Camera] = None
         self._names: set[str] = set()
-        self._has_matches = False
         self._pending = 0
         self._skipped = 0
         self._closed = False
@@ -133,8 +131,8 @@ class Recording:
             camera: The camera; the same for all queries.
             world_from_camera: The pose that the localiser found, 4 x 4 [m]; None if it found none.
             matches: Query points and reference points (N x 2 [px]) and perhaps scores; ``reference`` says of which
-                frame.
-            inliers: Which of the matches are inliers: N booleans, or their positions.
+                frame. They are checked; verdicts and the folder do not use them yet.
+            inliers: Which of the matches are inliers: N booleans, or their positions. As ``matches``.
             reference: The frame of the scene, or the reference, that the localiser used. By default the nearest frame.
             truth: The true pose, 4 x 4, where it is known.
             name: The name of the query. By default its number.
@@ -156,9 +154,9 @@ class Recording:
             raise ValueError(f"name: a new name that a file can have expected, `{name}` given")
         line = _posescope.unjudged(self._scene, _PHOTOS, name, self._name, world_from_camera, truth)
         copied = np.array(photo, np.uint8)
-        logged = _Logged(name, line, _copy(world_from_camera), _copy(truth), None, reference, None)
+        logged = _Logged(name, line, _copy(world_from_camera), _copy(truth), None, reference)
         if matches is not None:
-            logged.matches = _inliers_of(tuple(np.array(part) for part in matches), inliers)
+            _inliers_of(tuple(np.array(part) for part in matches), inliers)
         self._camera = camera
         self._names.add(name)
         with self._lock:
@@ -260,9 +258,7 @@ class Recording:
             reference = self._scene.reference(reference)
         query = Query(logged.photo, self._camera, logged.name, logged.truth)
         # One thread, so that the caller keeps the others.
-        result = diagnose(
-            query, reference, pose, matches=logged.matches, name=self._name, threads=1
-        )
+        result = diagnose(query, reference, pose, name=self._name, threads=1)
         if self._keep > 0:
             entry = (_badness(result), next(self._order), result)
             if len(self._worst) < self._keep:

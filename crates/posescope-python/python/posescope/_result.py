@@ -84,12 +84,18 @@ class Result:
     In a notebook it shows itself: the sentence, and the picture that proves it.
     """
 
-    def __init__(self, answer: "Answer") -> None:
+    def __init__(self, answer: "Answer", from_matches: "Optional[Result]" = None) -> None:
         self._answer = answer
+        self._from_matches = from_matches
         self._json = answer.json()
         self._row: Dict[str, Any] = json.loads(self._json)
         self._proof: Optional[Tuple[str, str]] = None
         self._has_proof = False
+
+    @property
+    def from_matches(self) -> "Optional[Result]":
+        """What ``fb`` makes of the matches that :func:`diagnose` was given; None without matches."""
+        return self._from_matches
 
     @property
     def query(self) -> str:
