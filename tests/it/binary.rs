@@ -165,3 +165,16 @@ pub fn with_files_up_to(size_kb: u32, line: &str) -> Option<Command> {
     command.args(["-c", &format!("trap '' XFSZ; ulimit -f {size_kb}; exec '{binary}' {line}")]);
     Some(command)
 }
+
+/// Where a text first gives a length in metres, with the words before it.
+pub fn first_metre(text: &str) -> Option<String> {
+    let after_number = text.match_indices(" m").filter(|&(at, _)| {
+        let is_after_number = text[..at].ends_with(|c: char| c.is_ascii_digit() || c == ')');
+        let is_word = text[at + 2..].starts_with(|c: char| c.is_alphanumeric() || c == '²');
+        is_after_number && !is_word
+    });
+    let in_brackets = ["(m)", "[m]"].into_iter().flat_map(|unit| text.match_indices(unit));
+    let (at, found) = after_number.chain(in_brackets).min_by_key(|&(at, _)| at)?;
+    let around: Vec<char> = text[..at + found.len()].chars().collect();
+    Some(around[around.len().saturating_sub(80)..].iter().collect())
+}

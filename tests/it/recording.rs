@@ -17,13 +17,15 @@ use posescope::localize::{LocalizeObserver as _, StageTimes, evaluate, localize_
 use posescope::method::Method;
 use posescope::params::Params;
 use posescope::retrieval::{Criterion, Geometry, Ranked, RankedReference, ReferenceRanking};
+use posescope::scale::Scale;
 use posescope::sink::rerun::{Identity, Recorder, Targets, entities};
 use posescope::trace::{Cancelled, Fanout, Sink as _, Trace};
+use rerun::external::arrow::array::{ListArray, StringArray};
 use rerun::external::re_log_encoding::DecoderApp;
 use rerun::external::re_sdk_types::blueprint::archetypes::ViewBlueprint;
 use rerun::log::{Chunk, LogMsg};
 
-use crate::binary::{has, posescope};
+use crate::binary::{first_metre, has, posescope};
 use crate::small_sequence::SmallSequence;
 use crate::two_walls::solvable;
 
@@ -32,12 +34,16 @@ const EVAL: &str = entities::EVAL_TIMELINE;
 const LOCKSTEP: &str = entities::LOCKSTEP_TIMELINE;
 
 fn identity() -> Identity {
+    identity_of(&Params::default())
+}
+
+fn identity_of(params: &Params) -> Identity {
     Identity {
         scene: "two walls".to_owned(),
         query_scene: None,
         queries: vec!["query".to_owned()],
         references: vec!["reference".to_owned()],
-        configuration: Params::default().to_toml(),
+        configuration: params.to_toml(),
         degraded: Default::default(),
         seed: 7,
     }
@@ -94,6 +100,24 @@ pub fn chunks(path: &Path) -> Vec<Chunk> {
             _ => None,
         })
         .collect()
+}
+
+/// All texts of a recording: log, report, names of layers.
+fn texts(path: &Path) -> Vec<String> {
+    let file = BufReader::new(File::open(path).expect("the recording"));
+    let messages = DecoderApp::decode_lazy(file).map(|message| message.expect("readable"));
+    let batches = messages.filter_map(|message| match message {
+        LogMsg::ArrowMsg(store, message) if store.is_recording() => Some(message.batch),
+        _ => None,
+    });
+    let columns = batches.flat_map(|batch| batch.columns().to_vec());
+    let mut texts = Vec::new();
+    for column in columns {
+        let Some(list) = column.as_any().downcast_ref::<ListArray>() else { continue };
+        let Some(rows) = list.values().as_any().downcast_ref::<StringArray>() else { continue };
+        texts.extend(rows.iter().flatten().map(str::to_owned));
+    }
+    texts
 }
 
 /// The layout, as text.
@@ -294,6 +318,26 @@ fn a_recording_of_something_wrong_opens_on_the_picture_that_proves_it() {
     assert!(!timelines(&chunks(&right)).contains_key(&proof));
     assert!(layout(&wrong).contains("Why MI is wrong"));
     assert!(!layout(&right).contains("Why MI is wrong"));
+}
+
+#[test]
+fn where_lengths_have_no_unit_a_recording_names_no_metres() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("model.rrd");
+    let metres_of = |is_metric: bool| -> Vec<String> {
+        let params = Params::at_scale(Scale::of_depth(10.0, is_metric));
+        let targets = Targets::file(&path);
+        let methods = Method::PAPER;
+        let recorder = Recorder::open(&targets, &identity_of(&params), &methods);
+        let mut recorder = recorder.expect("a writable file");
+        run(&mut recorder, &methods, &params);
+        recorder.close().expect("a whole recording");
+        texts(&path).iter().filter_map(|text| first_metre(text)).collect()
+    };
+    let metres = metres_of(true);
+    assert!(metres.len() > 10, "{metres:#?}");
+    let metres = metres_of(false);
+    assert!(metres.is_empty(), "{metres:#?}");
 }
 
 #[test]

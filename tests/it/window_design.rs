@@ -5,10 +5,13 @@ use egui::epaint::ClippedShape;
 use egui::{Color32, Key, Modifiers, Pos2, Rect, Shape, TextureId};
 use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
-use posescope::app::{App, Setup, views};
+use posescope::app::{App, Setup, Tab, views};
 use posescope::method::Method;
+use posescope::params::Params;
+use posescope::scale::Scale;
 use posescope::session::RunMode;
 
+use crate::binary::first_metre;
 use crate::window::{finish, is_said, press};
 use crate::window::{results, run_until_idle, setup, wait};
 
@@ -17,7 +20,15 @@ const SMALL: [f32; 2] = [1280.0, 800.0];
 
 /// A window of a size whose run is over, with so many pixels to a point.
 fn finished(size: [f32; 2], pixels_per_point: f32) -> Harness<'static, App> {
-    let setup = Setup { mode: RunMode::Running, ..setup() };
+    finished_of(setup(), size, pixels_per_point)
+}
+
+fn finished_of(
+    setup: Setup,
+    size: [f32; 2],
+    pixels_per_point: f32,
+) -> Harness<'static, App> {
+    let setup = Setup { mode: RunMode::Running, ..setup };
     let mut window = Harness::builder()
         .with_size(size)
         .with_pixels_per_point(pixels_per_point)
@@ -315,4 +326,29 @@ fn empty_views_say_what_to_do() {
         // Nothing has failed before anything ran.
         assert!(!is_said(&waiting, "failed:"), "{view}");
     }
+}
+
+#[test]
+fn where_lengths_have_no_unit_no_view_names_metres() {
+    let metric = setup();
+    let mut model = setup();
+    let paper = Scale::PAPER;
+    model.job.task.params = Params::at_scale(Scale::of_depth(10.0 * paper.metre(), false));
+    let metres_of = |setup: Setup| {
+        let mut window = finished_of(setup, SMALL, 1.0);
+        let mut found = std::collections::BTreeSet::new();
+        for (tab, _) in Tab::ALL {
+            window.state_mut().app_state_mut().show_tab(tab);
+            everywhere(&mut window, |window, place| {
+                let texts = texts(&window.output().shapes);
+                let metres = texts.iter().filter_map(|text| first_metre(&text.words));
+                found.extend(metres.map(|metre| format!("{place}: {metre}")));
+            });
+        }
+        found
+    };
+    let metres = metres_of(metric);
+    assert!(metres.len() > 20, "{metres:#?}");
+    let metres = metres_of(model);
+    assert!(metres.is_empty(), "{metres:#?}");
 }

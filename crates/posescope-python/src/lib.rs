@@ -40,6 +40,9 @@ fn extension(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(detached::panic, module)?)?;
     module.add_function(wrap_pyfunction!(live::check_photo, module)?)?;
     module.add_function(wrap_pyfunction!(live::save_photo, module)?)?;
+    module.add_function(wrap_pyfunction!(live::check_matches, module)?)?;
+    module.add_function(wrap_pyfunction!(live::save_matches, module)?)?;
+    module.add_function(wrap_pyfunction!(live::frame_name, module)?)?;
     module.add_function(wrap_pyfunction!(live::nearest, module)?)?;
     module.add_function(wrap_pyfunction!(live::unjudged, module)?)?;
     module.add_function(wrap_pyfunction!(live::run_text, module)?)?;

@@ -12,12 +12,16 @@ use posescope::run::{
     EstimatesFile, FolderError, Protocol, QueryCamera, RUN_SCHEMA, Reference, RunFile, ScenePair,
     read_run,
 };
+use posescope::scene::write_matches;
+use posescope_core::features::FoundMatches;
 use posescope_core::{Method, Params};
 use pyo3::exceptions::PyOSError;
 use pyo3::prelude::*;
 
 use crate::camera::Camera;
 use crate::detached::detached;
+use crate::frames::Origin;
+use crate::localize::{GivenMatches, found};
 use crate::scene::Scene;
 use crate::{arrays, errors};
 
@@ -37,6 +41,32 @@ pub fn save_photo(py: Python<'_>, photo: &Bound<'_, PyAny>, path: PathBuf) -> Py
         None => photo.gray.save(&path),
     });
     saved.map_err(|error| PyOSError::new_err(format!("{}: {error}", path.display())))
+}
+
+/// Checks matches without keeping them.
+#[pyfunction]
+pub fn check_matches(matches: GivenMatches<'_>) -> PyResult<()> {
+    found("matches", &matches).map(drop)
+}
+
+/// Saves the matches of a query with a reference as `--matches` reads them.
+#[pyfunction]
+pub fn save_matches(
+    folder: PathBuf,
+    query: &str,
+    reference: &str,
+    matches: GivenMatches<'_>,
+) -> PyResult<()> {
+    let FoundMatches { query: points, reference: others, decisions } = found("matches", &matches)?;
+    write_matches(&folder, (query, &points), (reference, &others), &decisions)
+        .map_err(|error| PyOSError::new_err(format!("{}: {error}", folder.display())))
+}
+
+/// The whole name of a frame, whose leading zeros may be left out.
+#[pyfunction]
+pub fn frame_name(scene: &Scene, name: &str) -> PyResult<String> {
+    let Origin { opened, frame } = scene.find(name)?;
+    Ok(opened.scene.frames()[frame].clone())
 }
 
 /// The name of the frame with pose and cloud that is nearest to a pose.
@@ -86,20 +116,24 @@ pub fn unjudged(
     serde_json::to_string(&result).map_err(|error| errors::internal(&error.to_string()))
 }
 
-/// The text of `run.toml`: the poses of `estimates` are those of a method, the queries are photos of another scene.
+/// The text of `run.toml`: the poses of `estimates` are those of a method, the queries are photos of another scene, and
+/// `matches`, where there are any, are those of `fb`.
 #[pyfunction]
+#[expect(clippy::too_many_arguments, reason = "Python names them")]
 pub fn run_text(
     scene: &Scene,
     query_scene: &str,
     query_folder: &str,
     method: &str,
     estimates: PathBuf,
+    matches: Option<PathBuf>,
     camera: &Camera,
     queries: Vec<String>,
 ) -> PyResult<String> {
     let method = Method::called(method).map_err(errors::value)?;
     let size = scene.opened.size();
     let params = Params::at_scale(size.scale).to_toml().parse();
+    let fb = matches.is_some().then_some(Method::FB);
     let run = RunFile {
         schema: RUN_SCHEMA.to_owned(),
         version: env!("CARGO_PKG_VERSION").to_owned(),
@@ -109,7 +143,8 @@ pub fn run_text(
             query_scene: vec![query_folder.to_owned()],
             references: vec![Reference::Chosen(posescope::localize::Selection::Nearest(1))],
             estimates: vec![EstimatesFile { method, path: estimates }],
-            methods: vec![method],
+            methods: [Some(method), fb].into_iter().flatten().collect(),
+            matches,
             ..Protocol::default().at_size(&size)
         },
         inputs: BTreeMap::new(),

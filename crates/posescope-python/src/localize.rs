@@ -25,7 +25,7 @@ use crate::witness::EventLines;
 use crate::{arrays, errors};
 
 /// Query points, reference points and perhaps scores.
-type GivenMatches<'py> = (Bound<'py, PyAny>, Bound<'py, PyAny>, Option<Bound<'py, PyAny>>);
+pub type GivenMatches<'py> = (Bound<'py, PyAny>, Bound<'py, PyAny>, Option<Bound<'py, PyAny>>);
 
 /// The fusion of several references, as of `posescope eval`.
 const FUSION: &str = "r-wavg";
@@ -126,7 +126,7 @@ impl MatchSource for ByReference {
 }
 
 /// The matches of one reference. Better scores come first, so that they keep a point that several claim.
-fn found(name: &str, (query, reference, scores): &GivenMatches<'_>) -> PyResult<FoundMatches> {
+pub fn found(name: &str, (query, reference, scores): &GivenMatches<'_>) -> PyResult<FoundMatches> {
     let query = arrays::points(&format!("{name}[0]"), query)?;
     let reference = arrays::points(&format!("{name}[1]"), reference)?;
     if query.len() != reference.len() {

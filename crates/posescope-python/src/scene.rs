@@ -50,7 +50,8 @@ impl Scene {
         })
     }
 
-    fn find(&self, name: &str) -> PyResult<Origin> {
+    /// The frame of this name.
+    pub fn find(&self, name: &str) -> PyResult<Origin> {
         let found = self.opened.scene.find(name).map_err(|error| errors::scene(&error))?;
         Ok(Origin { opened: Arc::clone(&self.opened), frame: found })
     }

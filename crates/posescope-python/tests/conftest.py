@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any, Tuple
+
 import numpy as np
 import pytest
 
@@ -27,3 +29,21 @@ def reference(camera: posescope.Camera) -> posescope.Reference:
 @pytest.fixture(scope="session")
 def query(camera: posescope.Camera) -> posescope.Query:
     return posescope.Query(np.zeros((48, 64), np.uint8), camera)
+
+
+def surf_matches(query: posescope.Query, reference: posescope.Reference) -> Tuple[np.ndarray, np.ndarray]:
+    """The accepted matches of SURF: points of the query, and of the reference."""
+    events = posescope.localize(query, reference, method="fb").events()
+    detected = {event["side"]: event for event in events if event["kind"] == "FeaturesDetected"}
+    decided = next(event for event in events if event["kind"] == "MatchesDecided")
+    points = {
+        side: np.array([event["keypoints"]["x_px"], event["keypoints"]["y_px"]]).T
+        if "keypoints" in event
+        else np.array([event["x_px"], event["y_px"]]).T
+        for side, event in detected.items()
+    }
+    matches: Any = decided.get("matches", decided)
+    kept = [at for at, verdict in enumerate(matches["verdict"]) if "candidate" in str(verdict).lower()]
+    of_query = np.array(matches["query_keypoint"])[kept]
+    of_reference = np.array(matches["reference_keypoint"])[kept]
+    return points["query"][of_query], points["reference"][of_reference]

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import posescope
+from conftest import surf_matches
 
 
 @pytest.fixture(scope="module")
@@ -17,22 +18,7 @@ def pair(street: posescope.Scene) -> Tuple[posescope.Query, posescope.Reference]
 
 @pytest.fixture(scope="module")
 def surf(pair: Tuple[posescope.Query, posescope.Reference]) -> Tuple[np.ndarray, np.ndarray]:
-    """The accepted matches of SURF."""
-    events = posescope.localize(*pair, method="fb").events()
-    detected = {event["side"]: event for event in events if event["kind"] == "FeaturesDetected"}
-    decided = next(event for event in events if event["kind"] == "MatchesDecided")
-    points = {
-        side: np.array([event["keypoints"]["x_px"], event["keypoints"]["y_px"]]).T
-        if "keypoints" in event
-        else np.array([event["x_px"], event["y_px"]]).T
-        for side, event in detected.items()
-    }
-    matches: Any = decided.get("matches", decided)
-    verdicts = matches["verdict"]
-    kept = [at for at, verdict in enumerate(verdicts) if "candidate" in str(verdict).lower()]
-    query = np.array(matches["query_keypoint"])[kept]
-    reference = np.array(matches["reference_keypoint"])[kept]
-    return points["query"][query], points["reference"][reference]
+    return surf_matches(*pair)
 
 
 def test_the_matches_of_surf_give_the_pose_of_surf(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import time
 from pathlib import Path
 
@@ -9,6 +10,7 @@ import numpy as np
 import pytest
 
 import posescope
+from conftest import surf_matches
 
 
 def test_a_recording_is_a_run_with_verdicts(street: posescope.Scene, tmp_path: Path) -> None:
@@ -38,6 +40,56 @@ def test_a_recording_is_a_run_with_verdicts(street: posescope.Scene, tmp_path: P
     assert (run.path / "report.html").stat().st_size > 10_000
     with pytest.raises(FileExistsError):
         posescope.record(tmp_path / "live", street)
+
+
+def test_matches_give_verdicts_of_their_own_and_are_stored(street: posescope.Scene, tmp_path: Path) -> None:
+    query, reference = street.query("70"), street.reference("62")
+    right = surf_matches(query, reference)
+    # Each point of the query with another one's partner.
+    wrong = right[0], np.roll(right[1], len(right[1]) // 2, axis=0)
+    truth = query.truth
+    assert truth is not None
+    moved = truth.copy()
+    moved[0, 3] += 5.0
+    folder = tmp_path / "live"
+    with posescope.record(folder, street, keep=1) as log:
+        for name, pose, matches in (("good", truth, right), ("none", None, right), ("bad", moved, wrong)):
+            log.query(
+                query.photo,
+                query.camera,
+                pose,
+                matches=matches,
+                inliers=np.arange(8),
+                reference="62",
+                truth=truth,
+                name=name,
+            )
+        log.query(query.photo, query.camera, truth, truth=truth, name="without")
+    run = posescope.Run.open(folder)
+    rows = [(row["query"], row["method"], row["grade"]) for row in run.rows()]
+    assert rows[:4] == [
+        ("good", "live", "right"),
+        ("good", "fb", "right"),
+        ("none", "live", "no pose"),
+        ("none", "fb", "right"),
+    ]
+    assert [row[:2] for row in rows[4:]] == [("bad", "live"), ("bad", "fb"), ("without", "live")]
+    assert rows[4][2] == "wrong" and rows[5][2] != "right"
+    assert run.rows()[5]["diagnosis"][0]["code"].startswith("R")
+    assert sorted(file.name for file in (folder / "failures").iterdir()) == ["bad-fb.rrd", "bad-live.rrd"]
+    # The command reads the same matches from the folder.
+    stored = np.loadtxt(folder / "matches" / "good_000062_matches.txt")
+    assert np.array_equal(stored, np.hstack(right).astype(np.float32))
+    inliers = np.loadtxt(folder / "inliers" / "good_000062_matches.txt")
+    assert np.array_equal(inliers, stored[:8])
+    assert 'methods = ["live", "fb"]' in (folder / "run.toml").read_text()
+    again = tmp_path / "again.jsonl"
+    code = posescope.main(
+        ["run", "street", "--query-scene", str(folder / "queries"), "--query", "good", "--reference", "62"]
+        + ["--method", "fb", "--matches", str(folder / "matches"), "--json", str(again)]
+    )
+    assert code == 0
+    assert json.loads(again.read_text())["pose"] == run.rows()[1]["pose"]
 
 
 def test_a_full_queue_skips_the_verdict_and_keeps_the_pose(street: posescope.Scene, tmp_path: Path) -> None:
@@ -73,16 +125,21 @@ def test_wrong_arguments_are_named_at_once(street: posescope.Scene, tmp_path: Pa
             log.query(query.photo, query.camera, query.truth, matches=(np.zeros((0, 2)),) * 2)
         with pytest.raises(ValueError, match="name"):
             log.query(query.photo, query.camera, query.truth, name="a/b")
+        with pytest.raises(posescope.InputError, match="900"):
+            log.query(query.photo, query.camera, query.truth, reference="900")
         points = np.zeros((3, 2))
-        log.query(
-            query.photo,
-            query.camera,
-            query.truth,
-            matches=(points, points),
-            inliers=[True, False, True],
-            reference="62",
-            name="a",
-        )
+        for matches, inliers, words in (
+            ((points, points[:2]), None, "as many query points"),
+            ((points,), None, "1 parts given"),
+            ((points, points), [9], "inliers: "),
+            ((points, points), [0.5], "inliers: booleans or positions"),
+            (None, [True], "matches: "),
+        ):
+            with pytest.raises(ValueError, match=words):
+                log.query(
+                    query.photo, query.camera, query.truth, matches=matches, inliers=inliers, reference="62"
+                )
+        log.query(query.photo, query.camera, query.truth, name="a")
         with pytest.raises(ValueError, match="new name"):
             log.query(query.photo, query.camera, query.truth, name="a")
     with pytest.raises(RuntimeError, match="closed"):

@@ -17,6 +17,9 @@ if TYPE_CHECKING:
     """Takes the photo of the query and that of a reference, and returns their matches."""
     MatchesOrMatcher = Union[Matches, Sequence[Matches], Matcher]
 
+Triple = Tuple[Any, Any, Any]
+"""Query points, reference points, and scores or None."""
+
 _USES_MATCHES = ("fb", "hy")
 """The methods that use matches of another system."""
 
@@ -140,7 +143,7 @@ def _texts(params: Optional[Mapping[str, object]]) -> List[Tuple[str, str]]:
 
 def _matches_of(
     query: Query, references: List[Reference], matches: "Optional[MatchesOrMatcher]"
-) -> Optional[List[Tuple[Any, Any, Any]]]:
+) -> Optional[List[Triple]]:
     """The matches of each reference, as triples."""
     if matches is None:
         return None
@@ -155,7 +158,7 @@ def _matches_of(
         raise ValueError(
             f"matches: one entry per reference expected, {len(given)} for {len(references)} references given"
         )
-    return [_triple(one) for one in given]
+    return [triple(one) for one in given]
 
 
 def _is_nested(matches: Any) -> bool:
@@ -163,7 +166,8 @@ def _is_nested(matches: Any) -> bool:
     return isinstance(matches, list) and len(matches) == 1
 
 
-def _triple(matches: Any) -> Tuple[Any, Any, Any]:
+def triple(matches: Any) -> Triple:
+    """Query points, reference points, and scores or None."""
     count = len(matches)
     if count not in (2, 3):
         raise ValueError(

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, List, Optional, Tuple, Type
 import numpy as np
 
 from . import _posescope
-from ._localize import diagnose
+from ._localize import Triple, diagnose, localize, triple
 from ._posescope import Camera, Query, Reference, Scene
 from ._result import Result
 from ._run import Run
@@ -41,6 +41,13 @@ class _Logged:
     truth: "Optional[NDArray[np.float64]]"
     photo: "Optional[NDArray[np.uint8]]"
     reference: "Optional[str | Reference]"
+    matches: Optional[Triple]
+    inliers: Optional[Triple]
+
+    @property
+    def reference_name(self) -> Optional[str]:
+        """The name of the reference, where one is named."""
+        return self.reference.name if isinstance(self.reference, Reference) else self.reference
 
 
 def record(
@@ -89,7 +96,8 @@ class Recording:
         self._closed = False
         self._broken: Optional[BaseException] = None
         self._lock = threading.Lock()
-        self._worst: List[Tuple[Tuple[float, ...], int, Result]] = []
+        self._has_matches = False
+        self._worst: List[Tuple[Tuple[float, ...], int, List[Result]]] = []
         self._order = itertools.count()
         self._files = [open(path / file, "w", encoding="utf-8") for file in ("results.jsonl", "timings.jsonl")]
         self._poses = open(path / "poses.txt", "w", encoding="utf-8")
@@ -131,8 +139,9 @@ class Recording:
             camera: The camera; the same for all queries.
             world_from_camera: The pose that the localiser found, 4 x 4 [m]; None if it found none.
             matches: Query points and reference points (N x 2 [px]) and perhaps scores; ``reference`` says of which
-                frame. They are checked; verdicts and the folder do not use them yet.
-            inliers: Which of the matches are inliers: N booleans, or their positions. As ``matches``.
+                frame. The run then has ``fb`` beside the localiser: what it makes of the same matches, with verdicts.
+            inliers: Which of the matches are inliers: N booleans, or their positions. Matches and inliers are stored
+                in ``matches`` and ``inliers`` of the folder, as ``--matches`` reads them.
             reference: The frame of the scene, or the reference, that the localiser used. By default the nearest frame.
             truth: The true pose, 4 x 4, where it is known.
             name: The name of the query. By default its number.
@@ -140,6 +149,7 @@ class Recording:
         Raises:
             ValueError: An array has another dtype or shape than documented, the camera has changed, or a name is
                 used twice.
+            InputError: The scene has no frame ``reference``.
             RuntimeError: The recording is closed.
         """
         if self._closed:
@@ -148,15 +158,22 @@ class Recording:
             raise ValueError("camera: the same for all queries of a recording expected")
         if matches is not None and reference is None:
             raise ValueError("reference: the frame that the matches belong to expected")
+        if matches is None and inliers is not None:
+            raise ValueError("matches: the matches that the inliers are among expected")
+        given = None if matches is None else _copied(triple(matches))
+        if given is not None:
+            _posescope.check_matches(given)
+        chosen = None if given is None or inliers is None else _inliers_of(given, inliers)
         _posescope.check_photo(photo, camera)
         name = f"{len(self._names):06}" if name is None else name
         if not name or name in self._names or _UNSAFE & set(name):
             raise ValueError(f"name: a new name that a file can have expected, `{name}` given")
         line = _posescope.unjudged(self._scene, _PHOTOS, name, self._name, world_from_camera, truth)
         copied = np.array(photo, np.uint8)
-        logged = _Logged(name, line, _copy(world_from_camera), _copy(truth), None, reference)
-        if matches is not None:
-            _inliers_of(tuple(np.array(part) for part in matches), inliers)
+        if isinstance(reference, str):
+            reference = _posescope.frame_name(self._scene, reference)
+        logged = _Logged(name, line, _copy(world_from_camera), _copy(truth), None, reference, given, chosen)
+        self._has_matches |= given is not None
         self._camera = camera
         self._names.add(name)
         with self._lock:
@@ -207,7 +224,7 @@ class Recording:
                 raise
 
     def _save_all(self) -> None:
-        """Writes photos and poses."""
+        """Writes photos, poses and matches."""
         while True:
             item = self._to_save.get()
             if item is None:
@@ -220,6 +237,10 @@ class Recording:
                     numbers = (*pose["position_m"], *pose["quaternion_xyzw"])
                     self._poses.write(f"{logged.name} {' '.join(map(repr, numbers))}\n")
                     self._poses.flush()
+                for folder, matches in (("matches", logged.matches), ("inliers", logged.inliers)):
+                    if matches is not None:
+                        into = os.fspath(self._path / folder)
+                        _posescope.save_matches(into, logged.name, logged.reference_name or "", matches)
             except Exception as error:  # noqa: BLE001
                 self._broken = self._broken or error
 
@@ -231,11 +252,12 @@ class Recording:
             if logged is None:
                 return
             try:
-                line = logged.line if logged.photo is None else self._judged(logged)
-                timing = json.dumps({"query": logged.name, "method": self._name})
-                for file, text in zip(reversed(self._files), (timing, line)):
-                    file.write(text + "\n")
-                    file.flush()
+                lines = [logged.line] if logged.photo is None else self._judged(logged)
+                for line in lines:
+                    timing = json.dumps({"query": logged.name, "method": json.loads(line)["method"]})
+                    for file, text in zip(reversed(self._files), (timing, line)):
+                        file.write(text + "\n")
+                        file.flush()
                 names.append(logged.name)
                 if len(names) % _SAVED_EVERY == 1:
                     self._save_run(names)
@@ -246,26 +268,32 @@ class Recording:
                     with self._lock:
                         self._pending -= 1
 
-    def _judged(self, logged: _Logged) -> str:
-        """The line of a query with its verdicts."""
+    def _judged(self, logged: _Logged) -> List[str]:
+        """The lines of a query with their verdicts: the localiser's, and that of ``fb`` where it gave matches."""
         pose = logged.world_from_camera
         reference = logged.reference
         if reference is None and pose is not None:
             reference = _posescope.nearest(self._scene, pose)
-        if pose is None or reference is None or self._camera is None or logged.photo is None:
-            return logged.line
+        if reference is None or self._camera is None or logged.photo is None:
+            return [logged.line]
         if not isinstance(reference, Reference):
             reference = self._scene.reference(reference)
         query = Query(logged.photo, self._camera, logged.name, logged.truth)
+        results: List[Result] = []
         # One thread, so that the caller keeps the others.
-        result = diagnose(query, reference, pose, name=self._name, threads=1)
-        if self._keep > 0:
-            entry = (_badness(result), next(self._order), result)
+        if pose is not None:
+            results.append(diagnose(query, reference, pose, name=self._name, threads=1))
+        lines = [result.to_json() for result in results] or [logged.line]
+        if logged.matches is not None:
+            results.append(localize(query, reference, matches=logged.matches, threads=1))
+            lines.append(results[-1].to_json())
+        if self._keep > 0 and results:
+            entry = (_badness(results[0]), next(self._order), results)
             if len(self._worst) < self._keep:
                 heapq.heappush(self._worst, entry)
             else:
                 heapq.heappushpop(self._worst, entry)
-        return result.to_json()
+        return lines
 
     def _save_run(self, names: Optional[List[str]] = None) -> None:
         """Writes run.toml and the scene of the photos."""
@@ -273,7 +301,8 @@ class Recording:
             return
         if names is None:
             lines = (self._path / "results.jsonl").read_text(encoding="utf-8").splitlines()
-            names = [json.loads(line)["query"] for line in lines]
+            # Once each: a query with matches has two lines.
+            names = list(dict.fromkeys(json.loads(line)["query"] for line in lines))
         camera = self._camera
         text = _posescope.run_text(
             self._scene,
@@ -281,6 +310,7 @@ class Recording:
             os.fspath(self._path / "queries"),
             self._name,
             os.fspath(self._path / "poses.txt"),
+            os.fspath(self._path / "matches") if self._has_matches else None,
             camera,
             names,
         )
@@ -296,23 +326,28 @@ class Recording:
         """Saves recordings of the worst queries."""
         folder = self._path / "failures"
         folder.mkdir(exist_ok=True)
-        for _, _, result in sorted(self._worst, reverse=True):
-            result.save(folder / f"{result.query}-{self._name}.rrd")
+        for _, _, results in self._worst:
+            for result in results:
+                result.save(folder / f"{result.query}-{result.method}.rrd")
 
 
 def _copy(pose: "Optional[ArrayLike]") -> "Optional[NDArray[np.float64]]":
     return None if pose is None else np.array(pose, np.float64)
 
 
-def _inliers_of(matches: Tuple[Any, ...], inliers: "Optional[ArrayLike]") -> Tuple[Any, ...]:
-    """The matches that are inliers, where it is known which are."""
-    if inliers is None:
-        return matches
+def _copied(matches: Triple) -> Triple:
+    queries, references, scores = matches
+    return np.array(queries), np.array(references), None if scores is None else np.array(scores)
+
+
+def _inliers_of(matches: Triple, inliers: "ArrayLike") -> Triple:
+    """The matches that are inliers."""
     chosen = np.asarray(inliers)
     if chosen.dtype.kind not in "biu" or chosen.ndim != 1:
         raise ValueError(f"inliers: booleans or positions expected, {chosen.dtype} of shape {chosen.shape} given")
+    queries, references, scores = matches
     try:
-        return tuple(part[chosen] for part in matches)
+        return queries[chosen], references[chosen], None if scores is None else scores[chosen]
     except IndexError as error:
         raise ValueError(f"inliers: {error}") from error
 
