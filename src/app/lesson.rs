@@ -230,13 +230,14 @@ fn asked_ui(ui: &mut Ui, context: &ViewContext<'_>, question: &Question, given: 
             ui.weak("Click on the map, or move the camera with Alt and the arrows");
             let words = context.state.camera.and_then(|camera| place(context, &camera));
             let is_placed = words.is_some();
+            let words = words.map(|words| context.in_unit(&words));
             ui.label(words.unwrap_or_else(|| "Nothing is chosen yet".to_owned()));
             let button = ui.add_enabled(is_placed, egui::Button::new("This is my guess (Enter)"));
             button.sends(context, App::guess);
         }
         (Answer::Place(method), Some(Given::Place(guess))) => {
             for words in outcome(context, *method, &guess) {
-                ui.label(RichText::new(words).strong());
+                ui.label(RichText::new(context.in_unit(&words)).strong());
             }
         }
         (Answer::Place(_), Some(Given::Choice(_))) => {}

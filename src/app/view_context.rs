@@ -43,6 +43,16 @@ impl<'a> ViewContext<'a> {
         self.setup.task.params.scale.unit().words(words)
     }
 
+    /// A unit behind a number; metres of a model without metric scale are units.
+    pub(super) fn suffix(&self, unit: &str) -> String {
+        match (unit, self.setup.task.params.scale.is_metric()) {
+            ("", _) => String::new(),
+            ("m", false) => " units".to_owned(),
+            ("°/m", false) => " °/unit".to_owned(),
+            _ => format!(" {unit}"),
+        }
+    }
+
     /// The same at another position among the records of the run.
     pub(super) fn at(&self, cursor: usize) -> Self {
         Self { cursor, ..*self }

@@ -137,9 +137,7 @@ fn groups_of(method: &str) -> Vec<&str> {
         "fb2" => vec!["fb2", "render"],
         "hy" => [features, groups_of("mi"), vec!["hy"]].concat(),
         "mi6" => [&search[..], &["judge", "mi6"]].concat(),
-        "robust" => {
-            [groups_of("fb"), groups_of("fb2"), groups_of("mi6"), vec!["robust"]].concat()
-        }
+        "robust" => [groups_of("fb"), groups_of("fb2"), groups_of("mi6"), vec!["robust"]].concat(),
         "retrieval" => vec!["surf", "fb", "retrieval", "index"],
         cost => {
             let is_cost = cost::ALL.iter().any(|known| known.name == cost);

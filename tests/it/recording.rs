@@ -65,7 +65,8 @@ fn run(recorder: &mut Recorder, methods: &[Method], params: &Params) {
         let tolerance = Tolerance { translation_m: 0.4, rotation_deg: 5.0 };
         let subject = Subject::new(&problem, method, params, &outcome, &evidence);
         let subject = subject.against(Some(&truth), tolerance);
-        let result = evaluate("two walls", &subject, Assessment::of(&subject));
+        let mut result = evaluate("two walls", &subject, Assessment::of(&subject));
+        result.unit = params.scale.unit();
         recorder.end_method(&result, &StageTimes::default());
     }
 }
@@ -107,7 +108,7 @@ fn texts(path: &Path) -> Vec<String> {
     let file = BufReader::new(File::open(path).expect("the recording"));
     let messages = DecoderApp::decode_lazy(file).map(|message| message.expect("readable"));
     let batches = messages.filter_map(|message| match message {
-        LogMsg::ArrowMsg(store, message) if store.is_recording() => Some(message.batch),
+        LogMsg::ArrowMsg(store, message) if store.is_recording() => Some(message.batch.clone()),
         _ => None,
     });
     let columns = batches.flat_map(|batch| batch.columns().to_vec());

@@ -23,11 +23,7 @@ fn finished(size: [f32; 2], pixels_per_point: f32) -> Harness<'static, App> {
     finished_of(setup(), size, pixels_per_point)
 }
 
-fn finished_of(
-    setup: Setup,
-    size: [f32; 2],
-    pixels_per_point: f32,
-) -> Harness<'static, App> {
+fn finished_of(setup: Setup, size: [f32; 2], pixels_per_point: f32) -> Harness<'static, App> {
     let setup = Setup { mode: RunMode::Running, ..setup };
     let mut window = Harness::builder()
         .with_size(size)

@@ -92,7 +92,7 @@ impl View for ChartsView {
                 Chart::Recall => {
                     let label = ui.label("up to");
                     let drag = DragValue::new(&mut self.limit_m).range(0.05..=100.0);
-                    ui.add(drag.speed(0.05).suffix(" m")).labelled_by(label.id);
+                    ui.add(drag.speed(0.05).suffix(context.suffix("m"))).labelled_by(label.id);
                 }
                 Chart::Verdicts => {
                     for (columns, name, about) in Columns::ALL {

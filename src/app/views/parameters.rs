@@ -82,7 +82,8 @@ impl ParametersView {
                     context.send(|app| app.state.degrade(Degradation::default()));
                 }
             }
-            let Some(value) = edited(ui, name, row, &default.value) else {
+            let Some(value) = edited(ui, name, row, &default.value, context.suffix(row.about.unit))
+            else {
                 continue;
             };
             let mut wanted = degradation;
@@ -109,11 +110,13 @@ fn all(degradation: &Degradation, params: &Params) -> Vec<Described> {
 }
 
 /// A row; answers the new value, once the user is done with it.
-fn edited(ui: &mut Ui, name: &str, row: &Described, default: &Value) -> Option<String> {
-    let suffix = match row.about.unit {
-        "" => String::new(),
-        unit => format!(" {unit}"),
-    };
+fn edited(
+    ui: &mut Ui,
+    name: &str,
+    row: &Described,
+    default: &Value,
+    suffix: String,
+) -> Option<String> {
     let (about, domain) = (row.about.help(), &row.domain);
     let help = format!("{about}\n{}: {domain}{suffix}, default {default}", row.key);
     let is_default = row.value == *default;

@@ -91,7 +91,7 @@ fn numbers(ui: &mut Ui, context: &ViewContext<'_>) {
     let is_done = |response: &egui::Response| response.drag_stopped() || response.lost_focus();
     let mut wanted = radius_m;
     let label = ui.label("Radius");
-    let drag = DragValue::new(&mut wanted).range(1.0..=500.0).suffix(" m");
+    let drag = DragValue::new(&mut wanted).range(1e-3..=500.0).suffix(context.suffix("m"));
     let response = ui.add(drag.update_while_editing(false));
     if is_done(&response.labelled_by(label.id)) && wanted != radius_m {
         context.send(move |app| app.state.set_radius(wanted));

@@ -190,7 +190,7 @@ fn caption(
         if context.state.is_probing() {
             ui.spinner();
         }
-        ui.add(egui::Label::new(words).wrap());
+        ui.add(egui::Label::new(context.in_unit(&words)).wrap());
     });
 }
 

@@ -240,7 +240,8 @@ impl Recording {
         let CurrentQuery { problems, results, .. } = &self.query;
         // Not on the timeline `lockstep`: the report would show results too early there.
         self.stream.set_lockstep(None);
-        let text = report::markdown(problems, results, &self.identity, origin);
+        let unit = self.params.scale.unit();
+        let text = report::markdown(problems, results, &self.identity, origin, unit);
         self.stream.log(entities::REPORT, &TextDocument::from_markdown(text));
     }
 

@@ -7,6 +7,7 @@ use crate::geometry::PoseError;
 use crate::localize::QueryResult;
 use crate::params::Params;
 use crate::problem::Problem;
+use crate::scale::LengthUnit;
 use crate::table::{Align, Table};
 use posescope_core::text::first_sentence;
 
@@ -16,12 +17,12 @@ pub(super) fn markdown(
     results: &[QueryResult],
     identity: &Identity,
     origin: Origin,
+    unit: LengthUnit,
 ) -> String {
     let mut text = String::new();
     if let Some(problem) = problems.first() {
         let references = problems.iter().map(|p| &p.reference.name);
         let names: Vec<String> = references.map(|name| identity.reference_label(name)).collect();
-        let unit = results.first().map(|result| result.unit).unwrap_or_default();
         let words = format!(
             "# Query {}\n\nReference: {}. Search radius: {} m. Seed: {}.\n\n",
             identity.query_label(&problem.query.name),
@@ -42,12 +43,12 @@ pub(super) fn markdown(
     }
     text += &changes(&identity.configuration);
     let Origin(origin) = origin;
-    text += &format!(
+    let words = format!(
         "\nPositions are relative to the first reference. Add ({:.3}, {:.3}, {:.3}) m to get \
          world coordinates. Axes: x right, y down, z forward.\n",
         origin.x, origin.y, origin.z
     );
-    text
+    text + &unit.words(&words)
 }
 
 /// The failures in sentences: primary verdict, other verdicts and remedies of each method.

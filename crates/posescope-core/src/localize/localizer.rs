@@ -328,11 +328,9 @@ impl<'a> Localizer<'a> {
     }
 
     fn marked(&self, mut result: QueryResult, setting: Option<Setting>) -> QueryResult {
-        let unit = self.params.scale.unit();
-        result.put_into_words_of(unit);
+        result.put_into_words_of(self.params.scale.unit());
         QueryResult {
             query_scene: (!self.is_one_drive).then(|| self.queries.name().to_owned()),
-            unit,
             scale: self.params.scale.metre(),
             degraded: self.queries.as_degraded().map(DegradedScene::degradation),
             setting,
@@ -401,8 +399,9 @@ impl<'a> Localizer<'a> {
             }
             None => self.estimate(work, problem, method, observer)?,
         };
-        let reported =
+        let mut reported =
             self.with_ranking_judged(candidate.result.clone(), request, work.truth.as_ref());
+        reported.put_into_words_of(self.params.scale.unit());
         observer.end_method(&reported, &candidate.times);
         let of_method = work.candidates.entry(method).or_default();
         of_method.resize_with(work.problems.len(), || None);

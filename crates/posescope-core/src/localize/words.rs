@@ -22,6 +22,7 @@ impl QueryResult {
 
     /// Says in the unit what its sentences say in metres.
     pub(super) fn put_into_words_of(&mut self, unit: LengthUnit) {
+        self.unit = unit;
         let reason = self.reason.iter_mut().map(|reason| &mut reason.text);
         let verdicts = self.diagnosis.iter_mut().map(|verdict| &mut verdict.text);
         for text in reason.chain(verdicts) {

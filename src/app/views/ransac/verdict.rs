@@ -68,7 +68,7 @@ fn sample(ui: &mut Ui, context: &ViewContext<'_>, span: &Span, cursor: usize, tr
         let columns =
             ["sample", "query [px]", "reference [px]", "depth [m]", "here [px]", "best [px]"];
         for column in columns {
-            ui.label(RichText::new(column).weak().small());
+            ui.label(RichText::new(context.in_unit(column)).weak().small());
         }
         ui.end_row();
         for &index in &trial.sample {

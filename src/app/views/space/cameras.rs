@@ -135,6 +135,7 @@ pub(super) fn cameras(context: &ViewContext<'_>, geometry: &SceneGeometry) -> Ve
             CameraKind::BestSoFar(_) => Thing::Result(palette::NO_POSE),
             CameraKind::Hand | CameraKind::Pointer => Thing::Dot(palette::UNDECIDED),
         };
+        let about = context.in_unit(&about);
         SceneCamera {
             kind,
             scene_from_camera: geometry.scene_from_world * world,

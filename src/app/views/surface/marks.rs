@@ -48,7 +48,7 @@ impl MapMark {
         let mut marks = Vec::new();
         let mut add = |kind, pose: Pose, name: &str, note: String| {
             let offset = search.offset(&pose);
-            let words = format!("{name} {}{note}", place(&offset));
+            let words = context.in_unit(&format!("{name} {}{note}", place(&offset)));
             marks.push(Self { kind, offset, pose, words });
         };
         let noted = |cost: Option<f64>| cost.map_or(String::new(), |c| format!(", {}", number(c)));

@@ -72,7 +72,7 @@ pub(super) fn ui(ui: &mut Ui, context: &ViewContext<'_>, search: &Search<'_>) {
     let width = ((ui.available_width() - 2.0 * gap) / 3.0).max(60.0);
     ui.horizontal_top(|ui| {
         for axis in SliceAxis::ALL {
-            slice(ui, axis, width, search, &marks);
+            slice(ui, context, axis, width, search, &marks);
         }
     });
 }
@@ -97,18 +97,20 @@ fn marks(ui: &Ui, context: &ViewContext<'_>, search: &Search<'_>) -> Vec<LineMar
 
 fn slice(
     ui: &mut Ui,
+    context: &ViewContext<'_>,
     (axis, name, unit): (SliceAxis, &str, &str),
     width: f32,
     search: &Search<'_>,
     marks: &[LineMark],
 ) {
-    let label =
-        at_points(|_, PlotPoint { x, y }| format!("cost {} at {name} {x:.2} {unit}", number(y)));
+    let label = at_points(|_, PlotPoint { x, y }| {
+        context.in_unit(&format!("cost {} at {name} {x:.2} {unit}", number(y)))
+    });
     let answer = Plot::new(name)
         .width(width)
         .height(PLOT_HEIGHT)
         .allow_scroll(false)
-        .x_axis_label(format!("{name} [{unit}]"))
+        .x_axis_label(context.in_unit(&format!("{name} [{unit}]")))
         .label_formatter(label)
         .show(ui, |plot| {
             for (name, color, style, offset) in marks {
