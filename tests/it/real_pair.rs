@@ -6,6 +6,7 @@ use posescope::estimator;
 use posescope::event::{DepthsLifted, FeaturesDetected, Side};
 use posescope::geometry::{Pose, PoseError};
 use posescope::history::History;
+use posescope::localize::QueryResult;
 use posescope::method::Method;
 use posescope::params::Params;
 use posescope::problem::Problem;
@@ -14,6 +15,7 @@ use posescope::scene;
 use posescope::solver::Correspondence;
 use posescope::trace::Trace;
 
+use crate::binary::run_in;
 use crate::data;
 
 /// The sequence with the authors' pair, 003814 and 003823.
@@ -127,4 +129,30 @@ fn the_hybrid_returns_the_feature_based_pose_where_that_is_accepted() {
     });
     assert!(indirect.pose.is_ok());
     assert_eq!(indirect, hybrid);
+}
+
+/// As a user asks: with the limits on confidence, for which a pose may be refused.
+#[test]
+fn the_methods_beyond_the_paper_answer_both_ways() {
+    let Some(folder) = authors_pair() else {
+        return;
+    };
+    let out = tempfile::tempdir().expect("a folder");
+    for (query, reference) in [("3823", "3814"), ("3814", "3823")] {
+        let asked = format!(
+            "run {} --query {query} --reference {reference} --method fb2,mi6,robust --json pair.jsonl -q",
+            folder.display()
+        );
+        run_in(out.path(), &asked).ok();
+        let lines = std::fs::read_to_string(out.path().join("pair.jsonl")).expect("results");
+        let results: Vec<QueryResult> =
+            lines.lines().map(|line| serde_json::from_str(line).expect("a result")).collect();
+        assert_eq!(results.len(), 3);
+        for result in results {
+            let method = result.method;
+            let error = result.error.unwrap_or_else(|| panic!("{method} has no pose"));
+            println!("{query} from {reference}: {method} {error}");
+            assert!(error.translation_m <= 0.25 && error.max_euler_deg <= 0.3, "{method}: {error}");
+        }
+    }
 }
