@@ -5,6 +5,7 @@
 //! 3. the best of those are refined in all six freedoms,
 //! 4. and of minima that cost about the same the likelier pose stands.
 
+mod halving;
 mod level;
 mod params;
 mod prior;
@@ -28,6 +29,9 @@ use crate::trace::{Cancelled, Trace};
 /// The step below which the refinement of all starts ends, before the best go on in six freedoms \[m\], at the
 /// paper's scale.
 const PLANE_LAST_M: f64 = 0.05;
+
+/// At least so many minima are refined to the last step: the answer, and what it is compared with.
+const MIN_REFINED: usize = 4;
 
 /// Starts nearer to each other than this are one, unless their headings differ \[m\], at the paper's scale.
 const SAME_M: f64 = 0.3;
@@ -174,7 +178,8 @@ impl ManyStarts {
             return Err(Halt::from(Failure::FlatCost { cost, hypotheses }));
         }
         let refined = trace.stage(Stage::RefinePlane, |trace| {
-            search.refine(&starts, &self.in_the_plane(), price, trace)
+            let plan = self.in_the_plane();
+            self.refine(&mut search, &starts, &plan, self.params.finalists, price, trace)
         })?;
         let mut finalists = self.apart(refined, self.params.finalists, price);
         if let Some(smaller) = smaller.filter(|_| self.params.coarse_shrink > 1) {
@@ -184,7 +189,8 @@ impl ManyStarts {
             finalists.extend(level.starts(&more));
         }
         let mut refined = trace.stage(Stage::RefineSix, |trace| {
-            search.refine(&finalists, &self.in_six(), price, trace)
+            let plan = self.in_six();
+            self.refine(&mut search, &finalists, &plan, MIN_REFINED, price, trace)
         })?;
         // A walk may leave the disc, where no query can be.
         let reach_m = self.reach(problem);
@@ -227,6 +233,17 @@ impl ManyStarts {
         lattices.collect()
     }
 
+    /// The scores of the poses; of those that are as unlikely as can be, none.
+    fn score_thinkable<O: Objective>(&self, level: &Level<O>, poses: &[Pose]) -> Vec<Score> {
+        let thinkable = poses.iter().copied().filter(|pose| self.is_thinkable(pose));
+        let mut scores = level.objective.score(&thinkable.collect::<Vec<_>>()).into_iter();
+        let scored = poses.iter().map(|pose| {
+            let score = self.is_thinkable(pose).then(|| scores.next());
+            score.flatten().unwrap_or(Score { cost: None, covered: 0 })
+        });
+        scored.collect()
+    }
+
     /// Poses that two smaller copies of the photos lead to: the minima of the smallest, over a wider range
     /// of headings, refined there in six freedoms and again at half the size. Their basins are wider, so
     /// that they find what lies between the fine level's cells.
@@ -240,7 +257,7 @@ impl ManyStarts {
         let level = smaller(shrink_by);
         let mut surfaces = Vec::new();
         for lattice in self.lattices(problem, self.params.coarse_yaws)? {
-            let score = |poses: &[Pose]| level.objective.score(poses);
+            let score = |poses: &[Pose]| self.score_thinkable(&level, poses);
             let silently = |_: &[Scored]| trace.checkpoint();
             let batch = level.objective.batch(lattice.cells());
             let surface = scan(lattice, level.least_covered, batch, score, silently)?;
@@ -251,22 +268,25 @@ impl ManyStarts {
         let starts = starts(&surfaces, 2 * self.params.starts, price);
         let most_m = self.most_m();
         let plan = Shrinking { last_m: most_m.min(0.1), ..self.in_the_plane() };
-        let plane = level.refined(&starts, &plan, || trace.checkpoint())?;
+        let plane =
+            self.halved(&level, &starts, &plan, self.params.starts, price, || trace.checkpoint())?;
         let plan = Shrinking {
             freedoms: Freedoms::Six,
             first_m: most_m.min(0.2),
             last_m: most_m.min(0.05),
             ..plan
         };
+        let finalists = self.params.finalists;
         let best = self.apart(plane, self.params.starts, price);
-        let six = level.refined(&best, &plan, || trace.checkpoint())?;
+        let six = self.halved(&level, &best, &plan, finalists, price, || trace.checkpoint())?;
 
         let level = smaller(shrink_by.div_ceil(2));
         trace.checkpoint()?;
-        let poses: Vec<Pose> = six.iter().map(|refined| refined.pose).collect();
+        let best = self.apart(six, finalists, price);
+        let poses: Vec<Pose> = best.iter().map(|start| start.pose).collect();
         let plan = Shrinking { last_m: most_m.min(0.025), ..plan };
         let refined = level.refined(&level.starts(&poses), &plan, || trace.checkpoint())?;
-        let best = self.apart(refined, self.params.finalists, price);
+        let best = self.apart(refined, finalists, price);
         Ok(best.into_iter().map(|start| start.pose).collect())
     }
 }
@@ -302,24 +322,6 @@ impl<O: Objective> Search<'_, O> {
         })?;
         Ok(surface)
     }
-
-    /// Refines the starts and emits where they ended, the lowest price first.
-    fn refine(
-        &mut self,
-        starts: &[Start],
-        plan: &Shrinking,
-        price: impl Fn(&Pose, f64) -> f64,
-        trace: &mut Trace<'_>,
-    ) -> Result<Vec<Refined>, Cancelled> {
-        let mut refined = self.level.refined(starts, plan, || trace.checkpoint())?;
-        self.evaluations += refined.iter().map(|one| one.evaluations).sum::<u64>();
-        refined.sort_by(|a, b| price(&a.pose, a.cost).total_cmp(&price(&b.pose, b.cost)));
-        trace.emit(|| StartsRefined {
-            freedoms: plan.freedoms,
-            refinements: refined.as_slice().into(),
-        })?;
-        Ok(refined)
-    }
 }
 
 /// The best minima of all lattices, no two of them at one place with one heading.
@@ -344,6 +346,26 @@ fn starts(
 }
 
 impl ManyStarts {
+    /// Refines the starts, at least `fewest` of them to the end, and emits where they ended, the lowest price first.
+    fn refine<O: Objective>(
+        &self,
+        search: &mut Search<'_, O>,
+        starts: &[Start],
+        plan: &Shrinking,
+        fewest: usize,
+        price: impl Fn(&Pose, f64) -> f64,
+        trace: &mut Trace<'_>,
+    ) -> Result<Vec<Refined>, Cancelled> {
+        let refined =
+            self.halved(search.level, starts, plan, fewest, price, || trace.checkpoint())?;
+        search.evaluations += refined.iter().map(|one| one.evaluations).sum::<u64>();
+        trace.emit(|| StartsRefined {
+            freedoms: plan.freedoms,
+            refinements: refined.as_slice().into(),
+        })?;
+        Ok(refined)
+    }
+
     /// The best of those that are refined, each at a place of its own.
     fn apart(
         &self,
@@ -351,14 +373,9 @@ impl ManyStarts {
         most: usize,
         price: impl Fn(&Pose, f64) -> f64,
     ) -> Vec<Start> {
-        refined.sort_by(|a, b| price(&a.pose, a.cost).total_cmp(&price(&b.pose, b.cost)));
-        let mut kept: Vec<Start> = Vec::new();
-        for one in refined {
-            if kept.len() < most && kept.iter().all(|known| self.is_apart(&known.pose, &one.pose)) {
-                kept.push(Start { pose: one.pose, cost: one.cost });
-            }
-        }
-        kept
+        halving::sort_by_price(&mut refined, price);
+        let (kept, _) = self.partition(refined, most);
+        kept.iter().map(|one| Start { pose: one.pose, cost: one.cost }).collect()
     }
 
     fn is_apart(&self, a: &Pose, b: &Pose) -> bool {

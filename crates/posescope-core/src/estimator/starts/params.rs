@@ -26,8 +26,8 @@ parameters! {
         /// How many times smaller photos are for the coarse level, whose minima are finalists beside those
         /// of the fine one; 1 leaves it out.
         pub coarse_shrink: usize = 3 => count("coarse_shrink", "", 1..=16),
-        /// Lattices of the coarse level, each at a yaw of its own.
-        pub coarse_yaws: usize = 11 => count("coarse_yaws", "", 1..=61),
+        /// Lattices of the coarse level, each at a yaw of its own. The least likely poses are left out.
+        pub coarse_yaws: usize = 41 => count("coarse_yaws", "", 1..=61),
         /// Turn against the reference's heading at which a pose's penalty is one standard deviation of the coarse
         /// costs; twice the turn has four times the penalty.
         pub usual_yaw_deg: f64 = 8.0 => number("usual_yaw", "°", 0.1..=1000.0),
