@@ -78,11 +78,12 @@ def test_matches_give_verdicts_of_their_own_and_are_stored(street: posescope.Sce
     assert run.rows()[5]["diagnosis"][0]["code"].startswith("R")
     assert sorted(file.name for file in (folder / "failures").iterdir()) == ["bad-fb.rrd", "bad-live.rrd"]
     # The command reads the same matches from the folder.
-    stored = np.loadtxt(folder / "matches" / "good_000062_matches.txt")
+    stored = np.loadtxt(folder / "matches" / "good_000062_matches.txt", np.float32)
     assert np.array_equal(stored, np.hstack(right).astype(np.float32))
-    inliers = np.loadtxt(folder / "inliers" / "good_000062_matches.txt")
+    inliers = np.loadtxt(folder / "inliers" / "good_000062_matches.txt", np.float32)
     assert np.array_equal(inliers, stored[:8])
-    assert 'methods = ["live", "fb"]' in (folder / "run.toml").read_text()
+    text = (folder / "run.toml").read_text()
+    assert 'method = ["live", "fb"]' in text and f'matches = "{folder / "matches"}"' in text
     again = tmp_path / "again.jsonl"
     code = posescope.main(
         ["run", "street", "--query-scene", str(folder / "queries"), "--query", "good", "--reference", "62"]
