@@ -240,3 +240,15 @@ fn a_room_is_searched_at_its_own_scale() {
 fn says_no_metres(text: &str) {
     assert_eq!(crate::binary::first_metre(text), None);
 }
+
+/// From one place any camera and any depth explain what is seen; the cost has failed, and nothing else.
+#[test]
+fn photos_of_one_place_do_not_make_their_camera_suspect() {
+    let sequence = SmallSequence::write();
+    let asked = "run street --query-scene street:sun --query 600 --reference 600 --method pm";
+    sequence.run(&format!("{asked} --json pm.jsonl"));
+    let line = sequence.text("pm.jsonl");
+    let result: QueryResult = serde_json::from_str(&line).expect("a result");
+    assert!(result.diagnosis.iter().all(|found| found.code != Code::X1), "{line}");
+    assert!(result.diagnosis.iter().any(|found| found.code == Code::D2), "{line}");
+}

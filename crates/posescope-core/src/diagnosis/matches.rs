@@ -272,6 +272,7 @@ pub(super) struct Pairs {
     /// Of each match, the pixel in the query and that in the reference.
     pixels: Vec<[Point2<f64>; 2]>,
     cloud: ProjectedCloudIndex,
+    stated: Intrinsics,
     /// The camera whose pixels the cloud has: that of the reference with a wider image.
     wide: Intrinsics,
     query_from_reference: Pose,
@@ -299,11 +300,31 @@ impl Pairs {
         Some(Self {
             pixels: evidence.lifted.as_deref()?.iter().map(pixels).collect(),
             cloud: ProjectedCloudIndex::new(&tuple.cloud, &wide),
+            stated: *stated,
             wide,
             query_from_reference: subject.reference_from_truth()?.inverse(),
             radius_px: matching.depth_radius_px,
             threshold_px: true_match_px(matching.mlesac.inlier_threshold_px),
         })
+    }
+
+    /// Whether depths matter: from one place any depth explains a match. The parallax of most points must be more than
+    /// what a match may be off.
+    pub(super) fn test_depths(&self) -> bool {
+        let camera = &self.wide;
+        let parallax_px = |point: &Point3<f64>| {
+            let there = camera.project(&(self.query_from_reference * point))?;
+            let turned = camera.project(&(self.query_from_reference.rotation * point))?;
+            Some((there - turned).norm())
+        };
+        let points = self.pixels.iter().filter_map(|[_, seen]| {
+            let at = self.stated.unproject(seen, 1.0);
+            let depths = self.cloud.read(&camera.project(&at)?, self.radius_px).within?;
+            Some(at * depths.nearest)
+        });
+        let parallaxes: Vec<f64> = points.filter_map(|point| parallax_px(&point)).collect();
+        let enough = parallaxes.iter().filter(|parallax| **parallax > self.threshold_px).count();
+        2 * enough > parallaxes.len()
     }
 
     /// How many matches the truth explains with the depths of the cloud, if both photos are of this camera; and how many

@@ -234,11 +234,11 @@ impl ManyStarts {
     }
 
     /// The scores of the poses; of those that are as unlikely as can be, none.
-    fn score_thinkable<O: Objective>(&self, level: &Level<O>, poses: &[Pose]) -> Vec<Score> {
-        let thinkable = poses.iter().copied().filter(|pose| self.is_thinkable(pose));
-        let mut scores = level.objective.score(&thinkable.collect::<Vec<_>>()).into_iter();
+    fn score_plausible<O: Objective>(&self, level: &Level<O>, poses: &[Pose]) -> Vec<Score> {
+        let plausible = poses.iter().copied().filter(|pose| self.is_plausible(pose));
+        let mut scores = level.objective.score(&plausible.collect::<Vec<_>>()).into_iter();
         let scored = poses.iter().map(|pose| {
-            let score = self.is_thinkable(pose).then(|| scores.next());
+            let score = self.is_plausible(pose).then(|| scores.next());
             score.flatten().unwrap_or(Score { cost: None, covered: 0 })
         });
         scored.collect()
@@ -257,7 +257,7 @@ impl ManyStarts {
         let level = smaller(shrink_by);
         let mut surfaces = Vec::new();
         for lattice in self.lattices(problem, self.params.coarse_yaws)? {
-            let score = |poses: &[Pose]| self.score_thinkable(&level, poses);
+            let score = |poses: &[Pose]| self.score_plausible(&level, poses);
             let silently = |_: &[Scored]| trace.checkpoint();
             let batch = level.objective.batch(lattice.cells());
             let surface = scan(lattice, level.least_covered, batch, score, silently)?;

@@ -20,7 +20,7 @@ impl ManyStarts {
     }
 
     /// Whether a pose is not as unlikely as can be.
-    pub(super) fn is_thinkable(&self, pose: &Pose) -> bool {
+    pub(super) fn is_plausible(&self, pose: &Pose) -> bool {
         self.params.unlikely == 0.0 || self.unlikeliness(pose) < self.params.unlikely
     }
 

@@ -55,6 +55,9 @@ pub(super) fn camera_of_both(case: &Case<'_>, matches: &TrueMatches) -> Option<S
         return None;
     }
     let pairs = Pairs::of(case.subject, &case.matching())?;
+    if !pairs.test_depths() {
+        return None;
+    }
     // The focal length's exponent, whether the centre is scaled with it, and the centre's way to the right.
     let other = |(exponent, with_centre, aside): (f64, bool, f64)| {
         let scale = exponent.exp2();
