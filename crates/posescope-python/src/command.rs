@@ -22,7 +22,10 @@ const USAGE: u8 = 2;
 /// Runs the command `posescope` with these arguments, the program's name first, and returns its exit code.
 #[pyfunction]
 pub fn main(py: Python<'_>, arguments: Vec<OsString>) -> u8 {
-    py.detach(|| cli::run(arguments))
+    let code = py.detach(|| cli::run(arguments));
+    // The program prints panics; those of later calls are exceptions again.
+    errors::keep_panics_silent();
+    code
 }
 
 /// Runs `posescope eval`. Returns the run folder, and why the run is not good enough.

@@ -81,6 +81,9 @@ def test_a_forked_process_localises_too(street: posescope.Scene) -> None:
 
 
 def test_a_panic_is_an_exception_and_prints_nothing(capfd: pytest.CaptureFixture[str]) -> None:
+    # The command prints panics in a way of its own, which must end with it.
+    posescope.main(["--version"])
+    capfd.readouterr()
     with pytest.raises(posescope.InternalError, match=r"a panic on purpose \(.*detached\.rs:\d+\)"):
         posescope._posescope.panic()
     assert capfd.readouterr() == ("", "")
