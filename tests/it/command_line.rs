@@ -242,3 +242,12 @@ fn an_evaluation_fits_eighty_columns_and_is_markdown_in_a_pipe() {
     assert_eq!(label.map(|line| line.split_whitespace().count()), Some(4), "{narrow}");
     has(&printed(&sequence, &line("b"), None), "|:--|--:|");
 }
+
+/// The street turns by 45° between the two; the search looks there because a vehicle turns with the road.
+#[test]
+fn a_query_behind_a_bend_is_found_by_the_search() {
+    let folder = TempDir::new().expect("a folder");
+    let asked = "run street --query 127 --reference 120 --radius 10 --method mi6 --json - -q";
+    let results = objects(&run_in(folder.path(), asked).ok().out);
+    assert_eq!(results[0]["grade"], "right", "{}", results[0]["error"]);
+}

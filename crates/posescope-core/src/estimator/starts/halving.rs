@@ -1,7 +1,7 @@
-//! Refining many starts, of which ever fewer go on.
+//! Refining many starts, and ending the worse ones early.
 //!
-//! Successive halving: most starts show after a few long steps that they lead to no good minimum, or to one that a
-//! better start leads to as well. Each time the step is halved, the dearer half of them ends.
+//! This is successive halving. After a few long steps, most starts are seen to lead to a high minimum, or to the minimum
+//! of a better start. Each time the step is halved, the search drops the half with the higher prices.
 
 use super::{Level, ManyStarts};
 use crate::geometry::Pose;
