@@ -248,6 +248,6 @@ fn an_evaluation_fits_eighty_columns_and_is_markdown_in_a_pipe() {
 fn a_query_behind_a_bend_is_found_by_the_search() {
     let folder = TempDir::new().expect("a folder");
     let asked = "run street --query 127 --reference 120 --radius 10 --method mi6 --json - -q";
-    let results = objects(&run_in(folder.path(), asked).ok().out);
+    let results: Vec<Value> = objects(&run_in(folder.path(), asked).ok().out);
     assert_eq!(results[0]["grade"], "right", "{}", results[0]["error"]);
 }
