@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
-"""Plants thirteen mistakes of a whole scene, and asks whether a run names each as a finding.
+"""Plants mistakes of a whole scene, and asks whether a run names each as a finding.
 
     studies/scene-mistakes.py PROGRAM [OUT] [-- OPTIONS OF EVAL]
+    studies/scene-mistakes.py --aside PROGRAM [OUT] [-- OPTIONS OF EVAL]   # the mistakes and the scene that were set aside
 
 Writes the street with exact poses into OUT, plants one mistake in a copy, evaluates it, and prints the findings in
 `summary.json`. Needs Python 3.9 with numpy and Pillow.
@@ -72,11 +73,25 @@ def of_other_frames(scene):
         path.write_bytes(clouds[(at + 2) % len(paths)])
 
 
+def upside_down(scene):
+    for path in (scene / "photos").iterdir():
+        Image.open(path).transpose(Image.Transpose.ROTATE_180).save(path)
+
+
+def photos_of_other_frames(scene):
+    paths = sorted((scene / "photos").iterdir())
+    photos = [path.read_bytes() for path in paths]
+    for at, path in enumerate(paths):
+        path.write_bytes(photos[(at + 3) % len(paths)])
+
+
 def half_size(value):
     return (value + 0.5) / 2 - 0.5
 
 
 Y_UP = np.diag([1.0, -1.0, -1.0, 1.0])
+# x stays, the camera's y is z, and its z is -y.
+Z_UP = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
 MISTAKES = {
     "focal length × 0.8": lambda s: for_camera(s, fx=lambda f: 0.8 * f, fy=lambda f: 0.8 * f),
     "focal length × 1.3": lambda s: for_camera(s, fx=lambda f: 1.3 * f, fy=lambda f: 1.3 * f),
@@ -96,6 +111,27 @@ MISTAKES = {
     "clouds shifted by 1 m": lambda s: for_clouds(s, lambda points: points + [0, 1, 0]),
     "clouds of the next frame but one": of_other_frames,
 }
+# Written down before any of them was planted; the scene is the street in sun.
+ASIDE = {
+    "focal length × 0.87": lambda s: for_camera(s, fx=lambda f: 0.87 * f, fy=lambda f: 0.87 * f),
+    "focal length × 1.5": lambda s: for_camera(s, fx=lambda f: 1.5 * f, fy=lambda f: 1.5 * f),
+    "camera of twice the size": lambda s: for_camera(
+        s, fx=lambda f: 2 * f, fy=lambda f: 2 * f, cx=lambda c: 2 * c + 0.5, cy=lambda c: 2 * c + 0.5
+    ),
+    "centre 50 px down": lambda s: for_camera(s, cy=lambda c: c + 50),
+    "rotations inverted": lambda s: for_poses(
+        s, lambda pose: np.block([[pose[:3, :3].T, pose[:3, 3:]], [pose[3:]]])
+    ),
+    "poses of a camera with z up": lambda s: for_poses(s, lambda pose: pose @ Z_UP),
+    "poses in feet": lambda s: for_poses(
+        s, lambda pose: np.block([[pose[:3, :3], pose[:3, 3:] / 0.3048], [pose[3:]]])
+    ),
+    "clouds in feet": lambda s: for_clouds(s, lambda points: points / 0.3048),
+    "photos upside down": upside_down,
+    "clouds turned by 3° about x": lambda s: for_clouds(s, turned("x", 3)),
+    "clouds shifted by 0.8 m to the right": lambda s: for_clouds(s, lambda points: points + [0.8, 0, 0]),
+    "photos of the next frame but two": photos_of_other_frames,
+}
 
 
 def findings(program, scene, out, options):
@@ -104,20 +140,20 @@ def findings(program, scene, out, options):
     return json.loads((out / "summary.json").read_text()).get("findings", [])
 
 
-def main(program, out, options):
+def main(program, out, options, condition="overcast", mistakes=MISTAKES):
     sound = out / "street"
     if not sound.exists():
         written = out / "written"
-        layout = ["--layout", "toml", "--condition", "overcast"]
+        layout = ["--layout", "toml", "--condition", condition]
         subprocess.run([program, "synth", str(written), *layout], check=True)
-        shutil.move(written / "overcast", sound)
+        shutil.move(written / condition, sound)
         for kind in ("photos", "scans"):
             for path in sorted((sound / kind).iterdir())[KEPT:]:
                 path.unlink()
         rows = (sound / "poses.txt").read_text().splitlines()[:KEPT]
         (sound / "poses.txt").write_text("\n".join(rows) + "\n")
     found = 0
-    cases = {"nothing": lambda scene: None, **MISTAKES}
+    cases = {"nothing": lambda scene: None, **mistakes}
     for name, plant in cases.items():
         scene, run = out / "planted", out / "run"
         for old in (scene, run):
@@ -127,17 +163,20 @@ def main(program, out, options):
         texts = [one["text"] for one in findings(program, scene, run, options)]
         print(f"{name}: {' | '.join(texts) or '–'}", flush=True)
         found += bool(texts) and name != "nothing"
-    print(f"{found} of {len(MISTAKES)} have a finding; whether it is the right one is for you to read")
+    print(f"{found} of {len(mistakes)} have a finding; whether it is the right one is for you to read")
 
 
 if __name__ == "__main__":
     own, _, options = "\0".join(sys.argv[1:]).partition("\0--\0")
     own = own.split("\0")
-    if not own[0]:
+    aside = own[0] == "--aside"
+    own = own[aside:]
+    if not own or not own[0]:
         sys.exit(__doc__)
+    arguments = {"condition": "sun", "mistakes": ASIDE} if aside else {}
     options = options.split("\0") if options else []
     if len(own) > 1:
-        main(own[0], Path(own[1]), options)
+        main(own[0], Path(own[1]), options, **arguments)
     else:
         with tempfile.TemporaryDirectory() as folder:
-            main(own[0], Path(folder), options)
+            main(own[0], Path(folder), options, **arguments)
