@@ -43,7 +43,7 @@ picture D8 street street:rain 390 399 pm --method pm
 picture H1 street street:sun 167 153 hy --method fb,mi,hy
 picture F1 street street:rain 224 219 fb --method fb --reference 218 --reference 237 --fusion avg
 picture F2 street street 589 583 end --method mi6 --reference 595 --fusion joint
-picture V1 street street:snow 75 retrieved end --method fb --reference retrieve:1 --prior 400 \
+picture V1 street street:snow 75 retrieved end --method fb --reference retrieve:1 --prior 100 \
     --index "$made/street.index"
 picture E1 street street 589 583 end --method other,mi --estimates other="$made/poses.txt"
 picture L1 street:snow street:night 719 709 mi --method mi

@@ -6,6 +6,7 @@ use super::{Panel, ProofCase, ProofPicture, Thing, is_near};
 use crate::event::{PoseRefined, ReferencesFused, ReferencesRanked};
 use crate::geometry::Pose;
 use crate::palette;
+use crate::retrieval::ReferenceRanking;
 
 /// Side of a map \[px\], and what is left free at its border.
 const SIDE: u32 = 560;
@@ -103,14 +104,19 @@ impl Map {
         }
     }
 
-    fn circle(&mut self, radius_m: f64) {
+    fn circle(&mut self, [right_m, forward_m]: [f64; 2], radius_m: f64) {
         let points = (0..=96).map(|step| {
             let angle = f64::from(step) * std::f64::consts::TAU / 96.0;
-            self.place([radius_m * angle.cos(), radius_m * angle.sin()])
+            self.place([right_m + radius_m * angle.cos(), forward_m + radius_m * angle.sin()])
         });
         let points: Vec<[f32; 2]> = points.collect();
         self.panel.line([0x90; 3], 1.5, points);
     }
+}
+
+/// Two corners of the square around a circle.
+fn square([right_m, forward_m]: [f64; 2], radius_m: f64) -> [[f64; 2]; 2] {
+    [-radius_m, radius_m].map(|by_m| [right_m + by_m, forward_m + by_m])
 }
 
 /// Metres to the right and ahead.
@@ -135,11 +141,11 @@ pub(super) fn pose_map(case: &ProofCase<'_>) -> ProofPicture {
     let radius_m = problem.believed_within_m();
     let is_alone = shares.is_empty();
     if is_alone {
-        places.extend([[-radius_m, -radius_m], [radius_m, radius_m]]);
+        places.extend(square([0.0; 2], radius_m));
     }
     let mut map = Map::around("Poses from above", &places);
     if is_alone {
-        map.circle(radius_m);
+        map.circle([0.0; 2], radius_m);
     }
     let name = format!("reference {}", problem.reference.name);
     for (share, pose) in &each {
@@ -196,9 +202,34 @@ pub(super) fn ranking(case: &ProofCase<'_>) -> Option<ProofPicture> {
         }
         beside.push(panel);
     }
+    beside.extend(narrowed(case, ranking));
     Some(ProofPicture {
         large: Panel::photo("Query", &case.problem.query.photo),
         below: None,
         beside,
     })
+}
+
+/// How retrieval narrows down where the query is: from the prior around its position to the radius around the
+/// first of the ranked frames. `None` where there is no prior, or no position.
+fn narrowed(case: &ProofCase<'_>, ranking: &ReferenceRanking) -> Option<Panel> {
+    let problem = case.problem;
+    let [prior_m, radius_m] = [problem.prior_m?, problem.uncertainty_radius_m];
+    let truth = problem.reference_from_query(case.truth?);
+    let frames = ranking.pictured().iter().take(RANKED);
+    let poses = frames.map(|frame| Some(problem.reference_from_query(&frame.world_from_camera?)));
+    let poses: Vec<Option<Pose>> = poses.collect();
+    let circles = [(ground(&truth), prior_m), ([0.0; 2], radius_m)];
+    let mut places = circles.map(|(centre, radius)| square(centre, radius)).concat();
+    places.extend(poses.iter().flatten().map(ground));
+    let mut map = Map::around("Prior and radius", &places);
+    for (centre, radius) in circles {
+        map.circle(centre, radius);
+    }
+    for (rank, pose) in poses.iter().enumerate() {
+        let Some(pose) = pose else { continue };
+        map.camera(Thing::Reference, pose, &format!("{}.", rank + 1));
+    }
+    map.camera(Thing::Truth, &truth, "truth");
+    Some(map.panel)
 }
