@@ -34,8 +34,8 @@ pub enum Mistake {
     CloudAxes,
     /// The camera parameters belong to another camera.
     WrongCamera,
-    /// Clouds, or poses, are in millimetres.
-    Millimetres,
+    /// Clouds, or poses, are in millimetres, centimetres or feet.
+    Units,
     /// Quaternions are written scalar first and read scalar last, or vice versa.
     QuaternionOrder,
     /// Each cloud belongs to the frame before or after.
@@ -68,7 +68,7 @@ impl Mistake {
                 "the clouds use the axes forward, left, up of a scanner instead of right, down, forward"
             }
             Self::WrongCamera => "the camera parameters are those of another camera",
-            Self::Millimetres => "poses and clouds use different units of length (millimetres?)",
+            Self::Units => "poses and clouds use different units of length",
             Self::QuaternionOrder => "the quaternions have the other order (w first or last)",
             Self::CloudOfNeighbour => "the clouds are one frame off",
             Self::Degrees => "the poses' angles are in degrees but read as radians, or vice versa",
@@ -100,7 +100,7 @@ impl Mistake {
             | Self::MirroredCloud
             | Self::MovedCloud => Subject::Clouds,
             Self::WrongCamera | Self::UndistortedTwice => Subject::Camera,
-            Self::Millimetres => Subject::Units,
+            Self::Units => Subject::Units,
         }
     }
 }
@@ -129,6 +129,8 @@ pub(super) enum Change {
     Aside(f64),
     /// A scaled focal length and a shifted principal point \[px\].
     Camera { times: f64, right: f64, down: f64 },
+    /// Photos so many times as large, and their cameras with them.
+    Resized(f64),
     /// An additional radial distortion k1.
     Lens(f64),
     /// Clouds so many times as large.
@@ -183,11 +185,25 @@ impl Change {
                 };
                 (camera, 0.0)
             }
+            Self::Resized(times) => {
+                let centre = |c: f64| (c + 0.5) * times - 0.5;
+                let camera = Intrinsics {
+                    fx: stated.fx * times,
+                    fy: stated.fy * times,
+                    cx: centre(stated.cx),
+                    cy: centre(stated.cy),
+                    ..*stated
+                };
+                (camera, 0.0)
+            }
             Self::Lens(k1) => (*stated, k1),
             _ => (*stated, 0.0),
         }
     }
 }
+
+/// A foot \[m\].
+const FOOT_M: f64 = 0.3048;
 
 /// The readings that need no search.
 pub(super) fn readings() -> Vec<Reading> {
@@ -196,6 +212,11 @@ pub(super) fn readings() -> Vec<Reading> {
     use Mistake as M;
     vec![
         reading(M::InversePose, "invert each pose", Change::Pose(|pose| pose.inverse())),
+        reading(
+            M::InversePose,
+            "invert the rotation of each pose, and leave its position",
+            Change::Pose(|pose| Pose::from_parts(pose.translation, pose.rotation.inverse())),
+        ),
         reading(
             M::PoseAxes,
             "rotate the axes of each pose to right, down, forward",
@@ -211,8 +232,22 @@ pub(super) fn readings() -> Vec<Reading> {
             "rotate the axes of each cloud to right, down, forward",
             Change::Points(|p| Point3::new(-p.y, -p.z, p.x)),
         ),
-        reading(M::Millimetres, "divide the coordinates of clouds by 1000", Change::Size(1e-3)),
-        reading(M::Millimetres, "divide the positions of poses by 1000", Change::Size(1e3)),
+        reading(M::Units, "divide the coordinates of clouds by 1000", Change::Size(1e-3)),
+        reading(M::Units, "divide the coordinates of clouds by 100", Change::Size(1e-2)),
+        reading(M::Units, "multiply the coordinates of clouds by 0.3048", Change::Size(FOOT_M)),
+        reading(M::Units, "divide the positions of poses by 1000", Change::Size(1e3)),
+        reading(M::Units, "divide the positions of poses by 100", Change::Size(1e2)),
+        reading(M::Units, "multiply the positions of poses by 0.3048", Change::Size(1.0 / FOOT_M)),
+        reading(
+            M::WrongCamera,
+            "halve the camera parameters, which are those of photos of twice the size",
+            Change::Resized(0.5),
+        ),
+        reading(
+            M::WrongCamera,
+            "double the camera parameters, which are those of photos of half the size",
+            Change::Resized(2.0),
+        ),
         reading(
             M::QuaternionOrder,
             "read quaternions as w x y z",

@@ -15,14 +15,17 @@ use crate::planted::{Fault, Planted};
 use crate::small_sequence::SmallSequence;
 
 /// What each fault is to be called; half a pixel is less than clouds and photos agree by.
-const EXPECTED: [(Fault, Option<Mistake>); 18] = [
+const EXPECTED: [(Fault, Option<Mistake>); 21] = [
     (Fault::Nothing, None),
     (Fault::InversePose, Some(Mistake::InversePose)),
+    (Fault::InverseRotation, Some(Mistake::InversePose)),
     (Fault::PoseAxes, Some(Mistake::PoseAxes)),
     (Fault::CloudAxes, Some(Mistake::CloudAxes)),
     (Fault::WrongCamera, Some(Mistake::WrongCamera)),
-    (Fault::MillimetrePoses, Some(Mistake::Millimetres)),
-    (Fault::MillimetreClouds, Some(Mistake::Millimetres)),
+    (Fault::ResizedPhotos, Some(Mistake::WrongCamera)),
+    (Fault::FootPoses, Some(Mistake::Units)),
+    (Fault::MillimetrePoses, Some(Mistake::Units)),
+    (Fault::MillimetreClouds, Some(Mistake::Units)),
     (Fault::QuaternionOrder, Some(Mistake::QuaternionOrder)),
     (Fault::HalfPixel, None),
     (Fault::CloudOneFrameOff, Some(Mistake::CloudOfNeighbour)),

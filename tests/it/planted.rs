@@ -17,9 +17,12 @@ use crate::binary::write;
 pub enum Fault {
     Nothing,
     InversePose,
+    InverseRotation,
     PoseAxes,
     CloudAxes,
     WrongCamera,
+    ResizedPhotos,
+    FootPoses,
     MillimetrePoses,
     MillimetreClouds,
     QuaternionOrder,
@@ -78,6 +81,11 @@ impl<'a> Planted<'a> {
     }
 }
 
+/// The pose with its position so many times as far from the origin.
+fn larger(pose: &Pose, times: f64) -> Pose {
+    Pose::from_parts(Translation3::from(pose.translation.vector * times), pose.rotation)
+}
+
 /// From x right, y down, z forward to x forward, y left, z up.
 fn flu_from_rdf() -> Pose {
     let turn = Matrix3::new(0.0, 0.0, 1.0, -1.0, 0.0, 0.0, 0.0, -1.0, 0.0);
@@ -134,6 +142,13 @@ impl Scene for Planted<'_> {
                 cx: camera.cx + 18.0,
                 ..camera
             },
+            Fault::ResizedPhotos => Intrinsics {
+                fx: camera.fx * 2.0,
+                fy: camera.fy * 2.0,
+                cx: camera.cx * 2.0 + 0.5,
+                cy: camera.cy * 2.0 + 0.5,
+                ..camera
+            },
             Fault::HalfPixel => Intrinsics { cx: camera.cx + 0.5, cy: camera.cy + 0.5, ..camera },
             _ => camera,
         }
@@ -144,10 +159,9 @@ impl Scene for Planted<'_> {
         Some(match self.fault {
             Fault::InversePose => pose.inverse(),
             Fault::PoseAxes => pose * flu_from_rdf().inverse(),
-            Fault::MillimetrePoses => Pose::from_parts(
-                Translation3::from(pose.translation.vector * 1000.0),
-                pose.rotation,
-            ),
+            Fault::InverseRotation => Pose::from_parts(pose.translation, pose.rotation.inverse()),
+            Fault::FootPoses => larger(&pose, 1.0 / 0.3048),
+            Fault::MillimetrePoses => larger(&pose, 1000.0),
             Fault::QuaternionOrder => {
                 let q = pose.rotation.coords;
                 let read = Quaternion::new(q.z, q.w, q.x, q.y);
