@@ -40,16 +40,17 @@ impl Judge {
         params: &JudgeParams,
         shrink: u32,
     ) -> Self {
-        let query = &problem.query;
+        let (query, reference) = (&problem.query, &problem.reference);
         let bytes = |bins: &Vec<Bins>| size_of_val(bins.as_slice());
-        let bins = query
-            .memo
-            .recall((params, shrink), bytes, || query_bins(&query.photo.gray, params, shrink));
-        let reference = &problem.reference;
-        let points =
-            reference.memo.recall((params, render, shrink), ShownPoints::heap_bytes, || {
-                reference_points(problem, render, params, shrink)
-            });
+        let query_made = || query_bins(&query.photo.gray, params, shrink);
+        let reference_made = || reference_points(problem, render, params, shrink);
+        let (bins, points) = rayon::join(
+            || query.memo.recall((params, shrink), bytes, query_made),
+            || {
+                let key = (params, render, shrink);
+                reference.memo.recall(key, ShownPoints::heap_bytes, reference_made)
+            },
+        );
         Self {
             reference: points.value,
             query: bins.value,
