@@ -1,7 +1,9 @@
 use super::*;
 use crate::diagnosis::RULES;
+use crate::event::ReferencesRanked;
 use crate::history::History;
 use crate::localize::{LocalizeError, LocalizeObserver, Localizer, Request};
+use crate::retrieval::{Criterion, Geometry, Ranked, RankedReference, ReferenceRanking};
 use crate::scene;
 use crate::trace::{Cancelled, Sink};
 
@@ -364,4 +366,52 @@ fn reference_and_truth_at_one_place_share_a_label() {
             );
         }
     }
+}
+
+/// The map has the prior around the truth, and the ranked frames where they are.
+#[test]
+fn the_map_of_a_ranking_is_true_to_scale_and_needs_a_prior() {
+    let (mut kept, mut result) = neighbours(Method::FB);
+    result.diagnosis = vec![crate::diagnosis::Diagnosis {
+        code: crate::diagnosis::Code::V1,
+        text: String::new(),
+        evidence: Default::default(),
+    }];
+    let truth = kept.truth.expect("the street has poses");
+    let ranked = |frame: usize, ahead_m: f64| RankedReference {
+        name: frame.to_string(),
+        world_from_camera: Some(truth * Pose::translation(0.0, 0.0, ahead_m)),
+        ranked: Ranked { frame, score: 0.5, geometry: Geometry::Unchecked },
+    };
+    let ranking = ReferenceRanking {
+        criterion: Criterion::Words,
+        candidates: 9,
+        chosen: 1,
+        frames: vec![ranked(7, 30.0), ranked(8, -10.0)],
+    };
+    let event = ReferencesRanked { ranking: ranking.into(), photos: vec![None; 2].into() };
+    let told = |kept: &Kept| {
+        let mut record = kept.history.records()[0].clone();
+        record.event = event.clone().into();
+        let records = [record];
+        let params = Params::default();
+        let case = ProofCase { records: &records, ..kept.case(&result, &params) };
+        ProofPicture::of(&case).expect("a ranking").beside
+    };
+    assert!(told(&kept).is_empty(), "without a prior nothing is narrowed down");
+
+    kept.problems[0].prior_m = Some(40.0);
+    let beside = told(&kept);
+    let map = &beside[0];
+    let at = |label: &str| {
+        let mark = map.marks.iter().find(|mark| mark.label == label);
+        mark.unwrap_or_else(|| panic!("no {label}")).at
+    };
+    let apart = |a: [f32; 2], b: [f32; 2]| (a[0] - b[0]).hypot(a[1] - b[1]);
+    let px_per_m = apart(at("1."), at("truth")) / 30.0;
+    assert!((apart(at("2."), at("truth")) / px_per_m - 10.0).abs() < 0.01);
+    let circles = map.lines.iter().filter(|line| line.points.len() == 97);
+    let radii: Vec<f32> =
+        circles.map(|circle| apart(circle.points[0], circle.points[48]) / 2.0 / px_per_m).collect();
+    assert!((radii[0] - 40.0).abs() < 0.01 && (radii[1] - 5.0).abs() < 0.01, "{radii:?}");
 }
