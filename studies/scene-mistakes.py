@@ -61,28 +61,16 @@ def turned(axis, degrees):
     return lambda points: points @ turn.T
 
 
-def mirrored(scene):
+def transposed(scene, how):
     for path in (scene / "photos").iterdir():
-        Image.open(path).transpose(Image.Transpose.FLIP_LEFT_RIGHT).save(path)
+        Image.open(path).transpose(how).save(path)
 
 
-def of_other_frames(scene):
-    paths = sorted((scene / "scans").iterdir())
-    clouds = [path.read_bytes() for path in paths]
+def of_other_frames(scene, kind, step):
+    paths = sorted((scene / kind).iterdir())
+    files = [path.read_bytes() for path in paths]
     for at, path in enumerate(paths):
-        path.write_bytes(clouds[(at + 2) % len(paths)])
-
-
-def upside_down(scene):
-    for path in (scene / "photos").iterdir():
-        Image.open(path).transpose(Image.Transpose.ROTATE_180).save(path)
-
-
-def photos_of_other_frames(scene):
-    paths = sorted((scene / "photos").iterdir())
-    photos = [path.read_bytes() for path in paths]
-    for at, path in enumerate(paths):
-        path.write_bytes(photos[(at + 3) % len(paths)])
+        path.write_bytes(files[(at + step) % len(paths)])
 
 
 def half_size(value):
@@ -105,11 +93,11 @@ MISTAKES = {
         s, lambda pose: np.block([[pose[:3, :3], 1000 * pose[:3, 3:]], [pose[3:]]])
     ),
     "clouds in millimetres": lambda s: for_clouds(s, lambda points: 1000 * points),
-    "mirrored photos": mirrored,
+    "mirrored photos": lambda s: transposed(s, Image.Transpose.FLIP_LEFT_RIGHT),
     "clouds turned by 4° about y": lambda s: for_clouds(s, turned("y", 4)),
     "clouds turned by 4° about x": lambda s: for_clouds(s, turned("x", 4)),
     "clouds shifted by 1 m": lambda s: for_clouds(s, lambda points: points + [0, 1, 0]),
-    "clouds of the next frame but one": of_other_frames,
+    "clouds of the next frame but one": lambda s: of_other_frames(s, "scans", 2),
 }
 # Written down before any of them was planted; the scene is the street in sun.
 ASIDE = {
@@ -127,10 +115,10 @@ ASIDE = {
         s, lambda pose: np.block([[pose[:3, :3], pose[:3, 3:] / 0.3048], [pose[3:]]])
     ),
     "clouds in feet": lambda s: for_clouds(s, lambda points: points / 0.3048),
-    "photos upside down": upside_down,
+    "photos upside down": lambda s: transposed(s, Image.Transpose.ROTATE_180),
     "clouds turned by 3° about x": lambda s: for_clouds(s, turned("x", 3)),
     "clouds shifted by 0.8 m to the right": lambda s: for_clouds(s, lambda points: points + [0.8, 0, 0]),
-    "photos of the next frame but two": photos_of_other_frames,
+    "photos of the next frame but two": lambda s: of_other_frames(s, "photos", 3),
 }
 
 

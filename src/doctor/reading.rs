@@ -34,7 +34,7 @@ pub enum Mistake {
     CloudAxes,
     /// The camera parameters belong to another camera.
     WrongCamera,
-    /// Clouds, or poses, are in millimetres, centimetres or feet.
+    /// Clouds or poses are in millimetres or centimetres, or poses in feet.
     Units,
     /// Quaternions are written scalar first and read scalar last, or vice versa.
     QuaternionOrder,
@@ -234,7 +234,6 @@ pub(super) fn readings() -> Vec<Reading> {
         ),
         reading(M::Units, "divide the coordinates of clouds by 1000", Change::Size(1e-3)),
         reading(M::Units, "divide the coordinates of clouds by 100", Change::Size(1e-2)),
-        reading(M::Units, "multiply the coordinates of clouds by 0.3048", Change::Size(FOOT_M)),
         reading(M::Units, "divide the positions of poses by 1000", Change::Size(1e3)),
         reading(M::Units, "divide the positions of poses by 100", Change::Size(1e2)),
         reading(M::Units, "multiply the positions of poses by 0.3048", Change::Size(1.0 / FOOT_M)),

@@ -15,7 +15,7 @@ use crate::planted::{Fault, Planted};
 use crate::small_sequence::SmallSequence;
 
 /// What each fault is to be called; half a pixel is less than clouds and photos agree by.
-const EXPECTED: [(Fault, Option<Mistake>); 21] = [
+const EXPECTED: [(Fault, Option<Mistake>); 22] = [
     (Fault::Nothing, None),
     (Fault::InversePose, Some(Mistake::InversePose)),
     (Fault::InverseRotation, Some(Mistake::InversePose)),
@@ -26,6 +26,7 @@ const EXPECTED: [(Fault, Option<Mistake>); 21] = [
     (Fault::FootPoses, Some(Mistake::Units)),
     (Fault::MillimetrePoses, Some(Mistake::Units)),
     (Fault::MillimetreClouds, Some(Mistake::Units)),
+    (Fault::CentimetreClouds, Some(Mistake::Units)),
     (Fault::QuaternionOrder, Some(Mistake::QuaternionOrder)),
     (Fault::HalfPixel, None),
     (Fault::CloudOneFrameOff, Some(Mistake::CloudOfNeighbour)),
@@ -37,6 +38,20 @@ const EXPECTED: [(Fault, Option<Mistake>); 21] = [
     (Fault::LoweredCloud, Some(Mistake::MovedCloud)),
     (Fault::ReversedPoses, Some(Mistake::ReversedPoses)),
     (Fault::UndistortedTwice, Some(Mistake::UndistortedTwice)),
+];
+
+/// What mends those that one word names as others are named.
+const REMEDIES: [(Fault, &str); 7] = [
+    (Fault::InversePose, "invert each pose"),
+    (Fault::InverseRotation, "invert the rotation of each pose, and leave its position"),
+    (
+        Fault::ResizedPhotos,
+        "halve the camera parameters, which are those of photos of twice the size",
+    ),
+    (Fault::FootPoses, "multiply the positions of poses by 0.3048"),
+    (Fault::MillimetrePoses, "divide the positions of poses by 1000"),
+    (Fault::MillimetreClouds, "divide the coordinates of clouds by 1000"),
+    (Fault::CentimetreClouds, "divide the coordinates of clouds by 100"),
 ];
 
 /// The faults that every change is held to: of a pose, a cloud and a camera, of nothing, and of too little.
@@ -68,6 +83,9 @@ fn are_named(is_planted: impl Fn(Fault) -> bool) {
         let named = found.finding.as_ref().map(|finding| finding.mistake);
         println!("{fault:?}: {named:?} {:?}", found.remarks);
         assert_eq!(named, expected, "{fault:?}");
+        if let Some((_, remedy)) = REMEDIES.iter().find(|(of, _)| *of == fault) {
+            assert_eq!(found.finding.as_ref().expect("one was named").remedy, *remedy, "{fault:?}");
+        }
         assert_eq!(found.is_broken(), expected.is_some(), "{fault:?}");
     }
 }

@@ -25,6 +25,7 @@ pub enum Fault {
     FootPoses,
     MillimetrePoses,
     MillimetreClouds,
+    CentimetreClouds,
     QuaternionOrder,
     HalfPixel,
     CloudOneFrameOff,
@@ -206,6 +207,7 @@ impl Scene for Planted<'_> {
         Ok(match self.fault {
             Fault::CloudAxes => moved(&|p| Point3::new(p.z, -p.x, -p.y)),
             Fault::MillimetreClouds => moved(&|p| p * 1000.0),
+            Fault::CentimetreClouds => moved(&|p| p * 100.0),
             Fault::LeftForRight => moved(&|p| Point3::new(p.x + BASELINE_M as f32, p.y, p.z)),
             Fault::MirroredCloud => moved(&|p| Point3::new(-p.x, p.y, p.z)),
             Fault::TurnedCloud => {
