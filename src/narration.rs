@@ -145,10 +145,12 @@ pub(crate) fn about(stage: Stage) -> &'static str {
             "From the reference it goes downhill, first over blurred photos, then over sharper ones."
         }
         Stage::SearchCoarse => {
-            "Smaller copies of the photos have wider basins, so it searches them first."
+            "Smaller copies of the photos have wider basins, so it searches them for starts."
         }
         Stage::RefinePlane => "The best coarse minima go downhill in position and heading.",
-        Stage::RefineSix => "Now height, pitch and roll may change too.",
+        Stage::RefineSix => {
+            "Samples gather around the best poses. Height, pitch and roll may change too."
+        }
         Stage::Judge => "One cost compares the poses of several methods.",
         Stage::Assess => {
             "How good is the minimum? It is compared with its rivals and with shuffled pixels."

@@ -51,7 +51,7 @@ fn who_asks_for_a_card_is_told_once_which_methods_search_without_it() {
         return;
     }
     assert_eq!(without(&asked), 1, "{}", asked.err);
-    has(&asked.err, "mi6 does not use the graphics card: it compares three channels at once\n");
+    has(&asked.err, "mi6 does not use the graphics card: it compares more than grey values\n");
     assert_eq!(without(&run("auto")), 0);
 }
 

@@ -1,24 +1,28 @@
-//! One judge for the poses of all methods: what a pose costs, seen in three ways at once.
+//! One judge for the poses of all methods: what a pose costs where grey values alone do not say it.
 //!
-//! The cost of MI compares grey values alone, and light changes them. Two more channels of the same
-//! photos hold where grey values do not: the grey value against its surroundings (local contrast), and
-//! how strong the edges are. Each hypothesis is drawn once and counted in three joint histograms; the
-//! cost is the mean of 1 − NMI over the channels, each NMI less what chance alone would give.
+//! The cost of MI compares grey values, and light changes them. Two more channels of the same photos hold where grey
+//! values do not: the grey value against its surroundings (local contrast), and how strong the edges are. Each hypothesis
+//! is drawn once and counted in a joint histogram for each channel; the cost is the mean of 1 − NMI over the channels, each
+//! NMI less what chance alone would give. All three lead from far away. Which of two minima is the right one, local
+//! contrast alone says best.
 //!
 //! | file | what |
 //! |---|---|
 //! | `channels` | what a photo shows, three ways |
 //! | `chance` | 1 − NMI less its chance level |
 //! | `scorer` | the cost of many poses, on all threads |
+//! | `gather` | from a start to the deep minimum near it, by samples |
 //! | `shrink` | from a start to the minimum near it, by steps that shrink |
 //! | `params` | what decides it |
 
 mod chance;
 mod channels;
+mod gather;
 mod params;
 mod scorer;
 mod shrink;
 
+pub use gather::{Gathering, gather};
 pub use params::{Channels, JudgeParams};
 pub use scorer::Judge;
 pub use shrink::{Freedoms, Refined, Shrinking, Start, moved, shrink};

@@ -4,7 +4,8 @@
 //! yaw. Three things keep it from the truth where it fails. Only one coarse minimum is followed; height,
 //! pitch and roll stay the reference's, which costs more information than the last decimetres give; and
 //! grey values alone change with the light. So here the [search](super::starts) has many starts and six freedoms,
-//! and the cost is that of the [judge](crate::judge): three channels, less what chance gives.
+//! and the cost is that of the [judge](crate::judge): three channels in smaller copies of the photos, and local
+//! contrast in the photos themselves.
 
 use std::convert::Infallible;
 use std::sync::Arc;
@@ -16,7 +17,7 @@ use crate::cost;
 use crate::event::Stage;
 use crate::geometry::Pose;
 use crate::grid::ScoredLattice;
-use crate::judge::{Judge, JudgeParams, Refined};
+use crate::judge::{Channels, Judge, JudgeParams, Refined};
 use crate::method::Method;
 use crate::params::Params;
 use crate::problem::Problem;
@@ -43,7 +44,7 @@ pub(super) fn shown() -> &'static cost::Entry {
 }
 
 /// Why no graphics card takes what the judge scores.
-pub(super) const JUDGED: &str = "compares three channels at once";
+pub(super) const JUDGED: &str = "compares more than grey values";
 
 /// The search in six freedoms.
 pub struct SixFreedoms {
@@ -65,9 +66,12 @@ impl SixFreedoms {
         }
     }
 
-    /// The cost with photos that are `shrink` times smaller.
+    /// The cost with photos that are `shrink` times smaller. All three channels lead from farther away, and the one that
+    /// the parameters name decides.
     pub(super) fn level(&self, problem: &Problem, shrink: u32) -> Level<Judge> {
-        self.starts.level(Judge::new(problem, &self.render, &self.judge, shrink))
+        let channels = if shrink > 1 { Channels::Three } else { self.judge.channels };
+        let judge = JudgeParams { channels, ..self.judge.clone() };
+        self.starts.level(Judge::new(problem, &self.render, &judge, shrink))
     }
 
     /// The view at a pose beside the query, with the score that the judge gave it.

@@ -2,8 +2,10 @@
 //!
 //! 1. Coarse positions are scored at several yaws, at once and not one after the other,
 //! 2. many of their minima are starts, each refined in right, forward and yaw,
-//! 3. the best of those are refined in all six freedoms,
+//! 3. around the best of those, samples gather, and end in a refinement in all six freedoms,
 //! 4. and of minima that cost about the same the likelier pose stands.
+//!
+//! Where there are smaller copies of the photos, steps 1 and 2 use them.
 
 mod halving;
 mod level;
@@ -19,7 +21,7 @@ use super::{CostSummary, Failure, Halt};
 use crate::event::{Moment, PhaseSearched, PoseScored, Stage, StartsRefined, ViewRendered};
 use crate::geometry::{Pose, PoseError};
 use crate::grid::{GridParams, Lattice, Offset, Phase, Scored, ScoredLattice, scan};
-use crate::judge::{Freedoms, Refined, Shrinking, Start};
+use crate::judge::{Freedoms, Gathering, Refined, Shrinking, Start};
 use crate::params::Params;
 use crate::problem::Problem;
 use crate::render::{Comparison, Objective, Score};
@@ -111,12 +113,19 @@ impl ManyStarts {
         }
     }
 
+    /// The samples around the best starts.
+    fn around(&self) -> Gathering {
+        let Shrinking { first_m, rad_per_m, .. } = self.in_the_plane();
+        Gathering { first_m, rad_per_m }
+    }
+
     fn in_the_plane(&self) -> Shrinking {
         Shrinking {
             freedoms: Freedoms::Plane,
             first_m: self.params.first_step_m.min(self.most_m()),
             last_m: self.scale.length(PLANE_LAST_M).min(self.most_m()),
             rad_per_m: self.params.deg_per_m.to_radians(),
+            in_place: true,
         }
     }
 
@@ -146,7 +155,10 @@ impl ManyStarts {
         compare: &dyn Fn(&Pose, Score) -> Comparison,
         trace: &mut Trace<'_>,
     ) -> Result<Found, Halt> {
-        let lattices = self.lattices(problem, self.params.yaws)?;
+        let smaller = smaller.filter(|_| self.params.coarse_shrink > 1);
+        // Where smaller copies are searched, one surface is enough to say what costs are worth.
+        let yaws = if smaller.is_some() { 1 } else { self.params.yaws };
+        let lattices = self.lattices(problem, yaws)?;
         let initial = level.initial;
         let rendered = |moment, evaluation, pose: &Pose, score| ViewRendered {
             moment,
@@ -177,20 +189,24 @@ impl ManyStarts {
         {
             return Err(Halt::from(Failure::FlatCost { cost, hypotheses }));
         }
-        let refined = trace.stage(Stage::RefinePlane, |trace| {
-            let plan = self.in_the_plane();
-            self.refine(&mut search, &starts, &plan, self.params.finalists, price, trace)
-        })?;
-        let mut finalists = self.apart(refined, self.params.finalists, price);
-        if let Some(smaller) = smaller.filter(|_| self.params.coarse_shrink > 1) {
-            let more = trace
+        let mut finalists = Vec::new();
+        if let Some(smaller) = smaller {
+            let poses = trace
                 .stage(Stage::SearchCoarse, |trace| self.coarse_poses(problem, smaller, trace))?;
-            search.evaluations += more.len() as u64;
-            finalists.extend(level.starts(&more));
+            search.evaluations += poses.len() as u64;
+            finalists = level.starts(&poses);
+        }
+        if finalists.is_empty() {
+            let refined = trace.stage(Stage::RefinePlane, |trace| {
+                let walks = starts.iter().map(Refined::unmoved).collect();
+                let plan = self.in_the_plane();
+                self.refine(&mut search, walks, &plan, self.params.finalists, price, trace)
+            })?;
+            finalists = self.apart(refined, self.params.finalists, price);
         }
         let mut refined = trace.stage(Stage::RefineSix, |trace| {
-            let plan = self.in_six();
-            self.refine(&mut search, &finalists, &plan, MIN_REFINED, price, trace)
+            let walks = level.gathered(&finalists, &self.around(), || trace.checkpoint())?;
+            self.refine(&mut search, walks, &self.in_six(), MIN_REFINED, price, trace)
         })?;
         // A walk may leave the disc, where no query can be.
         let reach_m = self.reach(problem);
@@ -244,9 +260,8 @@ impl ManyStarts {
         scored.collect()
     }
 
-    /// Poses that two smaller copies of the photos lead to: the minima of the smallest, over a wider range
-    /// of headings, refined there in six freedoms and again at half the size. Their basins are wider, so
-    /// that they find what lies between the fine level's cells.
+    /// Poses that two smaller copies of the photos lead to: the minima of the smallest, over a wide range of headings,
+    /// refined there in six freedoms and again at half the size. Basins are wider there than in the photos themselves.
     fn coarse_poses<O: Objective>(
         &self,
         problem: &Problem,
@@ -265,20 +280,19 @@ impl ManyStarts {
         }
         let spread = Spread::of(&surfaces);
         let price = |pose: &Pose, cost: f64| self.price(&spread, pose, cost);
-        let starts = starts(&surfaces, 2 * self.params.starts, price);
+        let SixParams { starts: most, finalists, .. } = self.params;
         let most_m = self.most_m();
+        let walks = starts(&surfaces, 2 * most, price).iter().map(Refined::unmoved).collect();
         let plan = Shrinking { last_m: most_m.min(0.1), ..self.in_the_plane() };
-        let plane =
-            self.halved(&level, &starts, &plan, self.params.starts, price, || trace.checkpoint())?;
+        let plane = self.halved(&level, walks, &plan, most, price, || trace.checkpoint())?;
         let plan = Shrinking {
             freedoms: Freedoms::Six,
             first_m: most_m.min(0.2),
             last_m: most_m.min(0.05),
             ..plan
         };
-        let finalists = self.params.finalists;
-        let best = self.apart(plane, self.params.starts, price);
-        let six = self.halved(&level, &best, &plan, finalists, price, || trace.checkpoint())?;
+        let walks = self.apart(plane, most, price).iter().map(Refined::unmoved).collect();
+        let six = self.halved(&level, walks, &plan, finalists, price, || trace.checkpoint())?;
 
         let level = smaller(shrink_by.div_ceil(2));
         trace.checkpoint()?;
@@ -350,14 +364,14 @@ impl ManyStarts {
     fn refine<O: Objective>(
         &self,
         search: &mut Search<'_, O>,
-        starts: &[Start],
+        walks: Vec<Refined>,
         plan: &Shrinking,
         fewest: usize,
         price: impl Fn(&Pose, f64) -> f64,
         trace: &mut Trace<'_>,
     ) -> Result<Vec<Refined>, Cancelled> {
         let refined =
-            self.halved(search.level, starts, plan, fewest, price, || trace.checkpoint())?;
+            self.halved(search.level, walks, plan, fewest, price, || trace.checkpoint())?;
         search.evaluations += refined.iter().map(|one| one.evaluations).sum::<u64>();
         trace.emit(|| StartsRefined {
             freedoms: plan.freedoms,

@@ -3,7 +3,7 @@
 use image::imageops::blur;
 use image::{GenericImageView as _, Luma};
 
-use super::params::JudgeParams;
+use super::params::{Channels, JudgeParams};
 use crate::image::{FloatImage, GrayImage, gaussian_smoothed};
 
 /// Standard deviations from the mean of its surroundings at which a grey value is as dark or bright as
@@ -17,16 +17,19 @@ const MIN_DEVIATION: f32 = 4.0;
 /// The gradient at which edges are as strong as they go \[grey value per px\].
 const MAX_EDGE: f32 = 60.0;
 
-/// The side of the squares whose means stand for the surroundings \[px\]: means over 20 px need no more.
+/// The side of the squares whose means stand for the surroundings \[px\].
 const SQUARE: u32 = 4;
 
-/// The channels of one photo, each 0 … 255: the grey values smoothed by a Gaussian of `sigma` \[px\], their
-/// contrast, and edges.
-pub fn channel_images(photo: &GrayImage, sigma: f64, params: &JudgeParams) -> [FloatImage; 3] {
-    let smoothed = gaussian_smoothed(photo, sigma);
-    let contrast = local_contrast(photo, &smoothed, params.contrast_sigma_px);
-    let edges = edges(&gaussian_smoothed(photo, params.edge_sigma_px));
-    [smoothed, contrast, edges]
+/// The channels of one photo, each 0 … 255, of its smoothed grey values.
+pub fn channel_images(photo: &GrayImage, params: &JudgeParams) -> Vec<FloatImage> {
+    let smoothed = gaussian_smoothed(photo, params.sigma_px);
+    let contrast = || local_contrast(photo, &smoothed, params.contrast_sigma_px);
+    match params.channels {
+        Channels::Intensity => vec![smoothed],
+        Channels::Contrast => vec![contrast()],
+        Channels::Gradient => vec![edges(&smoothed)],
+        Channels::Three => vec![contrast(), edges(&smoothed), smoothed],
+    }
 }
 
 /// The value between the pixels, linearly; beyond the border that of the nearest pixel.

@@ -23,14 +23,9 @@ choice!(Channels:
 );
 
 impl Channels {
-    /// Their places among all, in this order.
-    pub(super) fn places(self) -> std::ops::Range<usize> {
-        match self {
-            Self::Intensity => 0..1,
-            Self::Contrast => 1..2,
-            Self::Gradient => 2..3,
-            Self::Three => 0..3,
-        }
+    /// How many there are.
+    pub(super) fn count(self) -> usize {
+        if self == Self::Three { 3 } else { 1 }
     }
 }
 
@@ -38,18 +33,15 @@ parameters! {
     /// Parameters of the cost that judges the poses of `mi6`, `fb2` and `robust`.
     #[derive(Clone, Debug, PartialEq)]
     pub struct JudgeParams {
-        /// Channels of the cost: grey value, local contrast, edge strength, or the mean of all.
-        pub channels: Channels = Channels::Three => choice("channels"),
+        /// Channels of the cost that decides: grey value, local contrast, edge strength, or the mean of all. Smaller copies
+        /// of the photos are always searched with all.
+        pub channels: Channels = Channels::Contrast => choice("channels"),
         /// Whether to subtract the chance level at this number of pixels from normalised mutual information.
         pub corrected: bool = true => flag("corrected"),
-        /// Standard deviation of the Gaussian that smooths the query.
+        /// Standard deviation of the Gaussian that smooths both photos.
         pub sigma_px: f64 = 1.5 => number("sigma", "px", 0.0..=20.0),
-        /// Standard deviation of the Gaussian that smooths the reference photo before it colours the cloud.
-        pub reference_sigma_px: f64 = 0.0 => number("reference_sigma", "px", 0.0..=20.0),
-        /// Standard deviation of the Gaussian that smooths both photos before edge detection.
-        pub edge_sigma_px: f64 = 1.5 => number("edge_sigma", "px", 0.0..=20.0),
         /// Standard deviation of the neighbourhood that local contrast compares a grey value with.
-        pub contrast_sigma_px: f64 = 20.0 => number("contrast_sigma", "px", 1.0..=200.0),
+        pub contrast_sigma_px: f64 = 8.0 => number("contrast_sigma", "px", 1.0..=200.0),
         /// Bins per axis of each joint histogram.
         pub bins: usize = 16 => count("bins", "", 2..=256),
     }

@@ -1,5 +1,6 @@
 //! What poses cost, many at once.
 
+use std::borrow::Cow;
 use std::sync::Arc;
 
 use image::GenericImageView as _;
@@ -11,17 +12,17 @@ use super::params::JudgeParams;
 use crate::camera::Intrinsics;
 use crate::cost::{Pair, byte_bin, count_pairs, shuffled};
 use crate::geometry::Pose;
-use crate::image::{GrayImage, cubic_interpolated};
+use crate::image::{FloatImage, GrayImage};
 use crate::problem::Problem;
 use crate::render::{
     ColoredPoint, DepthCanvas, Objective, PointArrays, Pool, Rasterizer, RenderParams, Score,
     ShownPoints, SplattedPixel, Values, at_a_time,
 };
 
-/// The bins of the three channels at one place.
+/// The bins of at most three channels at one place.
 type Bins = [u8; 3];
 
-/// Scores query poses against one reference by the mean cost of three channels.
+/// Scores query poses against one reference by the mean cost of the channels that the parameters name.
 pub struct Judge {
     reference: Arc<ShownPoints<Bins>>,
     query: Arc<Vec<Bins>>,
@@ -60,6 +61,29 @@ impl Judge {
             pool: Pool::default(),
         }
     }
+
+    /// The mean cost of the channels over the pairs. A channel that is constant tells nothing, which costs 1;
+    /// where all are, there is no cost.
+    ///
+    /// Of many poses that cover few pixels, some look informed by chance. So what they say counts less, by the fourth
+    /// root of the share of the points that are seen.
+    fn cost_of(&self, pairs: &[Pair<Bins>], counts: &mut Vec<u32>) -> Option<f64> {
+        let JudgeParams { bins, channels, corrected, .. } = self.params;
+        let (mut sum, mut is_any) = (0.0, false);
+        for place in 0..channels.count() {
+            let bins_of = |&Pair { query, synthetic }: &Pair<Bins>| Pair {
+                query: query[place],
+                synthetic: synthetic[place],
+            };
+            count_pairs(pairs, bins_of, bins, counts);
+            let cost = corrected_distance(counts, bins, corrected);
+            is_any |= cost.is_some();
+            sum += cost.unwrap_or(1.0);
+        }
+        let seen = pairs.len() as f64 / self.reference.values.len() as f64;
+        let informed = 1.0 - sum / channels.count() as f64;
+        is_any.then(|| 1.0 - informed * seen.sqrt().sqrt())
+    }
 }
 
 impl Objective for Judge {
@@ -76,7 +100,7 @@ impl Objective for Judge {
         let worker = || (DepthCanvas::new(&self.intrinsics, self.splat_px), Vec::new());
         self.pool.score(reference_from_camera, worker, |(canvas, counts), pose| {
             let pairs = canvas.draw(positions, values, &pose.inverse(), pair);
-            Score { cost: cost_of(pairs, &self.params, counts), covered: pairs.len() as u32 }
+            Score { cost: self.cost_of(pairs, counts), covered: pairs.len() as u32 }
         })
     }
 
@@ -97,37 +121,23 @@ impl Objective for Judge {
             synthetic: self.reference.values[pixel.intensity as usize],
         };
         let pairs: Vec<Pair<Bins>> = pixels.iter().map(pair).collect();
-        cost_of(&shuffled(&pairs, seed), &self.params, &mut Vec::new())
+        self.cost_of(&shuffled(&pairs, seed), &mut Vec::new())
     }
 }
 
-/// The mean cost of the channels over the pairs. A channel that is constant tells nothing, which costs 1;
-/// where all are, there is no cost.
-fn cost_of(pairs: &[Pair<Bins>], params: &JudgeParams, counts: &mut Vec<u32>) -> Option<f64> {
-    let &JudgeParams { bins, channels, corrected, .. } = params;
-    let (places, mut sum, mut is_any) = (channels.places(), 0.0, false);
-    for place in places.clone() {
-        let bins_of = |&Pair { query, synthetic }: &Pair<Bins>| Pair {
-            query: query[place],
-            synthetic: synthetic[place],
-        };
-        count_pairs(pairs, bins_of, bins, counts);
-        let cost = corrected_distance(counts, bins, corrected);
-        is_any |= cost.is_some();
-        sum += cost.unwrap_or(1.0);
+/// The bins of the channels; those that are not compared stay 0.
+fn binned(channels: &[FloatImage], bins: usize, value: impl Fn(&FloatImage) -> f32) -> Bins {
+    let mut binned = Bins::default();
+    for (bin, channel) in binned.iter_mut().zip(channels) {
+        *bin = byte_bin(value(channel), bins);
     }
-    is_any.then(|| sum / places.len() as f64)
-}
-
-fn binned(values: [f32; 3], bins: usize) -> Bins {
-    values.map(|value| byte_bin(value, bins))
+    binned
 }
 
 fn query_bins(photo: &GrayImage, params: &JudgeParams, shrink: u32) -> Vec<Bins> {
-    let (photo, params) = shrunk(photo, params, shrink);
-    let [grey, contrast, edges] = channel_images(&photo, params.sigma_px, &params);
-    let values = grey.as_raw().iter().zip(contrast.as_raw()).zip(edges.as_raw());
-    values.map(|((&grey, &contrast), &edge)| binned([grey, contrast, edge], params.bins)).collect()
+    let channels = channel_images(&shrunk(photo, shrink), params);
+    let pixels = 0..channels[0].as_raw().len();
+    pixels.map(|at| binned(&channels, params.bins, |channel| channel.as_raw()[at])).collect()
 }
 
 fn reference_points(
@@ -137,44 +147,33 @@ fn reference_points(
     shrink: u32,
 ) -> ShownPoints<Bins> {
     let reference = &problem.reference;
-    let photo = &reference.photo.gray;
-    let (photo, params) = shrunk(photo, params, shrink);
+    let channels = channel_images(&shrunk(&reference.photo.gray, shrink), params);
     let camera = shrunk_camera(&reference.intrinsics, shrink);
-    let [grey, contrast, edges] = channel_images(&photo, params.reference_sigma_px, &params);
     // A view that is smaller is covered by fewer points.
     let visible = reference.visible_cloud(render);
     let points: Vec<Point3<f32>> = visible.positions().step_by(shrink as usize).collect();
     let bins = points.iter().map(|point| {
         let pixel = camera.project(&point.cast()).unwrap_or_default();
         let (x, y) = (pixel.x as f32, pixel.y as f32);
-        let grey = match shrink {
-            1 if params.reference_sigma_px == 0.0 => cubic_interpolated(&photo, x, y),
-            _ => linear(&grey, x, y),
-        };
-        binned([grey, linear(&contrast, x, y), linear(&edges, x, y)], params.bins)
+        binned(&channels, params.bins, |channel| linear(channel, x, y))
     });
     ShownPoints { values: bins.collect(), positions: PointArrays::new(points.iter().copied()) }
 }
 
-/// The photo with squares of `shrink` × `shrink` pixels as its pixels, and the parameters for it.
-fn shrunk(photo: &GrayImage, params: &JudgeParams, shrink: u32) -> (GrayImage, JudgeParams) {
+/// The photo with squares of `shrink` × `shrink` pixels as its pixels.
+fn shrunk(photo: &GrayImage, shrink: u32) -> Cow<'_, GrayImage> {
     if shrink <= 1 {
-        return (photo.clone(), params.clone());
+        return Cow::Borrowed(photo);
     }
     let (width, height) = photo.dimensions();
     let [columns, rows] = [width, height].map(|side| (side / shrink).max(1));
-    let smaller = GrayImage::from_fn(columns, rows, |x, y| {
+    Cow::Owned(GrayImage::from_fn(columns, rows, |x, y| {
         let (left, top) = (x * shrink, y * shrink);
         let square = photo.view(left, top, shrink.min(width - left), shrink.min(height - top));
         let count = (square.width() * square.height()).max(1);
         let sum: u32 = square.pixels().map(|(_, _, pixel)| u32::from(pixel.0[0])).sum();
         image::Luma([((sum + count / 2) / count) as u8])
-    });
-    let params = JudgeParams {
-        contrast_sigma_px: params.contrast_sigma_px / f64::from(shrink),
-        ..params.clone()
-    };
-    (smaller, params)
+    }))
 }
 
 /// The camera of the photo that [`shrunk`] makes.
@@ -191,5 +190,31 @@ fn shrunk_camera(camera: &Intrinsics, shrink: u32) -> Intrinsics {
         cy: centre(camera.cy),
         width: (camera.width / shrink).max(1),
         height: (camera.height / shrink).max(1),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_few_pixels_say_counts_less() {
+        let judge_of = |points: usize| Judge {
+            reference: Arc::new(ShownPoints {
+                positions: PointArrays::new(std::iter::empty()),
+                values: vec![Bins::default(); points],
+            }),
+            query: Arc::default(),
+            intrinsics: Intrinsics { fx: 1.0, fy: 1.0, cx: 0.0, cy: 0.0, width: 1, height: 1 },
+            splat_px: 1,
+            params: JudgeParams { corrected: false, ..JudgeParams::default() },
+            pool: Pool::default(),
+        };
+        // Half of the query's information is in the view.
+        let pairs: Vec<Pair<Bins>> =
+            (0..4_u8).map(|at| Pair { query: [at, 0, 0], synthetic: [at / 2, 0, 0] }).collect();
+        let cost = |points| judge_of(points).cost_of(&pairs, &mut Vec::new()).expect("textured");
+        assert!((cost(4) - 0.5).abs() < 1e-12);
+        assert!((cost(64) - 0.75).abs() < 1e-12, "a sixteenth of the points counts half");
     }
 }

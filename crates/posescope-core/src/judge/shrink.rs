@@ -40,6 +40,14 @@ pub struct Shrinking {
     pub last_m: f64,
     /// Radians that count as a metre.
     pub rad_per_m: f64,
+    /// Whether steps aside turn the camera, as in [`moved_in_place`].
+    pub in_place: bool,
+}
+
+impl Shrinking {
+    fn moved(&self, pose: &Pose, by: &[f64; 6]) -> Pose {
+        if self.in_place { moved_in_place(pose, by, self.rad_per_m) } else { moved(pose, by) }
+    }
 }
 
 /// Where a refinement starts.
@@ -64,6 +72,13 @@ pub struct Refined {
     pub evaluations: u64,
 }
 
+impl Refined {
+    /// A refinement that has not begun.
+    pub fn unmoved(&start: &Start) -> Self {
+        Self { start, pose: start.pose, cost: start.cost, evaluations: 0 }
+    }
+}
+
 /// Rounds after which a refinement ends, whatever its step: each either moves or shrinks.
 const MAX_ROUNDS: usize = 60;
 
@@ -74,6 +89,13 @@ pub fn moved(pose: &Pose, by: &[f64; 6]) -> Pose {
         Translation3::new(x, y, z),
         UnitQuaternion::from_scaled_axis(Vector3::new(about_x, about_y, about_z)),
     )
+}
+
+/// As [`moved`], but what is a metre's turn away stays in place: a step to the right turns to the left, and a step down
+/// turns up. The cost of each axis then depends less on the others.
+pub fn moved_in_place(pose: &Pose, by: &[f64; 6], rad_per_m: f64) -> Pose {
+    let [x, y, z, about_x, about_y, about_z] = *by;
+    moved(pose, &[x, y, z, about_x + y * rad_per_m, about_y - x * rad_per_m, about_z])
 }
 
 /// A refinement at work.
@@ -98,10 +120,7 @@ pub fn shrink<E>(
 ) -> Result<Vec<Refined>, E> {
     let mut walks: Vec<Walk> = starts
         .iter()
-        .map(|&start| Walk {
-            refined: Refined { start, pose: start.pose, cost: start.cost, evaluations: 0 },
-            step_m: plan.first_m,
-        })
+        .map(|start| Walk { refined: Refined::unmoved(start), step_m: plan.first_m })
         .collect();
     let mut scored = |poses: &[Pose]| -> Result<Vec<Option<f64>>, E> {
         let mut costs = Vec::with_capacity(poses.len());
@@ -124,7 +143,7 @@ pub fn shrink<E>(
                     [-1.0, 1.0].map(|side| {
                         let mut by = [0.0; 6];
                         by[axis] = side * step_along(axis, walk.step_m, plan);
-                        moved(&walk.refined.pose, &by)
+                        plan.moved(&walk.refined.pose, &by)
                     })
                 })
             })
@@ -135,8 +154,11 @@ pub fn shrink<E>(
             .zip(costs.chunks(2 * axes.len()))
             .map(|(walk, costs)| vertex(walk, costs, plan))
             .collect();
-        let combined: Vec<Pose> =
-            active.iter().zip(&vertices).map(|(walk, by)| moved(&walk.refined.pose, by)).collect();
+        let combined: Vec<Pose> = active
+            .iter()
+            .zip(&vertices)
+            .map(|(walk, by)| plan.moved(&walk.refined.pose, by))
+            .collect();
         let at_vertices = scored(&combined)?;
         let per_walk = probes.chunks(2 * axes.len()).zip(costs.chunks(2 * axes.len()));
         let per_walk = per_walk.zip(combined.iter().zip(&at_vertices).zip(&vertices));
@@ -196,6 +218,7 @@ fn vertex(walk: &Walk, costs: &[Option<f64>], plan: &Shrinking) -> [f64; 6] {
 mod tests {
     use super::*;
     use crate::geometry::PoseError;
+    use nalgebra::Point3;
     use std::convert::Infallible;
 
     /// A valley around a pose, long where forward and pitch go together.
@@ -213,7 +236,7 @@ mod tests {
     }
 
     fn plan(freedoms: Freedoms) -> Shrinking {
-        Shrinking { freedoms, first_m: 0.5, last_m: 1e-4, rad_per_m: 0.1 }
+        Shrinking { freedoms, first_m: 0.5, last_m: 1e-4, rad_per_m: 0.1, in_place: false }
     }
 
     fn refined(truth: &Pose, start: Pose, plan: &Shrinking) -> Refined {
@@ -235,6 +258,20 @@ mod tests {
         let error = PoseError::between(&truth, &found.pose);
         assert!(error.translation_m < 0.01 && error.rotation_deg < 0.05, "{error}");
         assert!(found.cost < valley(&truth, &start) && found.evaluations > 0);
+    }
+
+    #[test]
+    fn a_step_in_place_keeps_what_is_a_metres_turn_away_in_its_direction() {
+        let (pose, rad_per_m) = (Pose::translation(1.0, 2.0, 3.0), 0.05);
+        let seen = pose * Point3::new(0.0, 0.0, 1.0 / rad_per_m);
+        let off = |by: [f64; 6], rad_per_m: f64| {
+            let ahead = moved_in_place(&pose, &by, rad_per_m).inverse() * seen;
+            ahead.x.hypot(ahead.y)
+        };
+        for by in [[0.2, 0.0, 0.0, 0.0, 0.0, 0.0], [0.0, -0.2, 0.0, 0.0, 0.0, 0.0]] {
+            assert!(off(by, rad_per_m) < 1e-3, "{by:?}: {}", off(by, rad_per_m));
+            assert!(off(by, 0.0) > 0.19);
+        }
     }
 
     #[test]

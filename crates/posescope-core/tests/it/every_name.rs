@@ -285,7 +285,7 @@ fn parameters_are_set_by_name_or_field() {
     let (retrieval, index): (&RetrievalParams, &IndexParams) = (&params.retrieval, &params.index);
     assert_eq!((grid.rounds, fb.depth), (2, DepthRule::Nearest));
     assert_eq!(fb.accept, AcceptanceRule::default());
-    assert_eq!(judge.channels, Channels::Three);
+    assert_eq!(judge.channels, Channels::Contrast);
     println!(
         "{surf:?} {fb2:?} {mi6:?} {robust:?} {render:?} {descent:?} {surface:?} {retrieval:?} {index:?}"
     );

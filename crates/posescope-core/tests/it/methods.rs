@@ -8,7 +8,7 @@ use posescope_core::event::{
 };
 use posescope_core::geometry::{Pose, PoseError};
 use posescope_core::history::History;
-use posescope_core::judge::{Channels, Judge, JudgeParams, Refined};
+use posescope_core::judge::{Channels, Freedoms, Judge, JudgeParams, Refined};
 use posescope_core::method::Method;
 use posescope_core::params::Params;
 use posescope_core::problem::Problem;
@@ -80,11 +80,12 @@ fn the_truth_costs_less_than_what_is_beside_it_in_any_channel_and_light() {
 #[test]
 fn six_freedoms_are_searched_at_several_yaws_and_end_below_every_lattice() {
     let problem = solvable();
-    let (outcome, history) = told("mi6", &problem, &params(&["mi6.yaws=3"]));
+    let photos_alone = ["mi6.yaws=3", "mi6.coarse_shrink=1"];
+    let (outcome, history) = told("mi6", &problem, &params(&photos_alone));
     assert!(error(&problem, &outcome).translation_m < 0.1);
     let best = outcome.cost.expect("it searched").best;
     let surfaces: Vec<_> = history.all::<PhaseSearched>().collect();
-    assert_eq!(surfaces.len(), 3, "the fine level's");
+    assert_eq!(surfaces.len(), 3);
     for (_, searched) in surfaces {
         let cell = searched.surface.minimum().expect("textured");
         assert!(best < searched.surface.eligible_cost(cell).expect("a cost"));
@@ -97,6 +98,24 @@ fn six_freedoms_are_searched_at_several_yaws_and_end_below_every_lattice() {
             assert!(one.cost <= one.start.cost);
         }
     }
+}
+
+#[test]
+fn smaller_copies_lead_to_starts_and_one_surface_says_what_costs_are_worth() {
+    let problem = solvable();
+    let (outcome, history) = told("mi6", &problem, &Params::default());
+    assert!(error(&problem, &outcome).translation_m < 0.1);
+    assert_eq!(history.all::<PhaseSearched>().count(), 1);
+    let refined: Vec<_> = history.all::<StartsRefined>().collect();
+    let [(_, refined)] = refined[..] else { panic!("{} refinements", refined.len()) };
+    let best = refined.refinements[0];
+    assert_eq!(
+        (refined.freedoms, best.cost),
+        (Freedoms::Six, outcome.cost.expect("searched").best)
+    );
+    // The copies are coarse: what they lead to is near, and refined further.
+    let from = PoseError::between(&Pose::translation(0.0, 0.0, 1.0), &best.start.pose);
+    assert!(from.translation_m < 0.5 && best.cost < best.start.cost, "{from}");
 }
 
 #[test]
@@ -114,11 +133,13 @@ fn a_search_whose_minima_all_lead_out_of_the_disc_says_so() {
 fn refinements_take_no_steps_beyond_the_next_coarse_position() {
     let mut problem = solvable();
     problem.uncertainty_radius_m = 1.25;
-    let (outcome, history) = told("mi6", &problem, &params(&["grid.coarse_step=0.25"]));
+    let photos_alone = "mi6.coarse_shrink=1";
+    let (outcome, history) =
+        told("mi6", &problem, &params(&["grid.coarse_step=0.25", photos_alone]));
     assert!(error(&problem, &outcome).translation_m < 0.1);
     let (_, refined) = history.all::<StartsRefined>().next().expect("in the plane");
     let moved = |one: &Refined| PoseError::between(&one.start.pose, &one.pose).translation_m;
-    let usual = told("mi6", &problem, &Params::default()).1;
+    let usual = told("mi6", &problem, &params(&[photos_alone])).1;
     let (_, usual) = usual.all::<StartsRefined>().next().expect("in the plane");
     let farthest = |of: &StartsRefined| of.refinements.iter().map(moved).fold(0.0, f64::max);
     assert!(farthest(refined) < farthest(usual));
@@ -198,7 +219,8 @@ fn matching_again_where_the_pose_says_adds_inliers() {
 #[test]
 fn robust_compares_all_families_and_says_what_each_costs() {
     let problem = solvable();
-    let (outcome, history) = told("robust", &problem, &params(&["robust.credit=0"]));
+    let costs_alone = params(&["robust.credit=0", "mi6.unlikely=0"]);
+    let (outcome, history) = told("robust", &problem, &costs_alone);
     assert!(error(&problem, &outcome).translation_m < 0.1);
     let judged = history.last::<CandidatesJudged>().expect("it decided");
     let costs: Vec<f64> = judged.candidates.iter().map(|c| c.refined.cost).collect();

@@ -20,6 +20,7 @@ const REFINEMENT: Shrinking = Shrinking {
     last_m: 0.01,
     // Three degrees move a view by as much as a metre does.
     rad_per_m: 0.052,
+    in_place: false,
 };
 
 /// A reference that shows something.

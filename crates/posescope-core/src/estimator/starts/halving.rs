@@ -9,7 +9,7 @@ use crate::judge::{Refined, Shrinking, Start};
 use crate::render::Objective;
 
 impl ManyStarts {
-    /// Refines the starts, of which at least `fewest` are refined to the end where so many lead to places of their
+    /// Refines the walks, of which at least `fewest` are refined to the end where so many lead to places of their
     /// own. The lowest price comes first.
     ///
     /// # Errors
@@ -17,15 +17,12 @@ impl ManyStarts {
     pub(super) fn halved<E>(
         &self,
         level: &Level<impl Objective>,
-        starts: &[Start],
+        mut walks: Vec<Refined>,
         plan: &Shrinking,
         fewest: usize,
         price: impl Fn(&Pose, f64) -> f64,
         mut checkpoint: impl FnMut() -> Result<(), E>,
     ) -> Result<Vec<Refined>, E> {
-        let unmoved =
-            |&start: &Start| Refined { start, pose: start.pose, cost: start.cost, evaluations: 0 };
-        let mut walks: Vec<Refined> = starts.iter().map(unmoved).collect();
         let (mut ended, mut step_m) = (Vec::new(), plan.first_m);
         while step_m >= plan.last_m {
             let here: Vec<Start> =
@@ -110,13 +107,19 @@ mod tests {
         let level = six.level(Bowls);
         let poses: Vec<Pose> = starts.iter().map(|&x| Pose::translation(x, 0.0, 0.0)).collect();
         let starts = level.starts(&poses);
-        let plan =
-            Shrinking { freedoms: Freedoms::Six, first_m: 0.5, last_m: 0.004, rad_per_m: 0.05 };
+        let plan = Shrinking {
+            freedoms: Freedoms::Six,
+            first_m: 0.5,
+            last_m: 0.004,
+            rad_per_m: 0.05,
+            in_place: false,
+        };
         let never = || Ok::<_, Infallible>(());
         let Ok(mut all) = level.refined(&starts, &plan, never);
         let price = |_: &Pose, cost: f64| cost;
         sort_by_price(&mut all, price);
-        let Ok(halved) = six.halved(&level, &starts, &plan, fewest, price, never);
+        let walks = starts.iter().map(Refined::unmoved).collect();
+        let Ok(halved) = six.halved(&level, walks, &plan, fewest, price, never);
         (halved, all)
     }
 

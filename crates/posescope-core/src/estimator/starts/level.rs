@@ -3,7 +3,7 @@
 use super::ManyStarts;
 use crate::geometry::Pose;
 use crate::grid::least_covered;
-use crate::judge::{Refined, Shrinking, Start, shrink};
+use crate::judge::{Gathering, Refined, Shrinking, Start, gather, shrink};
 use crate::problem::Problem;
 use crate::render::{Objective, Score};
 
@@ -24,8 +24,7 @@ impl ManyStarts {
         Level { objective, initial, least_covered }
     }
 
-    /// Refines a pose (`reference_from_camera`) in all six freedoms, as the search does with its best
-    /// starts; `None` where it lies outside the disc, leads out of it, or covers too little to have a cost.
+    /// Refines a pose (`reference_from_camera`) as the search does with its best starts; `None` where it lies outside the disc, leads out of it, or covers too little to have a cost.
     ///
     /// # Errors
     /// What the checkpoint says, which is asked before each round.
@@ -34,13 +33,14 @@ impl ManyStarts {
         problem: &Problem,
         level: &Level<impl Objective>,
         pose: Pose,
-        checkpoint: impl FnMut() -> Result<(), E>,
+        mut checkpoint: impl FnMut() -> Result<(), E>,
     ) -> Result<Option<Refined>, E> {
         let reach = self.reach(problem);
         if pose.translation.vector.norm() > reach {
             return Ok(None);
         }
-        let refined = level.refined(&level.starts(&[pose]), &self.in_six(), checkpoint)?;
+        let walks = level.gathered(&level.starts(&[pose]), &self.around(), &mut checkpoint)?;
+        let refined = self.halved(level, walks, &self.in_six(), 1, |_, cost| cost, checkpoint)?;
         let inside = refined.first().filter(|one| one.pose.translation.vector.norm() <= reach);
         Ok(inside.copied())
     }
@@ -56,6 +56,24 @@ impl<O: Objective> Level<O> {
     pub(super) fn starts(&self, poses: &[Pose]) -> Vec<Start> {
         let both = poses.iter().zip(self.costs(poses));
         both.filter_map(|(&pose, cost)| Some(Start { pose, cost: cost? })).collect()
+    }
+
+    /// Moves walks to the cheapest of samples around them.
+    ///
+    /// # Errors
+    /// Those of `checkpoint`, which is asked before each batch.
+    pub(super) fn gathered<E>(
+        &self,
+        starts: &[Start],
+        plan: &Gathering,
+        mut checkpoint: impl FnMut() -> Result<(), E>,
+    ) -> Result<Vec<Refined>, E> {
+        let mut walks: Vec<Refined> = starts.iter().map(Refined::unmoved).collect();
+        gather(&mut walks, plan, |poses| {
+            checkpoint()?;
+            Ok(self.costs(poses))
+        })?;
+        Ok(walks)
     }
 
     /// Refines the starts.
