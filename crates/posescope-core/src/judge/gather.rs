@@ -50,7 +50,7 @@ struct Cloud {
 }
 
 /// Moves each walk to the cheapest of the samples around it, where one costs less. The samples are the same in each
-/// run. `costs_of` is as for [`shrink`](super::shrink).
+/// run. `costs_of` is as for [`shrink`](super::shrink()).
 ///
 /// # Errors
 /// Those of `costs_of`.

@@ -40,7 +40,7 @@ pub struct Shrinking {
     pub last_m: f64,
     /// Radians that count as a metre.
     pub rad_per_m: f64,
-    /// Whether steps aside turn the camera, as in [`moved_in_place`].
+    /// Whether a step aside turns the camera, so that what is a metre's turn away stays in place.
     pub in_place: bool,
 }
 
