@@ -119,6 +119,26 @@ fn smaller_copies_lead_to_starts_and_one_surface_says_what_costs_are_worth() {
 }
 
 #[test]
+fn copies_are_searched_with_all_channels_and_samples_gather_around_what_they_lead_to() {
+    let problem = solvable();
+    let refined = |channels: &str| {
+        let (_, history) = told("mi6", &problem, &params(&[channels]));
+        history.last::<StartsRefined>().expect("refined").refinements.to_vec()
+    };
+    let starts = |refined: &[Refined]| {
+        let at = |one: &Refined| <[f64; 3]>::from(one.start.pose.translation.vector);
+        let mut starts: Vec<[f64; 3]> = refined.iter().map(at).collect();
+        starts.sort_by(|a, b| a.partial_cmp(b).expect("numbers"));
+        starts
+    };
+    let [contrast, edges] = ["judge.channels=contrast", "judge.channels=gradient"].map(refined);
+    assert_eq!(starts(&contrast), starts(&edges), "whatever decides later");
+    assert_ne!(contrast[0].cost, edges[0].cost);
+    // Four rounds of 64, before the first step.
+    assert!(contrast.iter().all(|one| one.evaluations > 256));
+}
+
+#[test]
 fn a_search_whose_minima_all_lead_out_of_the_disc_says_so() {
     let mut problem = solvable();
     // The query is 1 m away.

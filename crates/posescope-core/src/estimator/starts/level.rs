@@ -24,7 +24,8 @@ impl ManyStarts {
         Level { objective, initial, least_covered }
     }
 
-    /// Refines a pose (`reference_from_camera`) as the search does with its best starts; `None` where it lies outside the disc, leads out of it, or covers too little to have a cost.
+    /// Refines a pose (`reference_from_camera`) as the search does with its best starts; `None` where it lies outside the
+    /// disc, leads out of it, or covers too little to have a cost.
     ///
     /// # Errors
     /// What the checkpoint says, which is asked before each round.
@@ -52,6 +53,17 @@ impl<O: Objective> Level<O> {
         scores.map(|score| score.eligible_cost(self.least_covered)).collect()
     }
 
+    /// The costs of poses, with a checkpoint before each batch.
+    fn checked_costs<E>(
+        &self,
+        mut checkpoint: impl FnMut() -> Result<(), E>,
+    ) -> impl FnMut(&[Pose]) -> Result<Vec<Option<f64>>, E> {
+        move |poses| {
+            checkpoint()?;
+            Ok(self.costs(poses))
+        }
+    }
+
     /// Those of the poses that have a cost.
     pub(super) fn starts(&self, poses: &[Pose]) -> Vec<Start> {
         let both = poses.iter().zip(self.costs(poses));
@@ -66,13 +78,10 @@ impl<O: Objective> Level<O> {
         &self,
         starts: &[Start],
         plan: &Gathering,
-        mut checkpoint: impl FnMut() -> Result<(), E>,
+        checkpoint: impl FnMut() -> Result<(), E>,
     ) -> Result<Vec<Refined>, E> {
         let mut walks: Vec<Refined> = starts.iter().map(Refined::unmoved).collect();
-        gather(&mut walks, plan, |poses| {
-            checkpoint()?;
-            Ok(self.costs(poses))
-        })?;
+        gather(&mut walks, plan, self.checked_costs(checkpoint))?;
         Ok(walks)
     }
 
@@ -84,11 +93,8 @@ impl<O: Objective> Level<O> {
         &self,
         starts: &[Start],
         plan: &Shrinking,
-        mut checkpoint: impl FnMut() -> Result<(), E>,
+        checkpoint: impl FnMut() -> Result<(), E>,
     ) -> Result<Vec<Refined>, E> {
-        shrink(starts, plan, |poses| {
-            checkpoint()?;
-            Ok(self.costs(poses))
-        })
+        shrink(starts, plan, self.checked_costs(checkpoint))
     }
 }
