@@ -33,7 +33,7 @@ use crate::trace::{Cancelled, Trace};
 const PLANE_LAST_M: f64 = 0.05;
 
 /// At least so many minima are refined to the last step: the answer, and what it is compared with.
-const MIN_REFINED: usize = 4;
+const MIN_REFINED: usize = 5;
 
 /// Starts nearer to each other than this are one, unless their headings differ \[m\], at the paper's scale.
 const SAME_M: f64 = 0.3;
@@ -116,7 +116,7 @@ impl ManyStarts {
     /// The samples around the best starts.
     fn around(&self) -> Gathering {
         let Shrinking { first_m, rad_per_m, .. } = self.in_the_plane();
-        Gathering { first_m, rad_per_m }
+        Gathering { first_m, rad_per_m, fewest: MIN_REFINED }
     }
 
     fn in_the_plane(&self) -> Shrinking {
@@ -205,7 +205,7 @@ impl ManyStarts {
             finalists = self.apart(refined, self.params.finalists, price);
         }
         let mut refined = trace.stage(Stage::RefineSix, |trace| {
-            let walks = level.gathered(&finalists, &self.around(), || trace.checkpoint())?;
+            let walks = level.gathered(&finalists, &self.around(), price, || trace.checkpoint())?;
             self.refine(&mut search, walks, &self.in_six(), MIN_REFINED, price, trace)
         })?;
         // A walk may leave the disc, where no query can be.
@@ -284,7 +284,7 @@ impl ManyStarts {
         let most_m = self.most_m();
         let walks = starts(&surfaces, 2 * most, price).iter().map(Refined::unmoved).collect();
         let plan = Shrinking { last_m: most_m.min(0.1), ..self.in_the_plane() };
-        let plane = self.halved(&level, walks, &plan, most, price, || trace.checkpoint())?;
+        let plane = self.halved(&level, walks, &plan, finalists, price, || trace.checkpoint())?;
         let plan = Shrinking {
             freedoms: Freedoms::Six,
             first_m: most_m.min(0.2),
@@ -292,14 +292,16 @@ impl ManyStarts {
             ..plan
         };
         let walks = self.apart(plane, most, price).iter().map(Refined::unmoved).collect();
-        let six = self.halved(&level, walks, &plan, finalists, price, || trace.checkpoint())?;
+        let six = self.halved(&level, walks, &plan, MIN_REFINED, price, || trace.checkpoint())?;
 
         let level = smaller(shrink_by.div_ceil(2));
         trace.checkpoint()?;
         let best = self.apart(six, finalists, price);
         let poses: Vec<Pose> = best.iter().map(|start| start.pose).collect();
         let plan = Shrinking { last_m: most_m.min(0.025), ..plan };
-        let refined = level.refined(&level.starts(&poses), &plan, || trace.checkpoint())?;
+        let walks = level.starts(&poses).iter().map(Refined::unmoved).collect();
+        let refined =
+            self.halved(&level, walks, &plan, MIN_REFINED, price, || trace.checkpoint())?;
         let best = self.apart(refined, finalists, price);
         Ok(best.into_iter().map(|start| start.pose).collect())
     }

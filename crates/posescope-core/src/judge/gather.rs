@@ -19,6 +19,8 @@ pub struct Gathering {
     pub first_m: f64,
     /// Radians that count as a metre.
     pub rad_per_m: f64,
+    /// Walks that are never given up.
+    pub fewest: usize,
 }
 
 /// Times that samples are drawn.
@@ -49,14 +51,16 @@ struct Cloud {
     factor: Matrix6<f64>,
 }
 
-/// Moves each walk to the cheapest of the samples around it, where one costs less. The samples are the same in each
-/// run. `costs_of` is as for [`shrink`](super::shrink()).
+/// Moves each walk to the cheapest of the samples around it, where one costs less. After each round, the half whose poses
+/// have the higher prices stays where it is. The samples are the same in each run. `costs_of` is as for
+/// [`shrink`](super::shrink()).
 ///
 /// # Errors
 /// Those of `costs_of`.
 pub fn gather<E>(
     walks: &mut [Refined],
     plan: &Gathering,
+    price: impl Fn(&Pose, f64) -> f64,
     mut costs_of: impl FnMut(&[Pose]) -> Result<Vec<Option<f64>>, E>,
 ) -> Result<(), E> {
     let first = Vector6::from_fn(|axis, _| {
@@ -67,12 +71,13 @@ pub fn gather<E>(
         mean: Vector6::zeros(),
         factor: Matrix6::from_diagonal(&first),
     };
-    let mut clouds: Vec<Cloud> = walks.iter().map(cloud).collect();
+    let mut active: Vec<(Cloud, &mut Refined)> =
+        walks.iter_mut().map(|walk| (cloud(walk), walk)).collect();
     let mut rng = Pcg64::seed_from_u64(0);
     for round in 1..=ROUNDS {
         let normal: Vec<Vector6<f64>> = (0..SAMPLES).map(|_| nearly_normal(&mut rng)).collect();
         let least = Matrix6::from_diagonal(&(first * SHRINKING.powi(round)).map(|one| one * one));
-        for (walk, cloud) in walks.iter_mut().zip(&mut clouds) {
+        for (cloud, walk) in &mut active {
             let steps: Vec<Vector6<f64>> =
                 normal.iter().map(|one| cloud.mean + cloud.factor * one).collect();
             let sampled =
@@ -100,6 +105,9 @@ pub fn gather<E>(
                 cloud.factor = covariance.cholesky().map_or(cloud.factor, |it| it.unpack());
             }
         }
+        let price = |walk: &Refined| price(&walk.pose, walk.cost);
+        active.sort_by(|(_, a), (_, b)| price(a).total_cmp(&price(b)));
+        active.truncate(plan.fewest.max(active.len().div_ceil(2)));
     }
     Ok(())
 }
@@ -119,7 +127,7 @@ mod tests {
     use crate::geometry::PoseError;
     use crate::judge::{Freedoms, Shrinking, Start, moved, shrink};
 
-    const PLAN: Gathering = Gathering { first_m: 0.5, rad_per_m: 0.05 };
+    const PLAN: Gathering = Gathering { first_m: 0.5, rad_per_m: 0.05, fewest: 3 };
 
     /// A bowl around a pose with dents every quarter of a metre, which hold what goes down step by step.
     fn dented(truth: &Pose, pose: &Pose) -> f64 {
@@ -138,7 +146,7 @@ mod tests {
             assert!(poses.len() <= MAX_AT_A_TIME);
             Ok::<_, Infallible>(poses.iter().map(|pose| Some(dented(truth, pose))).collect())
         };
-        let Ok(()) = gather(&mut walks, &PLAN, costs);
+        let Ok(()) = gather(&mut walks, &PLAN, |_, cost| cost, costs);
         walks
     }
 
@@ -179,11 +187,28 @@ mod tests {
     }
 
     #[test]
+    fn half_of_the_walks_are_given_up_after_each_round_by_price() {
+        let truth = Pose::identity();
+        let away = |x: &f64| start(&truth, Pose::translation(*x, 0.0, 0.0));
+        // Each in a dent of its own, so deep that no sample leads to another's place.
+        let mut walks: Vec<Refined> = [9.0, 0.0, 6.0, 12.0, 3.0].iter().map(away).collect();
+        let near = |pose: &Pose| (pose.translation.x / 3.0 + 0.5).fract() - 0.5;
+        let cost =
+            |pose: &Pose| Some(near(pose).powi(2) + 0.1 * (pose.translation.x / 3.0).round());
+        let costs = |poses: &[Pose]| Ok::<_, Infallible>(poses.iter().map(cost).collect());
+        let plan = Gathering { fewest: 2, ..PLAN };
+        // The price likes the farthest best.
+        let Ok(()) = gather(&mut walks, &plan, |pose, _| -pose.translation.x, costs);
+        let evaluations: Vec<u64> = walks.iter().map(|walk| walk.evaluations).collect();
+        assert_eq!(evaluations, [256, 64, 128, 256, 64]);
+    }
+
+    #[test]
     fn where_nothing_has_a_cost_a_walk_stays() {
         let mut walks = [start(&Pose::identity(), Pose::translation(1.0, 0.0, 0.0))];
         let before = walks[0];
         let nothing = |poses: &[Pose]| Ok::<_, Infallible>(vec![None; poses.len()]);
-        let Ok(()) = gather(&mut walks, &PLAN, nothing);
+        let Ok(()) = gather(&mut walks, &PLAN, |_, cost| cost, nothing);
         assert_eq!((walks[0].pose, walks[0].cost), (before.pose, before.cost));
     }
 }

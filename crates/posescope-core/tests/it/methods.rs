@@ -134,8 +134,9 @@ fn copies_are_searched_with_all_channels_and_samples_gather_around_what_they_lea
     let [contrast, edges] = ["judge.channels=contrast", "judge.channels=gradient"].map(refined);
     assert_eq!(starts(&contrast), starts(&edges), "whatever decides later");
     assert_ne!(contrast[0].cost, edges[0].cost);
-    // Four rounds of 64, before the first step.
-    assert!(contrast.iter().all(|one| one.evaluations > 256));
+    // One to four rounds of 64, before the first step.
+    assert!(contrast.iter().all(|one| one.evaluations > 64));
+    assert!(contrast[0].evaluations > 256);
 }
 
 #[test]

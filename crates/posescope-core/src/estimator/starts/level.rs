@@ -40,8 +40,10 @@ impl ManyStarts {
         if pose.translation.vector.norm() > reach {
             return Ok(None);
         }
-        let walks = level.gathered(&level.starts(&[pose]), &self.around(), &mut checkpoint)?;
-        let refined = self.halved(level, walks, &self.in_six(), 1, |_, cost| cost, checkpoint)?;
+        let price = |_: &Pose, cost: f64| cost;
+        let starts = level.starts(&[pose]);
+        let walks = level.gathered(&starts, &self.around(), price, &mut checkpoint)?;
+        let refined = self.halved(level, walks, &self.in_six(), 1, price, checkpoint)?;
         let inside = refined.first().filter(|one| one.pose.translation.vector.norm() <= reach);
         Ok(inside.copied())
     }
@@ -78,10 +80,11 @@ impl<O: Objective> Level<O> {
         &self,
         starts: &[Start],
         plan: &Gathering,
+        price: impl Fn(&Pose, f64) -> f64,
         checkpoint: impl FnMut() -> Result<(), E>,
     ) -> Result<Vec<Refined>, E> {
         let mut walks: Vec<Refined> = starts.iter().map(Refined::unmoved).collect();
-        gather(&mut walks, plan, self.checked_costs(checkpoint))?;
+        gather(&mut walks, plan, price, self.checked_costs(checkpoint))?;
         Ok(walks)
     }
 

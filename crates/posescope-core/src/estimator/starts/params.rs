@@ -10,11 +10,11 @@ parameters! {
         /// Coarse lattices, each at a yaw of its own, where no smaller copies are searched.
         pub yaws: usize = 5 => count("yaws", "", 1..=61),
         /// Yaw between neighbouring coarse lattices.
-        pub yaw_step_deg: f64 = 3.0 => number("yaw_step", "°", 0.1..=45.0),
+        pub yaw_step_deg: f64 = 4.0 => number("yaw_step", "°", 0.1..=45.0),
         /// Coarse minima that are refined in right, forward and yaw.
-        pub starts: usize = 40 => count("starts", "", 1..=200),
-        /// The best of those, which are refined in all six freedoms.
-        pub finalists: usize = 10 => count("finalists", "", 1..=100),
+        pub starts: usize = 60 => count("starts", "", 1..=200),
+        /// The best of those, around which samples gather before a refinement in all six freedoms.
+        pub finalists: usize = 20 => count("finalists", "", 1..=100),
         /// First step of the refinement in right, forward and yaw, and standard deviation of the samples around finalists; at
         /// most half a step between coarse positions.
         pub first_step_m: f64 = 0.5 => number("first_step", "m", 1e-6..=1e4),
@@ -28,7 +28,7 @@ parameters! {
         /// themselves are searched.
         pub coarse_shrink: usize = 3 => count("coarse_shrink", "", 1..=16),
         /// Lattices for the copies, each at a yaw of its own. The least likely poses are left out.
-        pub coarse_yaws: usize = 41 => count("coarse_yaws", "", 1..=61),
+        pub coarse_yaws: usize = 31 => count("coarse_yaws", "", 1..=61),
         /// Turn against the reference's heading at which a pose's penalty is one standard deviation of the coarse
         /// costs; twice the turn has four times the penalty.
         pub usual_yaw_deg: f64 = 8.0 => number("usual_yaw", "°", 0.1..=1000.0),
