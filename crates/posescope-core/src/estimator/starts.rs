@@ -32,7 +32,7 @@ use crate::trace::{Cancelled, Trace};
 /// paper's scale.
 const PLANE_LAST_M: f64 = 0.05;
 
-/// At least so many minima are refined to the last step: the answer, and what it is compared with.
+/// At least so many minima are followed to the end: the answer, and what it is compared with.
 const MIN_REFINED: usize = 5;
 
 /// Starts nearer to each other than this are one, unless their headings differ \[m\], at the paper's scale.
