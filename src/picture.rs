@@ -35,7 +35,7 @@ pub(crate) fn photo(photo: &Photo) -> DynamicImage {
 /// as large in the same view. A camera that moves forward also shifts features more sideways than vertically, so
 /// true matches are nearly vertical lines.
 pub(crate) fn stacked(query: &Photo, reference: &Photo) -> (DynamicImage, u32) {
-    let top = query.gray.height() + 4;
+    let top = row_below(query);
     let canvas = match (&query.color, &reference.color) {
         (None, None) => one_above_the_other(&query.gray, &reference.gray, top, Luma([255])).into(),
         _ => {
@@ -44,6 +44,11 @@ pub(crate) fn stacked(query: &Photo, reference: &Photo) -> (DynamicImage, u32) {
         }
     };
     (canvas, top)
+}
+
+/// The first row of the photo below this one.
+pub(crate) fn row_below(query: &Photo) -> u32 {
+    query.gray.height() + 4
 }
 
 fn one_above_the_other<P: Pixel>(

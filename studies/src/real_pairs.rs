@@ -1,4 +1,4 @@
-//! Pairs of real photos with scans, where there are any.
+//! Pairs of real photos with scans.
 //!
 //! The data are not part of the project: `POSESCOPE_DATA` names their folder. They are the pair of the
 //! paper's authors (KITTI odometry 00, frames 3814 and 3823) and frames of drive 0013 (KITTI raw), 3.6
@@ -42,12 +42,10 @@ const SOURCES: [(&str, &str); 2] = [
     ),
 ];
 
-/// All pairs below `POSESCOPE_DATA`; none where that is not set.
+/// All pairs below `POSESCOPE_DATA`.
 pub fn all() -> Result<Vec<RealPair>, Failure> {
-    let Some(root) = std::env::var_os("POSESCOPE_DATA") else {
-        println!("skipped: no data (POSESCOPE_DATA)");
-        return Ok(Vec::new());
-    };
+    let root = std::env::var_os("POSESCOPE_DATA")
+        .ok_or("real pairs need POSESCOPE_DATA, the folder with the sample data")?;
     let root = Path::new(&root);
     let sources = SOURCES
         .map(|(folder, poses)| frames(&root.join(folder), &root.join(poses)))

@@ -322,6 +322,33 @@ fn a_recording_of_something_wrong_opens_on_the_picture_that_proves_it() {
 }
 
 #[test]
+fn every_method_alone_has_its_pictures_in_the_layout() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for method in estimator::methods() {
+        let path = recorded(&folder, "alone.rrd", &[method], &Params::default());
+        let (found, layout) = (timelines(&chunks(&path)), layout(&path));
+        let has = |entity: &str| found.contains_key(entity);
+        let is_laid_out = |entity: &str| layout.contains(&format!("\"{entity}\""));
+        let shown = ["fb/matches/0", "fb/funnel"].map(str::to_owned).into_iter();
+        let shown = shown.chain(estimator::methods().flat_map(|of| {
+            let pictures = ["synthetic", "best"].map(|part| entities::direct(of, part));
+            pictures.into_iter().chain([entities::yaw_curve(of)])
+        }));
+        let mut views = 0;
+        for entity in shown {
+            // A hybrid has room for the method that it did not need.
+            let is_room = method == Method::HY && !has(&entity);
+            assert!(is_room || is_laid_out(&entity) == has(&entity), "{method}: {entity}");
+            views += usize::from(has(&entity));
+        }
+        assert!(views >= 2, "{method}: {views}");
+        let result = format!("/{}/label", entities::estimate(method));
+        let has_map = estimator::direct_methods(&[method]) != [];
+        assert!(layout.contains(&result) || !has_map, "{method}: the map shows no result");
+    }
+}
+
+#[test]
 fn where_lengths_have_no_unit_a_recording_names_no_metres() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("model.rrd");

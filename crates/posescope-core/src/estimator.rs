@@ -184,6 +184,7 @@ pub struct Entry {
     pub family: Option<Family>,
     cost: Option<&'static cost::Entry>,
     hybrid: Option<HybridParts>,
+    runs: &'static [Method],
     make: Make,
     least_probability: fn(&Params) -> f64,
 }
@@ -201,6 +202,7 @@ impl Entry {
             family: None,
             cost: None,
             hybrid: None,
+            runs: &[],
             make: Box::new(make),
             least_probability: |_| 0.0,
         }
@@ -225,6 +227,15 @@ impl Entry {
     /// The methods that it runs inside, if it is made of others.
     pub fn hybrid(&self) -> Option<HybridParts> {
         self.hybrid
+    }
+
+    /// The methods whose events show what it does: those that it runs inside, else itself.
+    pub fn told_by(&self) -> Vec<Method> {
+        match self.hybrid {
+            Some(HybridParts { first, second }) => vec![first, second],
+            None if self.runs.is_empty() => vec![self.method],
+            None => self.runs.to_vec(),
+        }
     }
 }
 

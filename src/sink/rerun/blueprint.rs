@@ -8,7 +8,7 @@ use super::entities;
 use super::layout::{BlueprintNode, BlueprintView};
 use super::stream::Stream;
 use crate::cost::ExplanationKind;
-use crate::estimator::{self, Entry};
+use crate::estimator::{self, Entry, Family};
 use crate::features::FeatureState;
 use crate::geometry::Pose;
 use crate::localize::QueryResult;
@@ -31,15 +31,15 @@ pub(super) struct LayoutInput<'a> {
     /// The number of ranked frames with a picture.
     pub(super) ranked: usize,
     /// What to show first.
-    pub(super) focus: Focus,
+    pub(super) focus: &'a Focus,
     /// Whether the recording has pages of a lesson.
     pub(super) has_pages: bool,
 }
 
-/// What the layout shows first, once the results are known; empty before.
-#[derive(Clone, Debug, Default)]
+/// What the layout shows first.
+#[derive(Clone, Debug, PartialEq)]
 pub(super) struct Focus {
-    /// The estimators with wrong or missing results; for a hybrid, the one whose pose it took.
+    /// The estimators behind wrong or missing results; for a hybrid, the one whose pose it took.
     pub(super) wrong: Vec<Method>,
     /// The methods with a picture that proves the failure.
     pub(super) proven: Vec<Method>,
@@ -48,7 +48,7 @@ pub(super) struct Focus {
 }
 
 impl Focus {
-    /// From all results of a query.
+    /// From the results of a query so far.
     pub(super) fn of(
         first: &Problem,
         truth: Option<&Pose>,
@@ -56,16 +56,23 @@ impl Focus {
         proven: &[Method],
     ) -> Self {
         let wrong = results.iter().filter(|result| is_wrong(result));
-        let estimates = results.iter().filter_map(|result| result.pose.as_ref()?.to_pose());
+        // What is right is at the truth.
+        let far = results.iter().filter(|result| truth.is_none() || is_wrong(result));
+        let estimates = far.filter_map(|result| result.pose.as_ref()?.to_pose());
         let in_reference = |pose: &Pose| -> [f64; 3] {
             first.reference_from_query(pose).translation.vector.into()
         };
         Self {
-            wrong: wrong.filter_map(responsible).collect(),
+            wrong: wrong.filter_map(responsible).flat_map(told_by).collect(),
             proven: proven.to_vec(),
             places: estimates.chain(truth.copied()).map(|pose| in_reference(&pose)).collect(),
         }
     }
+}
+
+/// The methods whose events show what a method does.
+pub(super) fn told_by(method: Method) -> Vec<Method> {
+    estimator::find(method).map_or(vec![method], Entry::told_by)
 }
 
 /// Whether a result is wrong or missing, or has a failure verdict.
@@ -86,7 +93,7 @@ pub(super) fn log_styles(stream: &mut Stream, methods: &[Method]) {
         let best = names(&["best inliers"]);
         stream.log_static(entities::RANSAC_BEST, &best);
     }
-    let direct = estimator::direct_methods(methods);
+    let direct = searches(methods);
     for &method in &direct {
         let best = names(&["best cost"]).with_colors([super::color(palette::ESTIMATE)]);
         stream.log_static(&entities::direct(method, "best"), &best);
@@ -97,12 +104,20 @@ pub(super) fn log_styles(stream: &mut Stream, methods: &[Method]) {
     }
 }
 
-/// Whether the recording may contain FB; a hybrid records both its methods.
+/// Whether features are matched.
 fn shows_features(methods: &[Method]) -> bool {
-    methods.iter().any(|&method| {
-        let parts = estimator::find(method).and_then(Entry::hybrid);
-        method == Method::FB || parts.is_some_and(|parts| parts.first == Method::FB)
-    })
+    let mut families = methods.iter().flat_map(|&method| told_by(method)).filter_map(family);
+    families.any(|family| Family::MATCHING.contains(&family))
+}
+
+fn family(method: Method) -> Option<Family> {
+    estimator::find(method)?.family
+}
+
+/// The methods that search a cost, each of which has a row.
+fn searches(methods: &[Method]) -> Vec<Method> {
+    let told: Vec<Method> = methods.iter().flat_map(|&method| told_by(method)).collect();
+    estimator::direct_methods(&told)
 }
 
 /// Whether a method's cost uses a joint histogram.
@@ -113,7 +128,7 @@ fn has_histogram(method: Method) -> bool {
 
 /// The world and text on the left, a row per method on the right.
 fn root(input: &LayoutInput<'_>) -> BlueprintNode {
-    let LayoutInput { methods, first, references, ranked, ref focus, has_pages } = *input;
+    let LayoutInput { methods, first, references, ranked, focus, has_pages } = *input;
     let viewpoints = &Viewpoints(first);
     let document = |name, origin: &str| view("TextDocument", name, origin);
     let mut words = vec![
@@ -137,7 +152,7 @@ fn root(input: &LayoutInput<'_>) -> BlueprintNode {
     if shows_features(methods) {
         rows.push((1.0, feature_row()));
     }
-    let mut direct = estimator::direct_methods(methods);
+    let mut direct = searches(methods);
     // The first tab, which is open, shows a failure.
     direct.sort_by_key(|method| !focus.wrong.contains(method));
     let share = match direct.first() {
@@ -145,7 +160,7 @@ fn root(input: &LayoutInput<'_>) -> BlueprintNode {
         _ => 1.2,
     };
     let direct = direct.into_iter();
-    let direct: Vec<_> = direct.map(|method| search_row(method, viewpoints)).collect();
+    let direct: Vec<_> = direct.map(|method| search_row(method, methods, viewpoints)).collect();
     // Three rows would be too low for the photos.
     if rows.is_empty() {
         rows = equal(direct);
@@ -209,7 +224,7 @@ fn feature_row() -> BlueprintNode {
 }
 
 /// The search of a direct method, step by step.
-fn search_row(method: Method, viewpoints: &Viewpoints<'_>) -> BlueprintNode {
+fn search_row(method: Method, methods: &[Method], viewpoints: &Viewpoints<'_>) -> BlueprintNode {
     let name = method.label();
     let of = |part: &str| entities::direct(method, part);
     let image = |what: &str, part: &str| view("2D", format!("{name} {what}"), of(part));
@@ -223,14 +238,18 @@ fn search_row(method: Method, viewpoints: &Viewpoints<'_>) -> BlueprintNode {
     });
     let query = view("2D", "Query", entities::QUERY_IMAGE);
     let views = BlueprintNode::tabs(vec![image("synthetic", "synthetic"), query]);
-    let yaw = entities::yaw_curve(method);
-    let maps = BlueprintNode::tabs(vec![
-        map(method, "cost", viewpoints).into(),
-        view("BarChart", format!("{name} yaw [°]"), yaw),
-        map(method, "coverage", viewpoints).into(),
+    let mut maps = vec![
+        map(method, methods, "cost", viewpoints).into(),
+        map(method, methods, "coverage", viewpoints).into(),
         plot(format!("{name} best"), of("best")),
         plot(format!("{name} cost (timeline eval)"), of("cost")),
-    ]);
+    ];
+    // Others search all freedoms at once.
+    if family(method) == Some(Family::Grid) {
+        let yaw = view("BarChart", format!("{name} yaw [°]"), entities::yaw_curve(method));
+        maps.insert(1, yaw);
+    }
+    let maps = BlueprintNode::tabs(maps);
     let views = BlueprintNode::column(equal([views, comparison]));
     BlueprintNode::row(&name, vec![(3.0, views), (2.0, maps)])
 }
@@ -245,16 +264,28 @@ fn equal(nodes: impl IntoIterator<Item = BlueprintNode>) -> Vec<(f32, BlueprintN
 }
 
 /// A surface of the grid search, seen from above.
-fn map(method: Method, part: &str, viewpoints: &Viewpoints<'_>) -> BlueprintView {
+fn map(
+    method: Method,
+    methods: &[Method],
+    part: &str,
+    viewpoints: &Viewpoints<'_>,
+) -> BlueprintView {
     let name = format!("{} {part}", method.label());
+    let mut contents = vec![
+        format!("+ /{}/**", entities::search(method, part)),
+        format!("+ /{}", entities::search(method, "path")),
+        format!("+ /{}/label", entities::reference(0)),
+        format!("+ /{}/label", entities::truth()),
+    ];
+    // Where only a method that runs this one was asked for, the result is that one's.
+    let is_shown = |asked: &Method| match methods.contains(&method) {
+        true => *asked == method,
+        false => told_by(*asked).contains(&method),
+    };
+    let results = methods.iter().copied().filter(is_shown);
+    contents.extend(results.map(|asked| format!("+ /{}/label", entities::estimate(asked))));
     BlueprintView::new("3D", name, "/")
-        .of([
-            format!("+ /{}/**", entities::search(method, part)),
-            format!("+ /{}", entities::search(method, "path")),
-            format!("+ /{}/label", entities::reference(0)),
-            format!("+ /{}/label", entities::estimate(method)),
-            format!("+ /{}/label", entities::truth()),
-        ])
+        .of(contents)
         .with("EyeControls3D", viewpoints.above())
         .with("LineGrid3D", LineGrid3D::new().with_visible(false))
 }

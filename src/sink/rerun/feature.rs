@@ -82,10 +82,12 @@ impl FeatureContext {
 
     fn canvas(&mut self, context: &EventContext<'_>, stream: &mut Stream) {
         let problem = context.problem;
-        let photos = [&problem.query.photo, &problem.reference.photo];
-        let (canvas, top) = picture::stacked(photos[0], photos[1]);
-        self.canvas_top = top;
-        stream.log_image(&entities::matches(context.reference), jpeg(&canvas));
+        let (query, reference) = (&problem.query.photo, &problem.reference.photo);
+        self.canvas_top = picture::row_below(query);
+        if context.is_first_match {
+            let (canvas, _) = picture::stacked(query, reference);
+            stream.log_image(&entities::matches(context.reference), jpeg(&canvas));
+        }
     }
 
     fn undecided(&self, context: &EventContext<'_>, stream: &mut Stream) {

@@ -18,7 +18,7 @@ use crate::problem::Problem;
 use crate::trace::{Cancelled, Record, Sink};
 
 /// The most tasks in the queue; a queued synthetic view takes one or two megabytes.
-const WAITING: usize = 64;
+const WAITING: usize = 1024;
 
 /// One thing to record.
 type Task = Box<dyn FnOnce(&mut Recording) + Send>;

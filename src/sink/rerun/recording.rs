@@ -39,7 +39,8 @@ pub(super) struct Recording {
     methods: Vec<Method>,
     /// The place drawn at (0, 0, 0), from the first query for the whole recording.
     origin: Option<Origin>,
-    is_laid_out: bool,
+    /// What the layout that was sent last shows first.
+    focus: Option<Focus>,
     /// Whether there are pages of a lesson.
     pub(super) has_pages: bool,
     query: CurrentQuery,
@@ -55,7 +56,10 @@ struct CurrentQuery {
     results: Vec<QueryResult>,
     reference: usize,
     method: Option<Method>,
+    /// References whose cloud is recorded.
     clouds: BTreeSet<usize>,
+    /// References whose photo is recorded below the query.
+    matched: BTreeSet<usize>,
     stages: Vec<Stage>,
     /// The estimators whose stages are open, outermost first.
     estimators: Vec<ActiveEstimator>,
@@ -96,7 +100,7 @@ impl Recording {
             identity: identity.clone(),
             methods: methods.to_vec(),
             origin: None,
-            is_laid_out: false,
+            focus: None,
             has_pages: false,
             query: CurrentQuery::default(),
             evals: BTreeMap::new(),
@@ -136,37 +140,38 @@ impl Recording {
 
     /// Sends the first layout, once it is known whether the references were ranked.
     fn lay_out(&mut self) {
-        if !self.is_laid_out && !self.query.problems.is_empty() {
-            self.is_laid_out = true;
-            self.send_layout(Focus::default());
+        if self.focus.is_none() {
+            self.send_layout();
         }
     }
 
-    /// Sends the layout again, now that the failures are known.
+    /// Sends the layout again, where the failures that are known now change it.
     fn lay_out_story(&mut self) {
-        let CurrentQuery { problems, truth, results, proven, .. } = &self.query;
         // The layout of a lesson stays as it is.
-        if results.is_empty() || self.stream.is_broken() || self.has_pages {
-            return;
-        }
-        if let Some(first) = problems.first() {
-            self.send_layout(Focus::of(first, truth.as_ref(), results, proven));
+        if !self.query.results.is_empty() && !self.stream.is_broken() && !self.has_pages {
+            self.send_layout();
         }
     }
 
-    fn send_layout(&mut self, focus: Focus) {
-        let Some(first) = self.query.problems.first() else {
+    fn send_layout(&mut self) {
+        let CurrentQuery { problems, truth, results, proven, .. } = &self.query;
+        let Some(first) = problems.first() else {
             return;
         };
+        let focus = Focus::of(first, truth.as_ref(), results, proven);
+        if self.focus.as_ref() == Some(&focus) {
+            return;
+        }
         let input = blueprint::LayoutInput {
             methods: &self.methods,
             first,
-            references: self.query.problems.len(),
+            references: problems.len(),
             ranked: self.query.ranked,
-            focus,
+            focus: &focus,
             has_pages: self.has_pages,
         };
         blueprint::send(&mut self.stream, &input);
+        self.focus = Some(focus);
     }
 
     /// Records the picture that proves a failure, once per method.
@@ -182,10 +187,11 @@ impl Recording {
         if !is_wrong(result) || query.proven.contains(&result.method) {
             return;
         }
-        let records = query.records.get(&(query.reference, estimator));
+        let told_by = blueprint::told_by(estimator).into_iter();
+        let records = told_by.filter_map(|teller| query.records.get(&(query.reference, teller)));
         let case = ProofCase {
             problem,
-            records: records.map_or(&[], Vec::as_slice),
+            records: &records.flatten().cloned().collect::<Vec<_>>(),
             result,
             truth: query.truth.as_ref(),
             params: &self.params,
@@ -353,6 +359,8 @@ impl Recording {
             problem,
             method,
             evals: self.evals.get(&method).copied().unwrap_or(0),
+            is_first_match: matches!(event, Event::MatchesDecided(_))
+                && self.query.matched.insert(index),
             origin,
         };
         if let Some(estimator) = self.query.estimators.last_mut() {

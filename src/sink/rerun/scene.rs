@@ -53,6 +53,8 @@ pub(super) struct EventContext<'a> {
     pub(super) method: Method,
     /// The estimator's hypotheses in earlier runs, after which the timeline `eval` continues.
     pub(super) evals: i64,
+    /// Whether these photos are matched for the first time.
+    pub(super) is_first_match: bool,
     /// The place drawn at (0, 0, 0).
     pub(super) origin: Origin,
 }

@@ -37,6 +37,7 @@ pub(super) fn entry() -> Entry {
     Entry {
         family: Some(Family::Starts),
         cost: Some(shown()),
+        runs: &[Method::FB, fb2::METHOD, mi6::METHOD],
         least_probability: |params| params.robust.least_probability,
         ..Entry::new(METHOD, about, |params| Box::new(Robust::new(params)))
     }

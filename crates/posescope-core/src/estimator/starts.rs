@@ -399,3 +399,91 @@ impl ManyStarts {
         between.translation_m > self.scale.length(SAME_M) || between.rotation_deg > SAME_DEG
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Mutex;
+
+    use super::*;
+    use crate::camera::Intrinsics;
+    use crate::cloud::Cloud;
+    use crate::geometry::yaw;
+    use crate::image::Photo;
+    use crate::problem::{Query, ReferenceTuple};
+
+    /// Cones along the way: the place of each, how far it is turned \[°\], and its least cost.
+    const CONES: [(f64, f64, f64); 10] = [
+        (-20.0, 8.0, 0.79),
+        (-16.0, 8.0, 0.79),
+        (-12.0, 0.0, 0.8),
+        (-8.0, 8.0, 0.79),
+        (-4.0, 8.0, 0.79),
+        (4.0, 0.0, 0.8),
+        (8.0, 8.0, 0.79),
+        (12.0, 8.0, 0.79),
+        (16.0, 0.0, 0.8),
+        (20.0, 8.0, 0.79),
+    ];
+
+    /// A cost of cones, which counts the rounds of samples around each.
+    struct Cones {
+        rounds: Mutex<[usize; CONES.len()]>,
+    }
+
+    impl Cones {
+        fn nearest(pose: &Pose) -> (usize, f64) {
+            let costs = CONES.iter().map(|&(forward_m, yaw_deg, least)| {
+                let cone = Pose::from_parts(
+                    nalgebra::Vector3::new(0.0, 0.0, forward_m).into(),
+                    yaw(yaw_deg.to_radians()),
+                );
+                let off = PoseError::between(&cone, pose);
+                least + 0.02 * off.translation_m + 0.01 * off.rotation_deg
+            });
+            let nearest = costs.enumerate().min_by(|(_, a), (_, b)| a.total_cmp(b));
+            nearest.expect("there are cones")
+        }
+    }
+
+    impl Objective for Cones {
+        fn score(&self, reference_from_camera: &[Pose]) -> Vec<Score> {
+            let nearest: Vec<_> = reference_from_camera.iter().map(Self::nearest).collect();
+            let (first, _) = nearest[0];
+            // Only samples of one walk are so many around one cone.
+            if nearest.len() == 64 && nearest.iter().all(|&(cone, _)| cone == first) {
+                self.rounds.lock().expect("no panic")[first] += 1;
+            }
+            nearest.iter().map(|&(_, cost)| Score { cost: Some(cost), covered: 100 }).collect()
+        }
+
+        fn batch(&self, hypotheses: usize) -> usize {
+            hypotheses
+        }
+
+        fn shuffled(&self, _: &Pose, _: u64) -> Option<f64> {
+            None
+        }
+    }
+
+    #[test]
+    fn likelier_poses_are_sampled_to_the_end_though_others_are_a_little_cheaper() {
+        let camera = Intrinsics { fx: 4.0, fy: 4.0, cx: 1.5, cy: 1.5, width: 4, height: 4 };
+        let photo = || Photo::from_gray_values(4, 4, vec![0; 16]).expect("of that size");
+        let query = Query::new("query", photo(), camera).expect("fits");
+        let reference =
+            ReferenceTuple::new("reference", photo(), camera, Pose::identity(), Cloud::default());
+        let problem = Problem::new(query, reference.expect("fits"), 25.0).expect("a radius");
+        let starts = ManyStarts::new(&Params::default());
+        let level = starts.level(Cones { rounds: Mutex::default() });
+        let compare = |_: &Pose, _: Score| unreachable!("nobody looks");
+        let found = starts
+            .search(&problem, &level, None, &compare, &mut Trace::off())
+            .unwrap_or_else(|_| panic!("there are minima"));
+        assert!(found.refined[0].cost > 0.795, "{:?}", found.refined[0]);
+        let rounds = level.objective.rounds.into_inner().expect("no panic");
+        for ((_, yaw_deg, _), rounds) in CONES.into_iter().zip(rounds) {
+            assert!(rounds >= 1, "each is sampled");
+            assert!(yaw_deg != 0.0 || rounds >= 4, "{rounds} rounds around a likely pose");
+        }
+    }
+}

@@ -56,13 +56,20 @@ impl<W: Send> Pool<W> {
     ) -> Vec<Score> {
         let jobs = poses.par_chunks(PER_JOB);
         jobs.flat_map_iter(|poses| {
-            let idle = self.idle().pop();
-            let mut worker = idle.unwrap_or_else(&new_worker);
-            let scores: Vec<Score> = poses.iter().map(|pose| score(&mut worker, pose)).collect();
-            self.idle().push(worker);
-            scores
+            self.with(&new_worker, |worker| -> Vec<Score> {
+                poses.iter().map(|pose| score(worker, pose)).collect()
+            })
         })
         .collect()
+    }
+
+    /// What a worker makes: one that no thread uses, or else a new one.
+    pub fn with<T>(&self, new_worker: impl FnOnce() -> W, make: impl FnOnce(&mut W) -> T) -> T {
+        let idle = self.idle().pop();
+        let mut worker = idle.unwrap_or_else(new_worker);
+        let made = make(&mut worker);
+        self.idle().push(worker);
+        made
     }
 
     fn idle(&self) -> MutexGuard<'_, Vec<W>> {

@@ -41,6 +41,7 @@ pub struct Scorer<'a> {
     splat_px: usize,
     statistic: Statistic<'a>,
     threads: OnceLock<Threads>,
+    rasterizers: Pool<Rasterizer>,
     /// What scores many hypotheses instead of the threads.
     on_device: OnDevice,
 }
@@ -48,7 +49,7 @@ pub struct Scorer<'a> {
 /// What all hypotheses have in common on the threads, as the statistic wants it.
 enum Threads {
     /// The statistic may depend on the order of the pairs, or the image or the joint histogram is too large.
-    Plain(Pool<Rasterizer>),
+    Plain,
     LesserHalf {
         points: ShownPoints<f32>,
         pool: Pool<(DepthCanvas<f32>, LesserHalfFinder)>,
@@ -79,6 +80,7 @@ impl<'a> Scorer<'a> {
             splat_px,
             statistic: cost.statistic(),
             threads: OnceLock::new(),
+            rasterizers: Pool::default(),
             on_device: OnDevice::new(device_in_use()),
         }
     }
@@ -100,7 +102,7 @@ impl<'a> Scorer<'a> {
         let (poses, query) = (reference_from_camera, self.query.as_raw().as_slice());
         let score = |cost, covered: usize| Score { cost, covered: covered as u32 };
         match self.threads() {
-            Threads::Plain(pool) => pool.score(
+            Threads::Plain => self.rasterizers.score(
                 poses,
                 || self.rasterizer(),
                 |rasterizer, pose| {
@@ -137,7 +139,7 @@ impl<'a> Scorer<'a> {
             let values = self.cloud.points.iter().map(|point| point.intensity);
             let is_large = !DepthCanvas::<u8>::can_draw(&self.intrinsics, self.splat_px);
             match self.statistic {
-                _ if is_large => Threads::Plain(Pool::default()),
+                _ if is_large => Threads::Plain,
                 Statistic::LesserHalf { power: 1 } => Threads::LesserHalf {
                     points: ShownPoints { positions: positions(), values: values.collect() },
                     pool: Pool::default(),
@@ -153,7 +155,7 @@ impl<'a> Scorer<'a> {
                         pool: Pool::default(),
                     }
                 }
-                _ => Threads::Plain(Pool::default()),
+                _ => Threads::Plain,
             }
         })
     }
@@ -164,7 +166,11 @@ impl<'a> Scorer<'a> {
 
     /// The synthetic view of one camera beside the query.
     pub fn compare(&self, reference_from_camera: &Pose) -> Comparison {
-        let view = self.rasterizer().view(&self.cloud.points, &reference_from_camera.inverse());
+        let camera_from_points = reference_from_camera.inverse();
+        let view = self.rasterizers.with(
+            || self.rasterizer(),
+            |rasterizer| rasterizer.view(&self.cloud.points, &camera_from_points),
+        );
         let pairs = self.pair_up(&view.pixels);
         Comparison {
             score: self.score_of(&pairs),
@@ -176,8 +182,11 @@ impl<'a> Scorer<'a> {
 
     /// Query and view of one camera at each covered pixel, as [`Self::compare`] pairs them up.
     pub fn pairs(&self, reference_from_camera: &Pose) -> Vec<IntensityPair> {
-        let mut rasterizer = self.rasterizer();
-        self.pair_up(rasterizer.splat(&self.cloud.points, &reference_from_camera.inverse()))
+        let camera_from_points = reference_from_camera.inverse();
+        self.rasterizers.with(
+            || self.rasterizer(),
+            |rasterizer| self.pair_up(rasterizer.splat(&self.cloud.points, &camera_from_points)),
+        )
     }
 
     fn score_of(&self, pairs: &[IntensityPair]) -> Score {
