@@ -13,9 +13,10 @@ use posescope::event::{Kind, KindSet, PhaseSearched, ReferencesRanked, Stage, Vi
 use posescope::features::FeatureState;
 use posescope::geometry::Pose;
 use posescope::history::History;
-use posescope::localize::{LocalizeObserver as _, StageTimes, evaluate, localize_by};
+use posescope::localize::{LocalizeObserver as _, QueryResult, StageTimes, evaluate, localize_by};
 use posescope::method::Method;
 use posescope::params::Params;
+use posescope::proof::{ProofCase, ProofPicture};
 use posescope::retrieval::{Criterion, Geometry, Ranked, RankedReference, ReferenceRanking};
 use posescope::scale::Scale;
 use posescope::sink::rerun::{Identity, Recorder, Targets, entities};
@@ -51,24 +52,37 @@ fn identity_of(params: &Params) -> Identity {
 
 /// Runs methods on one query, as the command line does.
 fn run(recorder: &mut Recorder, methods: &[Method], params: &Params) {
+    let truth = solvable().reference.world_from_camera * Pose::translation(0.0, 0.0, 1.0);
+    run_against(&truth, recorder, &mut History::default(), methods, params);
+}
+
+/// As [`run`], with what is said to be the truth. Returns the last result.
+fn run_against(
+    truth: &Pose,
+    recorder: &mut Recorder,
+    history: &mut History,
+    methods: &[Method],
+    params: &Params,
+) -> Option<QueryResult> {
     let problem = solvable();
-    let truth = problem.reference.world_from_camera * Pose::translation(0.0, 0.0, 1.0);
-    recorder.begin_query(0, std::slice::from_ref(&problem), Some(&truth));
-    for &method in methods {
+    recorder.begin_query(0, std::slice::from_ref(&problem), Some(truth));
+    let results = methods.iter().map(|&method| {
         recorder.begin_method(0, method);
         let mut evidence = Evidence::default();
-        let mut both = Fanout::new(vec![&mut *recorder, &mut evidence]);
+        let mut all = Fanout::new(vec![&mut *recorder, &mut evidence, &mut *history]);
         let outcome = estimator::entry(method)
             .make(params)
-            .estimate(&problem, &mut Trace::to(&mut both))
+            .estimate(&problem, &mut Trace::to(&mut all))
             .expect("a recorder never cancels");
         let tolerance = Tolerance { translation_m: 0.4, rotation_deg: 5.0 };
         let subject = Subject::new(&problem, method, params, &outcome, &evidence);
-        let subject = subject.against(Some(&truth), tolerance);
+        let subject = subject.against(Some(truth), tolerance);
         let mut result = evaluate("two walls", &subject, Assessment::of(&subject));
         result.unit = params.scale.unit();
         recorder.end_method(&result, &StageTimes::default());
-    }
+        result
+    });
+    results.last()
 }
 
 fn open(path: &Path, methods: &[Method]) -> Recorder {
@@ -319,6 +333,43 @@ fn a_recording_of_something_wrong_opens_on_the_picture_that_proves_it() {
     assert!(!timelines(&chunks(&right)).contains_key(&proof));
     assert!(layout(&wrong).contains("Why MI is wrong"));
     assert!(!layout(&right).contains("Why MI is wrong"));
+}
+
+#[test]
+fn a_proof_of_robust_is_made_from_all_that_it_ran_inside() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("robust.rrd");
+    let robust: Method = "robust".parse().expect("is registered");
+    let (params, problem, mut history) = (Params::default(), solvable(), History::default());
+    // What is found is right, and far from what is said to be the truth.
+    let truth = problem.reference.world_from_camera * Pose::translation(-2.0, 0.0, 3.0);
+    let mut recorder = open(&path, &[robust]);
+    let result = run_against(&truth, &mut recorder, &mut history, &[robust], &params);
+    recorder.close().expect("a whole recording");
+    let result = result.expect("one method");
+
+    let is_proof = |chunk: &&Chunk| {
+        chunk.entity_path().to_string().trim_start_matches('/') == entities::proof(robust)
+    };
+    let chunks = chunks(&path);
+    let proof = chunks.iter().find(is_proof).expect("the pose is wrong");
+    let blob = rerun::EncodedImage::descriptor_blob().component;
+    let blob = proof.iter_slices::<&[u8]>(blob).next().expect("a picture");
+    let shown = image::load_from_memory(&blob[0]).expect("a JPEG").into_rgb8();
+
+    let records = history.records();
+    let case = ProofCase {
+        problem: &problem,
+        records,
+        result: &result,
+        truth: Some(&truth),
+        params: &params,
+    };
+    let drawn = ProofPicture::of(&case).expect("a proof").raster(1280, &result.headline());
+    assert_eq!(shown.dimensions(), drawn.dimensions());
+    let off = shown.iter().zip(drawn.iter()).map(|(a, b)| u64::from(a.abs_diff(*b)));
+    let off = off.sum::<u64>() / drawn.len() as u64;
+    assert!(off < 4, "pixels are {off} off");
 }
 
 #[test]

@@ -17,8 +17,9 @@ use crate::method::Method;
 use crate::problem::Problem;
 use crate::trace::{Cancelled, Record, Sink};
 
-/// The most tasks in the queue; a queued synthetic view takes one or two megabytes.
-const WAITING: usize = 1024;
+/// The most tasks in the queue: enough for a search to go on while photos are encoded. About thirty of them are
+/// synthetic views, which take one or two megabytes each.
+const WAITING: usize = 256;
 
 /// One thing to record.
 type Task = Box<dyn FnOnce(&mut Recording) + Send>;
