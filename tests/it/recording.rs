@@ -394,7 +394,7 @@ fn every_method_alone_has_its_pictures_in_the_layout() {
         }
         assert!(views >= 2, "{method}: {views}");
         let result = format!("/{}/label", entities::estimate(method));
-        let has_map = estimator::direct_methods(&[method]) != [];
+        let has_map = !estimator::direct_methods(&[method]).is_empty();
         assert!(layout.contains(&result) || !has_map, "{method}: the map shows no result");
     }
 }

@@ -278,12 +278,13 @@ fn map(
         format!("+ /{}/label", entities::truth()),
     ];
     // Where only a method that runs this one was asked for, the result is that one's.
-    let is_shown = |asked: &Method| match methods.contains(&method) {
-        true => *asked == method,
-        false => told_by(*asked).contains(&method),
+    let results: Vec<Method> = if methods.contains(&method) {
+        vec![method]
+    } else {
+        methods.iter().copied().filter(|&asked| told_by(asked).contains(&method)).collect()
     };
-    let results = methods.iter().copied().filter(is_shown);
-    contents.extend(results.map(|asked| format!("+ /{}/label", entities::estimate(asked))));
+    let label = |asked: &Method| format!("+ /{}/label", entities::estimate(*asked));
+    contents.extend(results.iter().map(label));
     BlueprintView::new("3D", name, "/")
         .of(contents)
         .with("EyeControls3D", viewpoints.above())
