@@ -62,8 +62,14 @@ impl ProofPicture {
     /// The places on a page of this width, and the height that they take: those that fill more of it.
     pub fn on_page(&self, width: f32) -> (Vec<Place>, f32) {
         const MAX: f32 = 1.2;
-        let filled =
-            |places: &[Place]| places.iter().map(Place::area).sum::<f32>() / bottom(places);
+        // Cells are seen as well on a part of the width, and photos beside them are not.
+        let most =
+            if self.large.has_cells { (LARGE_SHARES[1] * width).powi(2) } else { f32::INFINITY };
+        let filled = |places: &[Place]| {
+            let large = places.first().map_or(0.0, Place::area).min(most);
+            let small = places.iter().skip(1).map(Place::area).sum::<f32>();
+            (large + small) / bottom(places)
+        };
         let places = self.better(width, MAX * width, filled);
         let height = bottom(&places).ceil();
         (places, height)

@@ -186,6 +186,20 @@ fn every_verdict_has_a_picture_without_overlap() {
     }
 }
 
+/// A map of cells without a strip below it, as of `robust`, fills the whole width best, and leaves nothing for the photos.
+#[test]
+fn photos_beside_a_map_of_cells_are_seen() {
+    let mut large = Panel::plain("costs", 21, 21);
+    (large.has_cells, large.is_plain) = (true, false);
+    let photo = || Panel::new("photo", RgbImage::new(1241, 376));
+    let picture = ProofPicture { large, below: None, beside: (0..4).map(|_| photo()).collect() };
+    let (places, height) = picture.on_page(1280.0);
+    assert!(height < 960.0, "{height}");
+    for photo in &places[1..] {
+        assert!(photo.width > 400.0, "{photo:?}");
+    }
+}
+
 /// The same bytes each time: reports are compared by them.
 #[test]
 fn a_proof_is_painted_the_same_twice() {
