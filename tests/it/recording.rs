@@ -56,7 +56,7 @@ fn run(recorder: &mut Recorder, methods: &[Method], params: &Params) {
     run_against(&truth, recorder, &mut History::default(), methods, params);
 }
 
-/// As [`run`], with what is said to be the truth. Returns the last result.
+/// Runs methods as [`run`] does, judges them against this pose, and returns the last result.
 fn run_against(
     truth: &Pose,
     recorder: &mut Recorder,
@@ -341,7 +341,7 @@ fn a_proof_of_robust_is_made_from_all_that_it_ran_inside() {
     let path = folder.path().join("robust.rrd");
     let robust: Method = "robust".parse().expect("is registered");
     let (params, problem, mut history) = (Params::default(), solvable(), History::default());
-    // What is found is right, and far from what is said to be the truth.
+    // This pose is false, so the right estimate is judged wrong.
     let truth = problem.reference.world_from_camera * Pose::translation(-2.0, 0.0, 3.0);
     let mut recorder = open(&path, &[robust]);
     let result = run_against(&truth, &mut recorder, &mut history, &[robust], &params);
