@@ -5,6 +5,7 @@ use std::path::Path;
 use std::time::Instant;
 
 use image::imageops::{self, FilterType};
+use posescope::cost;
 use posescope::estimator;
 use posescope::geometry::{Pose, PoseError};
 use posescope::grid::{
@@ -79,11 +80,8 @@ fn method(is_named: bool, methods: &[Method]) -> Result<Method, CliError> {
             ));
         }
     };
-    let entry = estimator::find(method);
-    match entry.and_then(|entry| entry.family) {
-        Some(estimator::Family::Grid) => Ok(method),
-        _ => Err(no_cost(method)),
-    }
+    let has_cost = cost::ALL.iter().any(|cost| cost.name == method.name());
+    if has_cost { Ok(method) } else { Err(no_cost(method)) }
 }
 
 fn no_cost(method: Method) -> CliError {

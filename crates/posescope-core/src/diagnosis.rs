@@ -148,7 +148,7 @@ impl<'a> Subject<'a> {
 pub fn diagnose(subject: &Subject<'_>) -> Vec<Diagnosis> {
     let grade = subject.grade();
     let responsible = confidence::responsible(subject.method, subject.outcome);
-    let Some(family) = Family::of(responsible) else {
+    let Some(family) = Family::of(responsible, subject.params) else {
         let failure = subject.outcome.pose.as_ref().err();
         return failure.map(Diagnosis::of_failure).into_iter().collect();
     };

@@ -29,6 +29,7 @@ pub use mi6::SixFreedoms;
 pub use robust::{Robust, RobustParams};
 use starts::Level;
 pub use starts::SixParams;
+pub(crate) use starts::prior_penalty;
 
 use std::str::FromStr;
 use std::sync::LazyLock;
@@ -37,6 +38,7 @@ use crate::cost;
 use crate::event::MinimumAssessed;
 use crate::geometry::Pose;
 use crate::grid::Offset;
+use crate::judge::Refined;
 use crate::method::Method;
 use crate::params::Params;
 use crate::problem::Problem;
@@ -83,22 +85,28 @@ pub struct CostSummary {
     pub evaluations: u64,
 }
 
+/// The pose that a search answers.
+struct Answered {
+    reference_from_camera: Pose,
+    /// What it costs and covers.
+    score: Score,
+    /// The cost of what it is compared with, if there is anything.
+    runner_up: Option<f64>,
+    /// Hypotheses that were scored on the way.
+    evaluations: u64,
+}
+
 impl CostSummary {
-    /// What a search found that ended at a pose with a score.
-    fn new(
-        problem: &Problem,
-        level: &Level<impl Objective>,
-        reference_from_camera: &Pose,
-        end: Score,
-        evaluations: u64,
-    ) -> Self {
+    /// All that a result says of its cost is of the pose that is answered.
+    fn of(problem: &Problem, level: &Level<impl Objective>, answered: &Answered) -> Self {
+        let &Answered { reference_from_camera: ref pose, score, runner_up, evaluations } = answered;
         let area = problem.query.intrinsics.area();
         Self {
             initial: level.initial.cost,
-            best: end.cost.unwrap_or(f64::NAN),
-            shuffled: level.objective.shuffled(reference_from_camera, problem.shuffle_seed()),
-            runner_up: None,
-            coverage_best: f64::from(end.covered) / area,
+            best: score.cost.unwrap_or(f64::NAN),
+            shuffled: level.objective.shuffled(pose, problem.shuffle_seed()),
+            runner_up,
+            coverage_best: f64::from(score.covered) / area,
             coverage_reference: f64::from(level.initial.covered) / area,
             evaluations,
         }
@@ -161,6 +169,14 @@ pub trait Estimator: Send + Sync {
         None
     }
 
+    /// The minimum that a pose (`reference_from_camera`) leads to by the estimator's own way in six freedoms, though it
+    /// did not start there; `None` where there is none, and for an estimator without such a way.
+    #[doc(hidden)]
+    fn led_from(&self, problem: &Problem, reference_from_camera: &Pose) -> Option<Refined> {
+        let _ = (problem, reference_from_camera);
+        None
+    }
+
     /// The synthetic view at any pose of the query, with its cost and what that was made of; `None` for an
     /// estimator that minimises no cost.
     #[doc(hidden)]
@@ -179,9 +195,9 @@ pub struct Entry {
     pub method: Method,
     /// What the estimator does, in one phrase.
     pub about: &'static str,
-    /// How it finds its pose, which decides its confidence and its verdicts; `None` for a hybrid, whose poses are
-    /// those of its methods.
-    pub family: Option<Family>,
+    family: fn(&Self, &Params) -> Option<Family>,
+    /// The groups of parameters that it reads beside those of its search and of the methods that it runs inside.
+    groups: Vec<&'static str>,
     cost: Option<&'static cost::Entry>,
     hybrid: Option<HybridParts>,
     runs: &'static [Method],
@@ -199,7 +215,8 @@ impl Entry {
         Self {
             method,
             about,
-            family: None,
+            family: |_, _| None,
+            groups: Vec::new(),
             cost: None,
             hybrid: None,
             runs: &[],
@@ -211,6 +228,31 @@ impl Entry {
     /// The estimator with these parameters.
     pub fn make(&self, params: &Params) -> Box<dyn Estimator> {
         (self.make)(params)
+    }
+
+    /// How it finds its pose with these parameters, which decides its confidence and its verdicts; `None` for a
+    /// hybrid, whose poses are those of its methods.
+    pub fn family(&self, params: &Params) -> Option<Family> {
+        (self.family)(self, params)
+    }
+
+    /// Whether its answer depends on the parameter `key` (`group.name`) while the others are these.
+    #[doc(hidden)]
+    pub fn reads(&self, params: &Params, key: &str) -> bool {
+        let of_search: &[&str] = match self.family(params) {
+            Some(Family::Grid) => &["grid"],
+            Some(Family::Starts) => {
+                &["mi6", "grid.coarse_step", "grid.coverage_floor", "fb.radius_slack"]
+            }
+            Some(Family::Descent) => &["descent", "grid.coverage_floor"],
+            _ => &[],
+        };
+        let is_of = |group: &&str| {
+            key.strip_prefix(*group).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
+        };
+        let mut parts = self.told_by().into_iter().filter(|part| *part != self.method);
+        of_search.iter().chain(&self.groups).any(|group| is_of(group))
+            || parts.any(|part| entry(part).reads(params, key))
     }
 
     /// The cost that it searches by itself, or by which its views are explained.
@@ -243,7 +285,8 @@ impl Entry {
 fn feature_based() -> Entry {
     let about = "indirect: SURF, ratio match, depth from the cloud, P3P and MLESAC";
     Entry {
-        family: Some(Family::Features),
+        family: |_, _| Some(Family::Features),
+        groups: vec!["fb", "surf", "render"],
         ..Entry::new(Method::FB, about, |params| Box::new(FeatureBased::new(params)))
     }
 }
@@ -254,6 +297,7 @@ fn hybrid() -> Entry {
     let about = "the feature-based pose, and mutual information where that has none";
     Entry {
         hybrid: Some(parts),
+        groups: vec!["hy"],
         ..Entry::new(Method::HY, about, move |params| {
             Box::new(Hybrid::new(Method::HY, parts, params))
         })
@@ -263,7 +307,8 @@ fn hybrid() -> Entry {
 /// The search of a cost over the grid.
 fn direct(cost: &'static cost::Entry) -> Entry {
     Entry {
-        family: Some(Family::Grid),
+        family: |entry, params| Some(params.costs.search(entry.cost?).into()),
+        groups: vec![cost.name, "render"],
         cost: Some(cost),
         ..Entry::new(Method::named(cost.name), cost.about, |params| {
             Box::new(Direct::new(cost, params))

@@ -74,8 +74,12 @@ impl GridParams {
     /// basin may go on outside.
     pub fn is_on_rim(&self, offset: &Offset, radius_m: f64) -> bool {
         let yaw_deg = offset.yaw_rad.to_degrees().abs();
+        self.is_on_edge(offset, radius_m) || yaw_deg > self.yaw_range_deg - 0.5 * self.yaw_step_deg
+    }
+
+    /// Whether an offset lies where the coarse positions within `radius_m` end.
+    pub fn is_on_edge(&self, offset: &Offset, radius_m: f64) -> bool {
         offset.distance_m() > radius_m - 0.5 * self.coarse_step_m
-            || yaw_deg > self.yaw_range_deg - 0.5 * self.yaw_step_deg
     }
 }
 

@@ -70,7 +70,7 @@ pub(super) fn at<'a>(context: &ViewContext<'a>) -> FeatureProgress<'a> {
     let with_features = |method: Method| {
         estimator::find(method).is_some_and(|entry| match entry.hybrid() {
             Some(parts) => parts.first == Method::FB,
-            None => entry.family == Some(Family::Features),
+            None => entry.family(&context.run.params) == Some(Family::Features),
         })
     };
     let asked = context.setup.task.protocol.methods.iter().copied();

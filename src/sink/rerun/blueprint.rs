@@ -14,6 +14,7 @@ use crate::geometry::Pose;
 use crate::localize::QueryResult;
 use crate::method::Method;
 use crate::palette;
+use crate::params::Params;
 use crate::problem::Problem;
 use crate::proof::responsible;
 
@@ -24,6 +25,8 @@ const RANKS_PER_ROW: usize = 3;
 pub(super) struct LayoutInput<'a> {
     /// The methods of the run.
     pub(super) methods: &'a [Method],
+    /// Their parameters, which decide how they search.
+    pub(super) params: &'a Params,
     /// The first problem; its reference defines the points of view.
     pub(super) first: &'a Problem,
     /// The number of references of a query.
@@ -87,9 +90,9 @@ pub(super) fn send(stream: &mut Stream, input: &LayoutInput<'_>) {
 }
 
 /// Logs names and colours of the plots.
-pub(super) fn log_styles(stream: &mut Stream, methods: &[Method]) {
+pub(super) fn log_styles(stream: &mut Stream, methods: &[Method], params: &Params) {
     let names = |names: &[&str]| SeriesLines::new().with_names(names.iter().copied());
-    if shows_features(methods) {
+    if shows_features(methods, params) {
         let best = names(&["best inliers"]);
         stream.log_static(entities::RANSAC_BEST, &best);
     }
@@ -105,13 +108,13 @@ pub(super) fn log_styles(stream: &mut Stream, methods: &[Method]) {
 }
 
 /// Whether features are matched.
-fn shows_features(methods: &[Method]) -> bool {
-    let mut families = methods.iter().flat_map(|&method| told_by(method)).filter_map(family);
-    families.any(|family| Family::MATCHING.contains(&family))
+fn shows_features(methods: &[Method], params: &Params) -> bool {
+    let mut told = methods.iter().flat_map(|&method| told_by(method));
+    told.any(|method| family(method, params).is_some_and(|of| Family::MATCHING.contains(&of)))
 }
 
-fn family(method: Method) -> Option<Family> {
-    estimator::find(method)?.family
+fn family(method: Method, params: &Params) -> Option<Family> {
+    estimator::find(method)?.family(params)
 }
 
 /// The methods that search a cost, each of which has a row.
@@ -128,7 +131,7 @@ fn has_histogram(method: Method) -> bool {
 
 /// The world and text on the left, a row per method on the right.
 fn root(input: &LayoutInput<'_>) -> BlueprintNode {
-    let LayoutInput { methods, first, references, ranked, focus, has_pages } = *input;
+    let LayoutInput { methods, params, first, references, ranked, focus, has_pages } = *input;
     let viewpoints = &Viewpoints(first);
     let document = |name, origin: &str| view("TextDocument", name, origin);
     let mut words = vec![
@@ -149,7 +152,7 @@ fn root(input: &LayoutInput<'_>) -> BlueprintNode {
     }
     let left = BlueprintNode::column(left);
     let mut rows = Vec::new();
-    if shows_features(methods) {
+    if shows_features(methods, params) {
         rows.push((1.0, feature_row()));
     }
     let mut direct = searches(methods);
@@ -159,8 +162,8 @@ fn root(input: &LayoutInput<'_>) -> BlueprintNode {
         Some(first) if focus.wrong.contains(first) => 1.8,
         _ => 1.2,
     };
-    let direct = direct.into_iter();
-    let direct: Vec<_> = direct.map(|method| search_row(method, methods, viewpoints)).collect();
+    let row = |method| search_row(method, methods, params, viewpoints);
+    let direct: Vec<_> = direct.into_iter().map(row).collect();
     // Three rows would be too low for the photos.
     if rows.is_empty() {
         rows = equal(direct);
@@ -224,7 +227,12 @@ fn feature_row() -> BlueprintNode {
 }
 
 /// The search of a direct method, step by step.
-fn search_row(method: Method, methods: &[Method], viewpoints: &Viewpoints<'_>) -> BlueprintNode {
+fn search_row(
+    method: Method,
+    methods: &[Method],
+    params: &Params,
+    viewpoints: &Viewpoints<'_>,
+) -> BlueprintNode {
     let name = method.label();
     let of = |part: &str| entities::direct(method, part);
     let image = |what: &str, part: &str| view("2D", format!("{name} {what}"), of(part));
@@ -245,7 +253,7 @@ fn search_row(method: Method, methods: &[Method], viewpoints: &Viewpoints<'_>) -
         plot(format!("{name} cost (timeline eval)"), of("cost")),
     ];
     // Others search all freedoms at once.
-    if family(method) == Some(Family::Grid) {
+    if family(method, params) == Some(Family::Grid) {
         let yaw = view("BarChart", format!("{name} yaw [°]"), entities::yaw_curve(method));
         maps.insert(1, yaw);
     }

@@ -134,7 +134,7 @@ impl Recording {
         let origin = Origin(reference.translation.vector);
         self.origin = Some(origin);
         self.stream.log_static(entities::WORLD, &ViewCoordinates::RDF());
-        blueprint::log_styles(&mut self.stream, &self.methods);
+        blueprint::log_styles(&mut self.stream, &self.methods, &self.params);
         origin
     }
 
@@ -164,6 +164,7 @@ impl Recording {
         }
         let input = blueprint::LayoutInput {
             methods: &self.methods,
+            params: &self.params,
             first,
             references: problems.len(),
             ranked: self.query.ranked,

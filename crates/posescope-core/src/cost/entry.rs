@@ -3,7 +3,7 @@
 use std::fmt;
 
 use super::{ALL, Cost, ExplanationKind, key};
-use crate::describe::{About, Describe, Field, Place, choice};
+use crate::describe::{About, Choice as _, Describe, Field, Place, choice};
 
 /// How a direct method finds the pose of least cost.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -19,6 +19,13 @@ pub enum SearchRule {
 }
 
 choice!(SearchRule: Grid = "grid", Starts = "starts", Descent = "descent");
+
+impl SearchRule {
+    /// The word that sets it.
+    pub fn name(self) -> &'static str {
+        self.names()[self.index()]
+    }
+}
 
 /// A cost whose parameters describe themselves.
 pub trait RegisteredCost: Cost + Describe + fmt::Debug {
@@ -105,6 +112,11 @@ impl CostSettings {
     pub fn groups(&mut self) -> impl Iterator<Item = (&'static str, &mut dyn Describe)> {
         let settings = self.0.iter_mut().map(|setting| setting as &mut dyn Describe);
         ALL.iter().map(|entry| entry.name).zip(settings)
+    }
+
+    /// How the minimum of a registered cost is found.
+    pub fn search(&self, entry: &Entry) -> SearchRule {
+        self.of(entry).map_or_else(SearchRule::default, |setting| setting.search)
     }
 
     /// The setting of a registered cost.

@@ -1,6 +1,7 @@
 //! Builds the remedies of rules: changes of settings, for a method with its parameters.
 
 use super::Family;
+use crate::cost::SearchRule;
 use crate::estimator::{FeatureBased, FeatureParams};
 use crate::method::Method;
 use crate::params::Params;
@@ -24,7 +25,9 @@ pub type Remedy = Vec<Change>;
 /// The input of a rule's remedies: a method with its parameters and the radius of its search.
 #[derive(Clone, Copy, Debug)]
 pub struct Ask<'a> {
-    /// How the method finds its pose.
+    /// The method.
+    pub method: Method,
+    /// How it finds its pose.
     pub family: Family,
     /// Its parameters.
     pub params: &'a Params,
@@ -65,6 +68,12 @@ impl Ask<'_> {
     /// One more round of a search on a grid.
     pub(super) fn rounds(&self) -> Change {
         Change::Set(format!("grid.rounds={}", (self.params.grid.rounds + 1).min(10)))
+    }
+
+    /// The searches of a cost that compare more than one place, in place of a descent.
+    pub(super) fn other_searches(&self) -> Vec<Remedy> {
+        let set = |search: SearchRule| self.word(&format!("{}.search", self.method), search.name());
+        [SearchRule::Grid, SearchRule::Starts].map(|search| vec![set(search)]).into()
     }
 
     /// A longer search of the method's kind; `None` for methods without a search.

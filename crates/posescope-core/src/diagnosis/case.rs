@@ -65,9 +65,9 @@ impl<'a> Case<'a> {
         self.matches.get_or_init(matches).as_ref()
     }
 
-    /// Where the truth leads under the cost of a search from many starts.
+    /// Where the truth leads under the cost of a search in six freedoms.
     pub(super) fn starts(&self) -> Option<&Starts> {
-        let starts = || Starts::of(self.subject);
+        let starts = || Starts::of(self.subject, self.family);
         self.starts.get_or_init(starts).as_ref()
     }
 

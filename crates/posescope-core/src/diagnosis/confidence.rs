@@ -22,6 +22,7 @@ use super::{Family, Subject};
 use crate::estimator::{self, CostSummary, Failure, Outcome};
 use crate::grid::ScoredLattice;
 use crate::method::Method;
+use crate::params::Params;
 use crate::stats::median_and_deviation;
 use crate::text::words;
 use appearance::Look;
@@ -186,16 +187,19 @@ pub fn signals(subject: &Subject<'_>) -> Option<Signals> {
 
 /// The signals of a subject with a pose, and its confidence but for the probability.
 fn left_behind(subject: &Subject<'_>) -> Option<(Signals, PoseConfidence)> {
-    let &Subject { method, outcome, evidence, .. } = subject;
+    let &Subject { method, params, outcome, evidence, .. } = subject;
     outcome.pose.as_ref().ok()?;
-    match Family::of(responsible(method, outcome))? {
+    let responsible = responsible(method, outcome);
+    let family = Family::of(responsible, params)?;
+    // The coefficients of a method were fitted to its own search.
+    let is_usual = Family::of(responsible, &Params::default()) == Some(family);
+    match family {
+        _ if !is_usual => None,
         Family::Features => inliers::signals(subject, Look::QUICK),
         Family::Guided => inliers::signals(subject, Look::THOROUGH),
-        // The coefficients of a cost were fitted to its search on the grid.
-        Family::Grid if evidence.settled.is_some() => None,
         Family::Grid => minimum::signals(outcome, evidence),
         Family::Starts => settled::signals(outcome, evidence),
-        Family::Given => None,
+        Family::Descent | Family::Given => None,
     }
 }
 

@@ -28,12 +28,12 @@ pub fn remedies(
             .iter()
             .any(|kind| kind.contains(family) && rule.applies_to.iter().any(|of| kind.contains(of)))
     };
-    let mut tried = match Family::of(responsible).filter(is_of) {
+    let mut tried = match Family::of(responsible, params).filter(is_of) {
         None | Some(Family::Given) => Vec::new(),
         Some(family) => {
-            let of_rule = (rule.remedies)(&Ask { family, params, radius_m });
+            let of_rule = (rule.remedies)(&Ask { method: responsible, family, params, radius_m });
             // What was changed by hand is the first suspect.
-            reset(&family.groups(responsible), params).into_iter().chain(of_rule).collect()
+            reset(responsible, params).into_iter().chain(of_rule).collect()
         }
     };
     // Whatever it is, another method or another reference may do better; a search from many starts first.
@@ -55,13 +55,12 @@ pub fn remedies(
     tried
 }
 
-/// The parameters of these groups that differ from their defaults, back at them.
-fn reset(groups: &[&str], params: &Params) -> Option<Remedy> {
+/// The parameters that a method reads and that differ from their defaults, back at them.
+fn reset(method: Method, params: &Params) -> Option<Remedy> {
+    let entry = estimator::find(method)?;
     let changed = params.list().into_iter().zip(params.defaults().list());
-    let changed = changed.filter(|(now, default)| {
-        let group = now.key.split('.').next().unwrap_or_default();
-        groups.contains(&group) && now.value != default.value
-    });
+    let changed = changed
+        .filter(|(now, default)| now.value != default.value && entry.reads(params, &now.key));
     let back: Remedy = changed
         .map(|(now, default)| Change::Set(format!("{}={}", now.key, default.value)))
         .collect();
@@ -103,27 +102,52 @@ mod tests {
     }
 
     #[test]
+    fn what_runs_inside_of_a_method_is_suspected_too() {
+        let mut params = Params::default();
+        for assignment in ["robust.credit=100", "surf.max_keypoints=30", "mi.bins=8"] {
+            params.assign(assignment).expect("a parameter");
+        }
+        let first =
+            remedies(Code::D2, Method::named("robust"), false, &params, 10.0).swap_remove(0);
+        let default = Params::default().robust.credit;
+        let back = ["surf.max_keypoints=0".to_owned(), format!("robust.credit={default}")];
+        assert_eq!(first, back.map(Change::Set));
+    }
+
+    #[test]
+    fn a_descent_is_offered_another_search_and_none_that_it_does_not_do() {
+        let mut params = Params::default();
+        params.assign("pm.search=descent").expect("a parameter");
+        for code in [Code::D2, Code::D3, Code::D4, Code::D8] {
+            let tried = remedies(code, Method::PM, false, &params, 10.0);
+            let set = tried.concat().into_iter().filter_map(|change| match change {
+                Change::Set(assignment) => Some(assignment),
+                _ => None,
+            });
+            let set: Vec<String> = set.collect();
+            assert_eq!(set[0], "pm.search=grid", "{code}");
+            assert!(set.iter().all(|one| !one.starts_with("grid.")), "{code}: {set:?}");
+        }
+    }
+
+    #[test]
     fn a_remedy_changes_only_what_the_method_reads() {
-        let params = Params::default();
-        for rule in RULES {
+        let searches = ["grid", "starts", "descent"].map(|search| {
+            let mut params = Params::default();
+            params.set("pm.search", search).expect("a search");
+            params
+        });
+        for (rule, params) in
+            RULES.iter().flat_map(|rule| searches.iter().map(move |of| (rule, of)))
+        {
             for method in estimator::methods() {
-                let Some(family) = Family::of(method) else {
-                    continue;
-                };
-                for change in remedies(rule.code, method, false, &params, 10.0).concat() {
+                for change in remedies(rule.code, method, false, params, 10.0).concat() {
                     let Change::Set(assignment) = change else {
                         continue;
                     };
                     let key = assignment.split('=').next().unwrap_or_default();
-                    let group = key.split('.').next().unwrap_or_default();
-                    assert!(
-                        family.groups(method).contains(&group),
-                        "{} of {method}: {assignment}",
-                        rule.code
-                    );
-                    // A search from many starts has one round and yaws of its own.
-                    let is_grid_alone = ["grid.rounds", "grid.yaw_range"].contains(&key);
-                    assert!(!is_grid_alone || family == Family::Grid, "{method}: {assignment}");
+                    let is_read = estimator::entry(method).reads(params, key);
+                    assert!(is_read, "{} of {method}: {assignment}", rule.code);
                 }
             }
         }

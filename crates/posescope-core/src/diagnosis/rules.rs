@@ -207,10 +207,9 @@ impl Code {
         self.rule().title
     }
 
-    /// What to try against what was found. Another system does not read our parameters.
-    pub fn advice(self, method: Method, evidence: &serde_json::Value) -> &'static str {
+    /// What to try against what was found, for a method of a family. Another system does not read our parameters.
+    pub fn advice(self, family: Option<Family>, evidence: &serde_json::Value) -> &'static str {
         let rule = self.rule();
-        let family = Family::of(method);
         let is_of_a_cost = !rule.applies_to.contains(&Family::Features);
         if family == Some(Family::Given) && is_of_a_cost && rule.applies_to.contains(&Family::Given)
         {

@@ -113,7 +113,7 @@ pub(super) fn estimator_of(subject: &Subject<'_>, family: Family) -> Option<Box<
     let method = match family {
         Family::Grid => confidence::responsible(subject.method, subject.outcome),
         Family::Given => JUDGE,
-        _ => return None,
+        Family::Features | Family::Guided | Family::Starts | Family::Descent => return None,
     };
     Some(estimator::find(method)?.make(subject.params))
 }

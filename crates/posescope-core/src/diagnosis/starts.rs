@@ -1,15 +1,17 @@
-//! A search from many starts beside the truth.
+//! A search in six freedoms beside the truth: one from many starts, or a descent.
 //!
 //! Nothing is frozen and no step is too coarse in six freedoms, so the pose that the truth leads to under
 //! the same cost tells search from cost.
 
-use super::Subject;
-use crate::estimator::SixFreedoms;
+use super::{Family, Subject, confidence};
+use crate::estimator::{self, prior_penalty};
 use crate::geometry::{Pose, PoseError};
 use crate::judge::Refined;
 
 /// Where the truth leads, and the result.
 pub(super) struct Starts {
+    /// Whether the search went downhill from the reference pose alone.
+    pub(super) is_descent: bool,
     /// The pose that the truth leads to; `None` where too little of the cloud is seen from there, or the
     /// way leads out of the disc.
     pub(super) near: Option<Near>,
@@ -33,13 +35,22 @@ pub(super) struct Near {
 }
 
 impl Starts {
-    pub(super) fn of(subject: &Subject<'_>) -> Option<Self> {
+    pub(super) fn of(subject: &Subject<'_>, family: Family) -> Option<Self> {
+        let is_descent = family == Family::Descent;
         let truth = subject.reference_from_truth()?;
         let (summary, pose) = (subject.outcome.cost?, subject.outcome.pose.as_ref().ok()?);
-        subject.evidence.settled.as_ref()?;
-        let six = SixFreedoms::new(subject.params);
-        let penalty = |pose: &Pose| six.penalty(&subject.evidence.surfaces, pose);
-        let near = six.basin_of(subject.problem, &truth).map(|refined| {
+        // Where `robust` had no search to compare with, there is nothing to look at.
+        if !is_descent && subject.evidence.settled.is_none() {
+            return None;
+        }
+        let responsible = confidence::responsible(subject.method, subject.outcome);
+        let estimator = estimator::find(responsible)?.make(subject.params);
+        // A descent has no prior on poses.
+        let penalty = |pose: &Pose| match family {
+            Family::Starts => prior_penalty(subject.params, &subject.evidence.surfaces, pose),
+            _ => 0.0,
+        };
+        let near = estimator.led_from(subject.problem, &truth).map(|refined| {
             let error = PoseError::between(&truth, &refined.pose);
             Near {
                 penalty: penalty(&refined.pose),
@@ -49,6 +60,7 @@ impl Starts {
             }
         });
         Some(Self {
+            is_descent,
             near,
             result_cost: summary.best,
             result_penalty: penalty(&subject.problem.reference_from_query(pose)),

@@ -7,13 +7,14 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::starts::{Level, ManyStarts};
-use super::{CostSummary, Estimator, Failure, Halt, Outcome, separate_failure};
+use super::{Answered, CostSummary, Estimator, Failure, Halt, Outcome, separate_failure};
 use crate::cost::{self, Cost, CostSetting, SearchRule};
 use crate::descent::DescentParams;
 use crate::event::{CloudColored, Moment, PhaseSearched, PoseScored, Stage, ViewRendered};
 use crate::geometry::Pose;
 use crate::grid::{GridParams, Lattice, Offset, Phase, Scored, ScoredLattice, scan};
 use crate::image::FloatImage;
+use crate::judge::Refined;
 use crate::memo::{Key, Recalled, key};
 use crate::method::Method;
 use crate::params::Params;
@@ -75,6 +76,17 @@ impl Estimator for Direct {
     fn scorer(&self, problem: &Problem) -> Option<Scorer<'_>> {
         Some(self.scorer_of(problem))
     }
+
+    fn led_from(&self, problem: &Problem, reference_from_camera: &Pose) -> Option<Refined> {
+        match self.search {
+            SearchRule::Grid => None,
+            SearchRule::Starts => {
+                let level = self.starts.level(self.scorer_of(problem));
+                self.starts.basin_of(problem, &level, reference_from_camera)
+            }
+            SearchRule::Descent => self.descended_from(problem, reference_from_camera),
+        }
+    }
 }
 
 impl Direct {
@@ -112,14 +124,16 @@ impl Direct {
             };
             trace.emit(|| search.render(Moment::End, best.offset))?;
             trace.checkpoint()?;
-            let pose = best.offset.reference_from_camera();
-            let summary = CostSummary {
+            let answered = Answered {
+                reference_from_camera: best.offset.reference_from_camera(),
+                score,
                 runner_up: coarse
                     .and_then(|surface| surface.local_minima().get(1).map(|minimum| minimum.1)),
-                ..CostSummary::new(problem, &level, &pose, score, evaluations)
+                evaluations,
             };
+            let summary = CostSummary::of(problem, &level, &answered);
             trace.emit(|| summary.assessed(best.offset))?;
-            Ok((problem.world_from_query(&pose), summary))
+            Ok((problem.world_from_query(&answered.reference_from_camera), summary))
         })
     }
 

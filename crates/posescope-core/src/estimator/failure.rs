@@ -1,5 +1,6 @@
 //! Why a query could not be localised.
 
+use crate::cost::SearchRule;
 use crate::grid::LatticeTooLarge;
 use crate::method::Method;
 use crate::robust::Counted;
@@ -97,7 +98,8 @@ pub enum Failure {
     },
     /// Every minimum that was refined lies outside of the disc.
     #[error(
-        "All {minima} refined minima lie outside the search, more than {reach_m:.1} m from the reference."
+        "{} outside the search, more than {reach_m:.1} m from the reference.",
+        if *.minima == 1 { "The minimum lies".to_owned() } else { format!("All {minima} refined minima lie") }
     )]
     LedOutside {
         /// Minima that were refined.
@@ -155,10 +157,15 @@ pub enum Failure {
         failure: Box<Failure>,
     },
     /// Several references were to give one pose at once, and the method takes one at a time.
-    #[error("{method} takes one reference at a time, so it has no joint pose.")]
+    #[error(
+        "{method}{} takes one reference at a time, so it has no joint pose.",
+        search.map(|search| format!(" with search={}", search.name())).unwrap_or_default()
+    )]
     NotJoint {
         /// The method.
         method: Method,
+        /// How it searches, if it would have a joint pose with another search.
+        search: Option<SearchRule>,
     },
     /// Another system has no answer here.
     #[error("There is nothing to judge: {answers} has no {missing}.")]

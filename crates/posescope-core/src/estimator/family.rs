@@ -1,10 +1,17 @@
 //! How methods find their poses.
 
-use super::find;
-use crate::method::Method;
+use serde::{Deserialize, Serialize};
 
-/// How a method finds its pose, as far as rules differ by it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+use super::find;
+use crate::cost::SearchRule;
+use crate::method::Method;
+use crate::params::Params;
+
+/// How a method finds its pose: what it leaves behind, what can be said of it, and what may help.
+///
+/// It depends on the parameters too: `pm` with `pm.search=descent` is no search on a grid.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Family {
     /// Features matched once: `fb`.
     Features,
@@ -12,21 +19,24 @@ pub enum Family {
     Guided,
     /// A cost searched on a grid: `pm`, `mi` and other costs.
     Grid,
-    /// A cost searched from many starts in six freedoms: `mi6`, `robust`.
+    /// A cost searched from many starts in six freedoms: `mi6`, `robust`, and costs with `search=starts`.
     Starts,
+    /// A cost followed downhill from the reference pose: costs with `search=descent`.
+    Descent,
     /// Another system's pose.
     Given,
 }
 
 impl Family {
     /// Every family.
-    pub const ALL: &[Self] = &[Self::Features, Self::Guided, Self::Grid, Self::Starts, Self::Given];
+    pub const ALL: &[Self] =
+        &[Self::Features, Self::Guided, Self::Grid, Self::Starts, Self::Descent, Self::Given];
     /// Those that match features.
     pub const MATCHING: &[Self] = &[Self::Features, Self::Guided];
     /// Those that search a cost.
-    pub const SEARCHING: &[Self] = &[Self::Grid, Self::Starts];
+    pub const SEARCHING: &[Self] = &[Self::Grid, Self::Starts, Self::Descent];
     /// Those whose pose has a cost: searched, or given by another system.
-    pub const COSTED: &[Self] = &[Self::Grid, Self::Starts, Self::Given];
+    pub const COSTED: &[Self] = &[Self::Grid, Self::Starts, Self::Descent, Self::Given];
 
     /// The family in one phrase.
     pub fn words(self) -> &'static str {
@@ -35,23 +45,24 @@ impl Family {
             Self::Guided => "features (fb2)",
             Self::Grid => "grid search (pm, mi)",
             Self::Starts => "many starts (mi6, robust)",
+            Self::Descent => "descent (search=descent)",
             Self::Given => "other systems",
         }
     }
 
-    /// The groups of parameters that a method of this family reads.
-    pub(crate) fn groups(self, method: Method) -> Vec<&'static str> {
-        match self {
-            Self::Features => vec!["fb", "surf"],
-            Self::Guided => vec!["fb2", "render"],
-            Self::Grid => vec!["grid", "render", method.name()],
-            Self::Starts => vec!["mi6", "grid", "render", "judge"],
-            Self::Given => Vec::new(),
-        }
+    /// The family of a method that is no hybrid, with these parameters; `None` where nothing is known of it but
+    /// its pose.
+    pub(crate) fn of(method: Method, params: &Params) -> Option<Self> {
+        find(method).map_or(Some(Self::Given), |entry| entry.family(params))
     }
+}
 
-    /// The family of a method that is no hybrid; `None` where nothing is known of it but its pose.
-    pub(crate) fn of(method: Method) -> Option<Self> {
-        find(method).map_or(Some(Self::Given), |entry| entry.family)
+impl From<SearchRule> for Family {
+    fn from(search: SearchRule) -> Self {
+        match search {
+            SearchRule::Grid => Self::Grid,
+            SearchRule::Starts => Self::Starts,
+            SearchRule::Descent => Self::Descent,
+        }
     }
 }

@@ -22,7 +22,8 @@ pub(super) fn entry() -> Entry {
     let about =
         "indirect: SIFT, depth of visible points, and a second matching where the first pose says";
     Entry {
-        family: Some(Family::Guided),
+        family: |_, _| Some(Family::Guided),
+        groups: vec!["fb2", "render"],
         least_probability: |params| params.fb2.least_probability,
         ..Entry::new(METHOD, about, |params| Box::new(FeatureBased::guided(params)))
     }

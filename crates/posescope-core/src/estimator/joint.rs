@@ -42,7 +42,7 @@ type JointPose = (Pose, Vec<Option<Support>>);
 
 /// The pose that several references give together, and what each has to do with it, in their order.
 ///
-/// A method that takes one reference at a time, or is in no registry, fails with [`Failure::NotJoint`].
+/// A method or a search that takes one reference at a time, or a method in no registry, fails with [`Failure::NotJoint`].
 ///
 /// # Errors
 /// Only [`Cancelled`].
@@ -80,7 +80,7 @@ fn agree(
     references: &[JointReference<'_>],
     trace: &mut Trace<'_>,
 ) -> Result<JointPose, Halt> {
-    let entry = find(method).ok_or(Failure::NotJoint { method })?;
+    let entry = find(method).ok_or(Failure::NotJoint { method, search: None })?;
     if let Some(HybridParts { first, second }) = entry.hybrid {
         let agreed = separate_failure(agree(first, params, references, trace))?;
         let Err(failure) = &agreed else {
@@ -93,10 +93,15 @@ fn agree(
         trace.emit(|| BranchTaken { method: second, why: failure.to_string() })?;
         return agree(second, params, references, trace);
     }
-    match (entry.family, entry.cost) {
+    match (entry.family(params), entry.cost) {
         (Some(Family::Features), _) => FeatureBased::new(params).agree(references, trace),
         (Some(Family::Grid), Some(cost)) => Direct::new(cost, params).agree(references, trace),
-        _ => Err(Halt::from(Failure::NotJoint { method })),
+        (_, cost) => {
+            // Of a cost of its own only another search than that on the grid is in the way.
+            let own = cost.filter(|cost| cost.name == method.name());
+            let search = own.map(|cost| params.costs.search(cost));
+            Err(Halt::from(Failure::NotJoint { method, search }))
+        }
     }
 }
 

@@ -7,16 +7,12 @@
 //! and the cost is that of the [judge](crate::judge): three channels in smaller copies of the photos, and local
 //! contrast in the photos themselves.
 
-use std::convert::Infallible;
-use std::sync::Arc;
-
 use super::direct::Direct;
-use super::starts::{Found, Level, ManyStarts, Spread};
+use super::starts::{Found, Level, ManyStarts};
 use super::{Entry, Estimator, Family, Halt, Outcome, separate_failure};
 use crate::cost;
 use crate::event::Stage;
 use crate::geometry::Pose;
-use crate::grid::ScoredLattice;
 use crate::judge::{Channels, Judge, JudgeParams, Refined};
 use crate::method::Method;
 use crate::params::Params;
@@ -31,7 +27,8 @@ pub(super) const METHOD: Method = Method::named("mi6");
 pub(super) fn entry() -> Entry {
     let about = "mutual information in six freedoms: several yaws, starts and channels, refined";
     Entry {
-        family: Some(Family::Starts),
+        family: |_, _| Some(Family::Starts),
+        groups: vec!["judge", "render"],
         cost: Some(shown()),
         ..Entry::new(METHOD, about, |params| Box::new(SixFreedoms::new(params)))
     }
@@ -92,18 +89,6 @@ impl SixFreedoms {
         let compare = |pose: &Pose, score| self.compare(problem, pose, score);
         self.starts.search(problem, level, Some(&smaller), &compare, trace)
     }
-
-    /// The minimum that a pose leads to, though no search started there; `None` where there is none.
-    pub fn basin_of(&self, problem: &Problem, reference_from_camera: &Pose) -> Option<Refined> {
-        let (level, never) = (self.level(problem, 1), || Ok::<_, Infallible>(()));
-        let Ok(refined) = self.starts.refined(problem, &level, *reference_from_camera, never);
-        refined
-    }
-
-    /// The penalty of a pose under the prior, given the coarse costs.
-    pub fn penalty(&self, coarse: &[Arc<ScoredLattice>], pose: &Pose) -> f64 {
-        self.starts.price(&Spread::of(coarse), pose, 0.0)
-    }
 }
 
 impl Estimator for SixFreedoms {
@@ -116,6 +101,10 @@ impl Estimator for SixFreedoms {
             let pose = problem.world_from_query(&found.refined[0].pose);
             (pose, found.summary)
         })))
+    }
+
+    fn led_from(&self, problem: &Problem, reference_from_camera: &Pose) -> Option<Refined> {
+        self.starts.basin_of(problem, &self.level(problem, 1), reference_from_camera)
     }
 
     fn compare_at(&self, problem: &Problem, world_from_query: &Pose) -> Option<Comparison> {

@@ -21,6 +21,7 @@ use super::{
 };
 use crate::event::{BranchTaken, CandidatesJudged, JudgedPose, Stage};
 use crate::geometry::Pose;
+use crate::grid::Offset;
 use crate::judge::Refined;
 use crate::method::Method;
 use crate::params::Params;
@@ -35,7 +36,8 @@ const METHOD: Method = Method::named("robust");
 pub(super) fn entry() -> Entry {
     let about = "the cheapest of the poses of fb, fb2 and mi6, refined under one cost";
     Entry {
-        family: Some(Family::Starts),
+        family: |_, _| Some(Family::Starts),
+        groups: vec!["robust"],
         cost: Some(shown()),
         runs: &[Method::FB, fb2::METHOD, mi6::METHOD],
         least_probability: |params| params.robust.least_probability,
@@ -121,9 +123,15 @@ impl Robust {
                 }));
             }
             trace.emit(|| BranchTaken { method: best.method, why: why.clone() })?;
-            let pose = problem.world_from_query(&best.refined.pose);
-            let summary = CostSummary { best: best.refined.cost, ..summary };
-            Ok((pose, Some(summary)))
+            let of_features = candidates.iter().filter(|one| one.from_features);
+            let refining: u64 = of_features.map(|one| one.refined.evaluations).sum();
+            let others = candidates[1..].iter().map(|other| &other.refined);
+            let evaluations = summary.evaluations + refining;
+            let answered = self.six.starts.answered(&level, &best.refined, others, evaluations);
+            let summary = CostSummary::of(problem, &level, &answered);
+            let pose = answered.reference_from_camera;
+            trace.emit(|| summary.assessed(Offset::of(&pose)))?;
+            Ok((problem.world_from_query(&pose), Some(summary)))
         })
     }
 }
@@ -183,6 +191,10 @@ impl Estimator for Robust {
                 Err(failure) => Outcome { counts: outcome.counts, ..Outcome::failed(failure) },
             })
         })
+    }
+
+    fn led_from(&self, problem: &Problem, reference_from_camera: &Pose) -> Option<Refined> {
+        self.six.led_from(problem, reference_from_camera)
     }
 
     fn compare_at(&self, problem: &Problem, world_from_query: &Pose) -> Option<Comparison> {

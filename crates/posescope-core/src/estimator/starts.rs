@@ -17,7 +17,7 @@ use std::sync::Arc;
 pub(super) use level::Level;
 pub use params::SixParams;
 
-use super::{CostSummary, Failure, Halt};
+use super::{Answered, CostSummary, Failure, Halt};
 use crate::event::{Moment, PhaseSearched, PoseScored, Stage, StartsRefined, ViewRendered};
 use crate::geometry::{Pose, PoseError};
 use crate::grid::{GridParams, Lattice, Offset, Phase, Scored, ScoredLattice, scan};
@@ -87,6 +87,12 @@ impl Spread {
     }
 }
 
+/// What the prior on poses adds to the cost of a pose (`reference_from_camera`) of a search from many starts, given the
+/// costs of its coarse positions.
+pub(crate) fn prior_penalty(params: &Params, coarse: &[Arc<ScoredLattice>], pose: &Pose) -> f64 {
+    ManyStarts::new(params).price(&Spread::of(coarse), pose, 0.0)
+}
+
 fn middle(values: &mut [f64]) -> f64 {
     values.sort_unstable_by(f64::total_cmp);
     values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
@@ -114,9 +120,9 @@ impl ManyStarts {
     }
 
     /// The samples around the best starts.
-    fn around(&self) -> Gathering {
+    fn around(&self, problem: &Problem) -> Gathering {
         let Shrinking { first_m, rad_per_m, .. } = self.in_the_plane();
-        Gathering { first_m, rad_per_m, fewest: MIN_REFINED }
+        Gathering { first_m, rad_per_m, fewest: MIN_REFINED, seed: problem.seed }
     }
 
     fn in_the_plane(&self) -> Shrinking {
@@ -205,7 +211,8 @@ impl ManyStarts {
             finalists = self.apart(refined, self.params.finalists, price);
         }
         let mut refined = trace.stage(Stage::RefineSix, |trace| {
-            let walks = level.gathered(&finalists, &self.around(), price, || trace.checkpoint())?;
+            let walks =
+                level.gathered(&finalists, &self.around(problem), price, || trace.checkpoint())?;
             self.refine(&mut search, walks, &self.in_six(), MIN_REFINED, price, trace)
         })?;
         // A walk may leave the disc, where no query can be.
@@ -217,20 +224,32 @@ impl ManyStarts {
         }
         trace.stage(Stage::Assess, |trace| {
             let best = refined[0];
-            let score = level.objective.score(&[best.pose])[0];
-            let evaluations = search.evaluations;
-            let mut others = refined.iter().skip(1);
-            let summary = CostSummary {
-                best: best.cost,
-                runner_up: others
-                    .find(|other| self.is_apart(&best.pose, &other.pose))
-                    .map(|other| other.cost),
-                ..CostSummary::new(problem, level, &best.pose, score, evaluations)
-            };
-            trace.emit(|| rendered(Moment::End, evaluations - 1, &best.pose, score))?;
+            let answered = self.answered(level, &best, &refined[1..], search.evaluations);
+            let summary = CostSummary::of(problem, level, &answered);
+            trace.emit(|| {
+                rendered(Moment::End, search.evaluations - 1, &best.pose, answered.score)
+            })?;
             trace.emit(|| summary.assessed(Offset::of(&best.pose)))?;
             Ok(Found { refined, summary, spread })
         })
+    }
+
+    /// The first of some minima, compared with the next that is at another place.
+    pub(super) fn answered<'a>(
+        &self,
+        level: &Level<impl Objective>,
+        first: &Refined,
+        others: impl IntoIterator<Item = &'a Refined>,
+        evaluations: u64,
+    ) -> Answered {
+        let pose = first.pose;
+        let mut others = others.into_iter();
+        Answered {
+            reference_from_camera: pose,
+            score: level.objective.score(&[pose])[0],
+            runner_up: others.find(|other| self.is_apart(&pose, &other.pose)).map(|one| one.cost),
+            evaluations,
+        }
     }
 
     /// A lattice of coarse positions for each yaw, the reference's own heading last: that one stays

@@ -21,6 +21,8 @@ pub struct Gathering {
     pub rad_per_m: f64,
     /// Walks that are never given up.
     pub fewest: usize,
+    /// Decides which samples are drawn.
+    pub seed: u64,
 }
 
 /// Times that samples are drawn.
@@ -52,7 +54,7 @@ struct Cloud {
 }
 
 /// Moves each walk to the cheapest of the samples around it, where one costs less. After each round, the half whose poses
-/// have the higher prices stays where it is. The samples are the same in each run. `costs_of` is as for
+/// have the higher prices stays where it is. All walks draw the same samples. `costs_of` is as for
 /// [`shrink`](super::shrink()).
 ///
 /// # Errors
@@ -73,7 +75,7 @@ pub fn gather<E>(
     };
     let mut active: Vec<(Cloud, &mut Refined)> =
         walks.iter_mut().map(|walk| (cloud(walk), walk)).collect();
-    let mut rng = Pcg64::seed_from_u64(0);
+    let mut rng = Pcg64::seed_from_u64(plan.seed);
     for round in 1..=ROUNDS {
         let normal: Vec<Vector6<f64>> = (0..SAMPLES).map(|_| nearly_normal(&mut rng)).collect();
         let least = Matrix6::from_diagonal(&(first * SHRINKING.powi(round)).map(|one| one * one));
@@ -127,7 +129,7 @@ mod tests {
     use crate::geometry::PoseError;
     use crate::judge::{Freedoms, Shrinking, Start, moved, shrink};
 
-    const PLAN: Gathering = Gathering { first_m: 0.5, rad_per_m: 0.05, fewest: 3 };
+    const PLAN: Gathering = Gathering { first_m: 0.5, rad_per_m: 0.05, fewest: 3, seed: 0 };
 
     /// A bowl around a pose with dents every quarter of a metre, which hold what goes down step by step.
     fn dented(truth: &Pose, pose: &Pose) -> f64 {

@@ -4,7 +4,8 @@ use nalgebra::Matrix3x4;
 use serde::{Deserialize, Serialize};
 
 use crate::diagnosis::{
-    Assessment, Code, Confidence, Diagnosis, Grade, PoseConfidence, Subject, Tolerance,
+    Assessment, Code, Confidence, Diagnosis, Family, Grade, PoseConfidence, Subject, Tolerance,
+    confidence,
 };
 use crate::estimator::{self, CostSummary, Failure, FeatureCounts};
 use crate::fusion::Fusion;
@@ -14,6 +15,7 @@ use crate::grid::GridParams;
 use crate::grid::{Basin, Offset, Phase};
 use crate::image::Degradation;
 use crate::method::Method;
+use crate::params::Params;
 use crate::scale::LengthUnit;
 use crate::text::words;
 
@@ -36,6 +38,9 @@ pub struct QueryResult {
     pub references: Vec<String>,
     /// The method.
     pub method: Method,
+    /// How the method found its pose, if not in its usual way: `descent` for `pm` with `pm.search=descent`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub family: Option<Family>,
     /// The fusion, if references were fused.
     pub fusion: Option<Fusion>,
     /// The seed of every random choice.
@@ -221,8 +226,8 @@ pub struct CostReport {
     pub coverage_reference: f64,
     /// Hypotheses that were scored.
     pub evaluations: u64,
-    /// Whether the estimate lies where the grid ends ([`GridParams::is_on_rim`]), so that the search has
-    /// not converged within its range.
+    /// Whether the estimate lies where the search ends, so that it has not converged within its range: at the rim of a
+    /// grid ([`GridParams::is_on_rim`]), or where the starts end ([`GridParams::is_on_edge`]).
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub on_rim: bool,
     /// From how far around the truth the coarse positions lead to it ([`Basin::radius_m`]), where the
@@ -297,16 +302,26 @@ pub fn evaluate(scene: &str, subject: &Subject<'_>, assessment: Assessment) -> Q
             None => estimator.compare_at(problem, truth_pose)?.score.cost,
         }
     });
-    let basin = truth.and_then(|truth| {
+    let responsible = confidence::responsible(method, outcome);
+    let [family, usual] =
+        [subject.params, &Params::default()].map(|params| Family::of(responsible, params));
+    // Lattices that a search did not follow say nothing of it.
+    let basin = truth.filter(|_| family != Some(Family::Descent)).and_then(|truth| {
         let place = Offset::of(&problem.reference_from_query(truth));
         subject.evidence.surface(Phase::PositionCoarse)?.basin(&place)
     });
     let on_rim = subject.evidence.minimum.is_some_and(|minimum| {
-        let grid = &subject.params.grid;
-        grid.is_on_rim(&minimum.offset, problem.uncertainty_radius_m)
+        let (grid, radius_m) = (&subject.params.grid, problem.uncertainty_radius_m);
+        match family {
+            Some(Family::Grid) => grid.is_on_rim(&minimum.offset, radius_m),
+            // The headings of its starts end elsewhere, and no heading is out of their reach.
+            Some(Family::Starts) => grid.is_on_edge(&minimum.offset, radius_m),
+            _ => false,
+        }
     });
     QueryResult {
         references: vec![problem.reference.name.clone()],
+        family: family.filter(|_| family != usual),
         initial_error: truth
             .map(|truth| PoseError::between(truth, &problem.reference.world_from_camera)),
         counts: outcome.counts,
@@ -353,6 +368,7 @@ impl QueryResult {
             query: query.to_owned(),
             references: Vec::new(),
             method,
+            family: None,
             fusion: None,
             seed,
             unit: LengthUnit::Metre,
@@ -426,6 +442,11 @@ impl QueryResult {
     /// Its confidence in one word, where it has one.
     pub fn confidence_word(&self) -> Option<Confidence> {
         self.confidence.as_ref().map(|confidence| confidence.word)
+    }
+
+    /// How the method found its pose; `None` for a hybrid in its usual way.
+    pub fn family(&self) -> Option<Family> {
+        self.family.or_else(|| Family::of(self.method, &Params::default()))
     }
 
     /// Whether a hybrid took its second method's answer.

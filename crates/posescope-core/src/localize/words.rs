@@ -54,7 +54,7 @@ impl QueryResult {
         if found.code == Code::L1 && self.status == Status::Failed {
             return "lower --min-confidence or fb2.least_probability to see the refused pose";
         }
-        found.code.advice(self.method, &found.evidence)
+        found.code.advice(self.family(), &found.evidence)
     }
 
     /// What follows the primary verdict, a paragraph each: other verdicts, what to try, what helped.

@@ -13,6 +13,7 @@ mod own_cost;
 mod ranking;
 mod robust_pose;
 mod scene_size;
+mod searches;
 mod stopping;
 mod surf_warp;
 mod two_walls;

@@ -15,7 +15,7 @@ pub(super) const RULE: Rule = Rule {
 
 fn test(case: &Case<'_>) -> Option<Diagnosis> {
     match case.family {
-        Family::Starts => by_starts(case.starts()?),
+        Family::Starts | Family::Descent => by_starts(case.starts()?),
         _ => by_grid(case.search?),
     }
 }
@@ -88,6 +88,7 @@ fn by_starts(starts: &Starts) -> Option<Diagnosis> {
             near_truth_error: near.error,
             leads_away: !near.is_right,
             turned_by_prior: starts.is_turned_by_prior(),
+            is_descent: starts.is_descent,
         })
     })
 }
@@ -100,11 +101,14 @@ evidence!(PreferredBySix {
     near_truth_error: PoseError,
     leads_away: bool,
     turned_by_prior: bool,
+    #[serde(skip)]
+    is_descent: bool,
 } => {
     let (result, near) = pair(*cost_at_result, *cost_near_truth);
     if *leads_away {
         let away = metres(near_truth_error.translation_m);
-        format!("The cost has no minimum at the truth: refined from there, the pose moves {away} away.")
+        let moves = if *is_descent { "a descent from there ends" } else { "refined from there, the pose moves" };
+        format!("The cost has no minimum at the truth: {moves} {away} away.")
     } else if *turned_by_prior {
         format!(
             "The prior on likely poses decided against the truth: cost {near} near it, {result} at the \
@@ -119,6 +123,9 @@ evidence!(PreferredBySix {
 });
 
 pub(super) fn remedies(ask: &Ask<'_>) -> Vec<Remedy> {
+    if ask.family == Family::Descent {
+        return ask.other_searches();
+    }
     let mut tried = vec![vec![ask.floor(4.0, 0.2)], vec![ask.wider_splat()], vec![ask.radius(0.5)]];
     tried.extend(ask.more_search().map(|more| vec![more]));
     tried

@@ -8,8 +8,9 @@ pub(super) const RULE: Rule = Rule {
     title: "the search missed a lower cost near the truth",
     advice: "raise grid.rounds or mi6.starts, or lower grid.coarse_step; instead of search=descent, use search=grid",
     advice_of: |family| match family {
-        Family::Grid => {
-            Some("raise grid.rounds or lower grid.coarse_step; search=descent stops near its start")
+        Family::Grid => Some("raise grid.rounds or lower grid.coarse_step"),
+        Family::Descent => {
+            Some("use search=grid or search=starts; a descent stops in the first minimum")
         }
         Family::Starts => Some("raise mi6.starts or mi6.coarse_yaws, or lower grid.coarse_step"),
         _ => None,
@@ -30,7 +31,7 @@ pub(super) const RULE: Rule = Rule {
 
 fn test(case: &Case<'_>) -> Option<Diagnosis> {
     match case.family {
-        Family::Starts => by_starts(case.starts()?),
+        Family::Starts | Family::Descent => by_starts(case.starts()?),
         Family::Given => by_given(case.search?),
         _ => by_grid(case.search?),
     }
@@ -117,6 +118,7 @@ fn by_starts(starts: &Starts) -> Option<Diagnosis> {
         penalty_at_result: starts.result_penalty,
         near_truth_error: near.error,
         turned_by_prior: starts.is_turned_by_prior(),
+        is_descent: starts.is_descent,
     }))
 }
 
@@ -127,9 +129,13 @@ evidence!(MissedBySix {
     penalty_at_result: f64,
     near_truth_error: PoseError,
     turned_by_prior: bool,
+    #[serde(skip)]
+    is_descent: bool,
 } => {
     let (near, result) = pair(*cost_near_truth, *cost_at_result);
-    let why = if *turned_by_prior {
+    let why = if *is_descent {
+        "The way down from the reference led elsewhere."
+    } else if *turned_by_prior {
         "With the prior on likely poses the truth wins."
     } else {
         "No start led there."
@@ -191,6 +197,7 @@ fn lost_among_coarse(coarse: &ScoredLattice, away: &dyn Fn(&Offset) -> f64) -> L
 fn remedies(ask: &Ask<'_>) -> Vec<Remedy> {
     let (floor, splat) = (ask.floor(3.0, 0.15), ask.wider_splat());
     match ask.family {
+        Family::Descent => ask.other_searches(),
         Family::Starts => {
             let mi6 = &ask.params.mi6;
             let starts = ask.set("mi6.starts", (2 * mi6.starts).min(200) as f64);

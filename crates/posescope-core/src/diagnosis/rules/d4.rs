@@ -32,7 +32,7 @@ fn advice_on(evidence: &Value) -> Option<&'static str> {
 fn test(case: &Case<'_>) -> Option<Diagnosis> {
     let radius_m = case.subject.problem.uncertainty_radius_m;
     match case.family {
-        Family::Starts => by_starts(case.starts()?, radius_m),
+        Family::Starts | Family::Descent => by_starts(case.starts()?, radius_m),
         _ => by_grid(case.search?, radius_m),
     }
 }
@@ -110,6 +110,11 @@ evidence!(Unreached { distance_m: f64, radius_m: f64 } => {
 fn remedies(ask: &Ask<'_>) -> Vec<Remedy> {
     let wider = [vec![ask.radius(1.5)], vec![ask.radius(2.0)]];
     match ask.family {
+        Family::Descent => {
+            let mut tried = ask.other_searches();
+            tried.extend(wider);
+            tried
+        }
         Family::Starts => {
             let mut tried = Vec::from(wider);
             tried.push(vec![ask.set("mi6.yaw_step", 2.0 * ask.params.mi6.yaw_step_deg)]);
@@ -134,11 +139,10 @@ mod tests {
     use serde_json::json;
 
     use super::*;
-    use crate::method::Method;
 
     #[test]
     fn the_advice_names_what_was_too_small() {
-        let advice = |evidence: &Value| Code::D4.advice(Method::MI, evidence);
+        let advice = |evidence: &Value| Code::D4.advice(Some(Family::Grid), evidence);
         let outside = json!({ "distance_m": 20.0, "radius_m": 15.0, "is_turned": false });
         assert!(advice(&outside).starts_with("raise --radius"));
         let turned = json!({ "distance_m": 2.0, "radius_m": 15.0, "is_turned": true });

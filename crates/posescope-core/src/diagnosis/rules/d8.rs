@@ -5,14 +5,25 @@ use super::*;
 pub(super) const RULE: Rule = Rule {
     title: "the search ended at its edge",
     advice: "raise --radius",
+    advice_of: |family| match family {
+        Family::Descent => Some("use search=grid or search=starts; the way down left the disc"),
+        _ => None,
+    },
     applies_to: &[Family::Grid],
     needs_truth: false,
     test: Test::Method(test),
     decided_at: DecidedAt::Stage(Stage::Search(Phase::PositionCoarse)),
     proof: Proof::CostMap(MapOverlay::Rim),
-    remedies: d1::remedies,
+    remedies,
     ..Rule::new(Code::D8)
 };
+
+fn remedies(ask: &Ask<'_>) -> Vec<Remedy> {
+    match ask.family {
+        Family::Descent => ask.other_searches(),
+        _ => d1::remedies(ask),
+    }
+}
 
 /// With the truth, where the minimum's basin goes on outside; without, of a pose that is more likely wrong
 /// than right.
@@ -39,7 +50,7 @@ fn on_rim(case: &Case<'_>) -> Option<Diagnosis> {
             radius_m,
             yaw_deg: offset.yaw_rad.to_degrees().abs(),
             yaw_range_deg: grid.yaw_range_deg,
-            is_position: distance_m > radius_m - 0.5 * grid.coarse_step_m,
+            is_position: grid.is_on_edge(&offset, radius_m),
         })
     })
 }

@@ -57,7 +57,7 @@ fn test(case: &Case<'_>) -> Option<Diagnosis> {
                 .or_else(|| truth_by_cost(case, search))
                 .or_else(|| camera_by_fb(case, false))
         }
-        Family::Starts => poses(case),
+        Family::Starts | Family::Descent => poses(case),
     }
 }
 

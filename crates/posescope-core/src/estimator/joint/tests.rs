@@ -1,6 +1,7 @@
 use super::*;
 use crate::camera::Intrinsics;
 use crate::cloud::Cloud;
+use crate::cost::SearchRule;
 use crate::diagnosis::Code;
 use crate::estimator::methods;
 use crate::geometry::yaw;
@@ -225,13 +226,32 @@ fn a_method_that_takes_one_reference_at_a_time_says_so() {
     for method in methods() {
         let (pose, shares) = estimate_jointly(method, &params, &references, &mut Trace::off())
             .expect("nobody cancels");
-        if pose == Err(Failure::NotJoint { method }) {
+        if matches!(pose, Err(Failure::NotJoint { method: of, search: None }) if of == method) {
             assert_eq!(shares[0].outcome, ShareOutcome::Failed);
         } else {
             jointly.push(method.name());
         }
     }
     assert_eq!(jointly, ["fb", "pm", "mi", "hy", "nid"]);
+}
+
+#[test]
+fn a_search_that_takes_one_reference_at_a_time_says_so_and_no_grid_is_searched_instead() {
+    let problems = problems(vec![reference(places()[0], TEXTURE, 0.0..WIDTH)]);
+    let references = [JointReference { problem: &problems[0], matches: 9, alone: None }];
+    for (search, word) in [(SearchRule::Descent, "descent"), (SearchRule::Starts, "starts")] {
+        let mut params = Params::default();
+        params.set("pm.search", word).expect("a search");
+        let (pose, _) =
+            estimate_jointly(Method::PM, &params, &references, &mut Trace::off()).expect("runs");
+        let failure = pose.expect_err("it does not search a grid");
+        assert_eq!(failure, Failure::NotJoint { method: Method::PM, search: Some(search) });
+        assert!(failure.to_string().starts_with(&format!("pm with search={word} takes one")));
+        // What is another method's search is none of MI's.
+        let (pose, _) =
+            estimate_jointly(Method::MI, &params, &references, &mut Trace::off()).expect("runs");
+        assert!(!matches!(pose, Err(Failure::NotJoint { .. })));
+    }
 }
 
 #[test]

@@ -1,5 +1,7 @@
 //! The cost of the search at one size of the photos.
 
+use std::convert::Infallible;
+
 use super::ManyStarts;
 use crate::geometry::Pose;
 use crate::grid::least_covered;
@@ -42,10 +44,24 @@ impl ManyStarts {
         }
         let price = |_: &Pose, cost: f64| cost;
         let starts = level.starts(&[pose]);
-        let walks = level.gathered(&starts, &self.around(), price, &mut checkpoint)?;
+        let walks = level.gathered(&starts, &self.around(problem), price, &mut checkpoint)?;
         let refined = self.halved(level, walks, &self.in_six(), 1, price, checkpoint)?;
         let inside = refined.first().filter(|one| one.pose.translation.vector.norm() <= reach);
         Ok(inside.copied())
+    }
+}
+
+impl ManyStarts {
+    /// The minimum that a pose leads to, though no search started there; `None` where there is none.
+    pub(in crate::estimator) fn basin_of(
+        &self,
+        problem: &Problem,
+        level: &Level<impl Objective>,
+        reference_from_camera: &Pose,
+    ) -> Option<Refined> {
+        let never = || Ok::<_, Infallible>(());
+        let Ok(refined) = self.refined(problem, level, *reference_from_camera, never);
+        refined
     }
 }
 
