@@ -1,5 +1,6 @@
 //! The input of an estimator: one query photo, one reference tuple, and no ground truth.
 
+use std::borrow::Cow;
 use std::convert::Infallible;
 use std::fmt;
 use std::sync::Arc;
@@ -206,6 +207,27 @@ impl Problem {
     /// The seed of the pixels that are shuffled to see what chance costs.
     pub(crate) fn shuffle_seed(&self) -> u64 {
         self.random_seed("shuffled pixels")
+    }
+
+    /// The same problem with a place for what a run prepares of it, such as the coloured cloud and the depths of
+    /// features, so that estimator and confidence make each once; itself where its frames keep that longer.
+    pub(crate) fn prepared(&self) -> Cow<'_, Self> {
+        let keeps = |memo: &Memo| memo.id().is_some();
+        let Self { query, reference, .. } = self;
+        if keeps(&query.memo) && keeps(&reference.memo) {
+            return Cow::Borrowed(self);
+        }
+        let query = if keeps(&query.memo) {
+            Arc::clone(query)
+        } else {
+            Arc::new(Query::clone(query).remembering())
+        };
+        let reference = if keeps(&reference.memo) {
+            Arc::clone(reference)
+        } else {
+            Arc::new(ReferenceTuple::clone(reference).remembering())
+        };
+        Cow::Owned(Self { query, reference, ..self.clone() })
     }
 
     /// A value that depends on these inputs, the query and the reference, kept with the query where both keep

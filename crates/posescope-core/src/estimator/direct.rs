@@ -74,14 +74,15 @@ impl Estimator for Direct {
     }
 
     fn scorer(&self, problem: &Problem) -> Option<Scorer<'_>> {
-        Some(self.scorer_of(problem))
+        Some(self.scorer_of(problem, self.colored(problem).value))
     }
 
     fn led_from(&self, problem: &Problem, reference_from_camera: &Pose) -> Option<Refined> {
         match self.search {
             SearchRule::Grid => None,
             SearchRule::Starts => {
-                let level = self.starts.level(self.scorer_of(problem));
+                let cloud = self.colored(problem).value;
+                let level = self.starts.level(self.scorer_of(problem, cloud));
                 self.starts.basin_of(problem, &level, reference_from_camera)
             }
             SearchRule::Descent => self.descended_from(problem, reference_from_camera),
@@ -100,9 +101,9 @@ impl Direct {
         if !self.cost.statistic().is_counted() {
             leave_out(self.method, "has a cost that whole numbers do not decide");
         }
-        self.color(problem, trace)?;
+        let cloud = self.color(problem, trace)?;
         trace.checkpoint()?;
-        let scorer = self.scorer_of(problem);
+        let scorer = self.scorer_of(problem, cloud);
         trace.checkpoint()?;
 
         // The reference pose is the starting value, and its coverage the measure of all others.
@@ -144,8 +145,8 @@ impl Direct {
         trace: &mut Trace<'_>,
     ) -> Result<(Pose, CostSummary), Halt> {
         self.starts.check_size(problem)?;
-        self.color(problem, trace)?;
-        let level = self.starts.level(self.scorer_of(problem));
+        let cloud = self.color(problem, trace)?;
+        let level = self.starts.level(self.scorer_of(problem, cloud));
         let compare = |pose: &Pose, _| level.objective.compare(pose);
         let found = self.starts.search(problem, &level, None, &compare, trace)?;
         Ok((problem.world_from_query(&found.refined[0].pose), found.summary))
@@ -179,14 +180,15 @@ impl Direct {
         })
     }
 
-    pub(super) fn scorer_of(&self, problem: &Problem) -> Scorer<'_> {
+    /// What scores poses of the query by what its photo and the coloured cloud show.
+    pub(super) fn scorer_of(&self, problem: &Problem, cloud: Arc<ColoredCloud>) -> Scorer<'_> {
         let query = &problem.query;
         let bytes = |image: &FloatImage| size_of_val(image.as_raw().as_slice());
         let channel = query.memo.recall(self.cost.query_channel_key(), bytes, || {
             self.cost.query_channel(&query.photo.gray)
         });
         Scorer::new(
-            self.colored(problem).value,
+            cloud,
             channel.value,
             &query.intrinsics,
             self.render.splat_px,

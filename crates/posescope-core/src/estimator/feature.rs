@@ -12,6 +12,7 @@ use std::sync::Arc;
 pub(super) use self::guide::Guide;
 pub use self::guide::GuidedParams;
 use self::guide::last_matches;
+use self::lifted::Lifted;
 pub use self::lifted::projected_cloud;
 pub use self::matched::count_matches;
 pub(super) use self::matched::{Detected, Detector};
@@ -168,9 +169,10 @@ impl FeatureBased {
 
         let lifted = trace.stage(Stage::DepthLift, |trace| {
             let lifted = self.lift(&matches, reference, &problem.reference, trace)?;
-            trace.emit(|| DepthsLifted { matches: Arc::clone(&lifted) })?;
+            trace.emit(|| DepthsLifted { matches: Arc::clone(&lifted.matches) })?;
             Ok::<_, Halt>(lifted)
         })?;
+        let Lifted { matches: lifted, all } = lifted;
         states.after_depth_lift(&lifted);
         let pairings: Vec<Pairing> =
             lifted.iter().filter_map(|lifted| Pairing::of(query, lifted)).collect();
@@ -206,8 +208,7 @@ impl FeatureBased {
             trials: consensus.trials,
         };
         let threshold_px = self.params.mlesac.inlier_threshold_px;
-        if let Some(guide) = &self.guide {
-            let all = self.lifted(&problem.reference, reference);
+        if let (Some(guide), Some(all)) = (&self.guide, all) {
             let (last, is_better) = guide.match_again(problem, detected, &all, best, trace)?;
             if is_better {
                 beyond.tested = last.pairings.len();

@@ -7,6 +7,8 @@
 //! and the cost is that of the [judge](crate::judge): three channels in smaller copies of the photos, and local
 //! contrast in the photos themselves.
 
+use std::cell::LazyCell;
+
 use super::direct::Direct;
 use super::starts::{Found, Level, ManyStarts};
 use super::{Entry, Estimator, Family, Halt, Outcome, separate_failure};
@@ -17,7 +19,7 @@ use crate::judge::{Channels, Judge, JudgeParams, Refined};
 use crate::method::Method;
 use crate::params::Params;
 use crate::problem::Problem;
-use crate::render::{Comparison, Objective as _, RenderParams, Score, leave_out};
+use crate::render::{Comparison, Objective as _, RenderParams, Score, Scorer, leave_out};
 use crate::trace::{Cancelled, Trace};
 
 /// The method.
@@ -72,8 +74,8 @@ impl SixFreedoms {
     }
 
     /// The view at a pose beside the query, with the score that the judge gave it.
-    fn compare(&self, problem: &Problem, pose: &Pose, score: Score) -> Comparison {
-        Comparison { score, ..self.view.scorer_of(problem).compare(pose) }
+    fn compare(view: &Scorer<'_>, pose: &Pose, score: Score) -> Comparison {
+        Comparison { score, ..view.compare(pose) }
     }
 
     /// Searches all of the disc.
@@ -84,9 +86,11 @@ impl SixFreedoms {
         trace: &mut Trace<'_>,
     ) -> Result<Found, Halt> {
         self.starts.check_size(problem)?;
-        self.view.color(problem, trace)?;
+        let cloud = self.view.color(problem, trace)?;
         let smaller = |shrink| self.level(problem, shrink);
-        let compare = |pose: &Pose, score| self.compare(problem, pose, score);
+        // Only what is shown is drawn in grey values.
+        let view = LazyCell::new(|| self.view.scorer_of(problem, cloud));
+        let compare = |pose: &Pose, score| Self::compare(&view, pose, score);
         self.starts.search(problem, level, Some(&smaller), &compare, trace)
     }
 }
@@ -111,6 +115,6 @@ impl Estimator for SixFreedoms {
         let pose = problem.reference_from_query(world_from_query);
         let judge = Judge::new(problem, &self.render, &self.judge, 1);
         let score = judge.score(&[pose])[0];
-        Some(self.compare(problem, &pose, score))
+        Some(Self::compare(&self.view.scorer(problem)?, &pose, score))
     }
 }

@@ -32,6 +32,7 @@ pub fn localize_traced(
     params: &Params,
     trace: &mut Trace<'_>,
 ) -> Result<Outcome, Cancelled> {
+    let problem = &*problem.prepared();
     let least = estimator::find(method).map_or(0.0, |entry| entry.least_probability(params));
     if least == 0.0 {
         return estimate_traced(problem, method, params, trace);
@@ -71,7 +72,7 @@ pub fn localize_by(
     problem: &Problem,
     trace: &mut Trace<'_>,
 ) -> Result<Outcome, Cancelled> {
-    caught(|| estimator.estimate(problem, trace))
+    caught(|| estimator.estimate(&problem.prepared(), trace))
         .unwrap_or_else(|failure| Ok(Outcome::failed(failure)))
 }
 

@@ -43,9 +43,8 @@ impl Direct {
         trace: &mut Trace<'_>,
     ) -> Result<(Pose, CostSummary), Halt> {
         let cloud = self.color(problem, trace)?;
-        let scorer = self.scorer_of(problem);
+        let level = self.starts.level(self.scorer_of(problem, Arc::clone(&cloud)));
         trace.checkpoint()?;
-        let level = self.starts.level(scorer);
         let scorer = &level.objective;
         let mut standing = Standing {
             reference_from_camera: Pose::identity(),
@@ -149,7 +148,8 @@ impl Direct {
     pub(super) fn descended_from(&self, problem: &Problem, start: &Pose) -> Option<Refined> {
         let is_inside =
             |pose: &Pose| pose.translation.vector.norm() <= problem.uncertainty_radius_m;
-        let level = self.starts.level(self.scorer_of(problem));
+        let cloud = self.colored(problem).value;
+        let level = self.starts.level(self.scorer_of(problem, Arc::clone(&cloud)));
         let cost_of = |pose: Pose| {
             let score = level.objective.score(&[pose])[0];
             score.eligible_cost(level.least_covered).filter(|_| is_inside(&pose))
@@ -160,7 +160,6 @@ impl Direct {
             evaluations += 1;
             Ok(())
         };
-        let cloud = self.colored(problem).value;
         let pose = self.go_down(problem, &cloud, start.pose, &mut Trace::off(), count).ok()?;
         Some(Refined { start, pose, cost: cost_of(pose)?, evaluations })
     }

@@ -14,6 +14,14 @@ use crate::trace::{Cancelled, Trace};
 /// Matches lifted between two checkpoints.
 const LIFTED_AT_A_TIME: usize = 256;
 
+/// What the cloud gives the features of a reference.
+pub(super) struct Lifted {
+    /// The depths of the matches.
+    pub(super) matches: Arc<[LiftedMatch]>,
+    /// The depth of every feature, whatever it matches, where features are matched again.
+    pub(super) all: Option<Arc<Vec<LiftedMatch>>>,
+}
+
 impl FeatureBased {
     /// P = K⁻¹ p_R z: the keypoint's own pixel at the depth of the nearest projected point.
     pub(super) fn lift(
@@ -22,10 +30,10 @@ impl FeatureBased {
         reference: &Features,
         tuple: &ReferenceTuple,
         trace: &mut Trace<'_>,
-    ) -> Result<Arc<[LiftedMatch]>, Cancelled> {
+    ) -> Result<Lifted, Cancelled> {
         let cloud = projected_cloud(tuple, self.params.visible.then_some(&self.render));
         trace.emit(|| ProjectedCloud { points: tuple.cloud.len(), in_view: cloud.len() })?;
-        let all = self.guide.as_ref().map(|_| self.lifted(tuple, reference));
+        let all = self.guide.as_ref().map(|_| self.all_lifted(tuple, reference, &cloud));
         let mut lifted = Vec::with_capacity(matches.len());
         for matches in matches.chunks(LIFTED_AT_A_TIME) {
             trace.checkpoint()?;
@@ -34,21 +42,21 @@ impl FeatureBased {
                 None => LiftedMatch { query, ..self.lifted_at(number, reference, &cloud, tuple) },
             }));
         }
-        Ok(lifted.into())
+        Ok(Lifted { matches: lifted.into(), all })
     }
 
     /// The depth of every feature of a reference, whatever it matches.
-    pub(super) fn lifted(
+    fn all_lifted(
         &self,
         tuple: &ReferenceTuple,
         reference: &Features,
+        cloud: &ProjectedCloudIndex,
     ) -> Arc<Vec<LiftedMatch>> {
         let FeatureParams { visible, depth_radius_px, depth, depth_spread, .. } = self.params;
         let bytes = |lifted: &Vec<LiftedMatch>| size_of_val(lifted.as_slice());
         let depth = (visible, &self.render, depth_radius_px, depth, depth_spread);
         let lifted = tuple.memo.recall((&self.detector, depth), bytes, || {
-            let cloud = projected_cloud(tuple, visible.then_some(&self.render));
-            let lift = |number| self.lifted_at(number, reference, &cloud, tuple);
+            let lift = |number| self.lifted_at(number, reference, cloud, tuple);
             (0..reference.keypoints.len()).map(lift).collect()
         });
         lifted.value

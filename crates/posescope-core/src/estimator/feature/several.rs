@@ -48,7 +48,7 @@ impl FeatureBased {
                 FeatureStates::new(query.keypoints.len()).after_matching(&decisions.value)
             };
             let reference = &detected.reference.features;
-            let lifted = self.lift(&matches, reference, &problem.reference, trace)?;
+            let lifted = self.lift(&matches, reference, &problem.reference, trace)?.matches;
             let pairings = lifted.iter().filter_map(|lifted| Pairing::of(query, lifted));
             Ok::<_, Halt>(Gathered {
                 correspondences: pairings.map(|pairing| pairing.correspondence).collect(),

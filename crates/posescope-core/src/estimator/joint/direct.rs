@@ -57,9 +57,10 @@ impl Direct {
         let mut members = Vec::new();
         for (index, reference) in references.iter().enumerate() {
             trace.checkpoint()?;
-            if !self.colored(reference.problem).value.points.is_empty() {
+            let cloud = self.colored(reference.problem).value;
+            if !cloud.points.is_empty() {
                 trace.checkpoint()?;
-                let level = self.starts.level(self.scorer_of(reference.problem));
+                let level = self.starts.level(self.scorer_of(reference.problem, cloud));
                 let member_from_lead = between(reference.problem, lead);
                 members.push(Member { index, level, member_from_lead });
             }
