@@ -19,7 +19,6 @@ mod ask;
 mod assessment;
 mod case;
 pub mod confidence;
-mod descent;
 mod evidence;
 mod fused;
 mod matches;

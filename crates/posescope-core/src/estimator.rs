@@ -38,11 +38,11 @@ use crate::cost;
 use crate::event::MinimumAssessed;
 use crate::geometry::Pose;
 use crate::grid::Offset;
-use crate::judge::Refined;
 use crate::method::Method;
 use crate::params::Params;
 use crate::problem::Problem;
 use crate::render::{Comparison, Objective, Score, Scorer};
+use crate::search::Refined;
 use crate::text::UnknownWord;
 use crate::trace::{Cancelled, Trace};
 

@@ -10,9 +10,9 @@ use std::sync::Arc;
 use serde::{Serialize, Serializer};
 
 pub use crate::depth::{DepthReading, DepthsWithin, LiftedMatch};
-pub use crate::judge::{Freedoms, Refined, Start};
 pub use crate::render::{ColoredCloud, ColoredPoint, ColoringCounts};
 pub use crate::render::{Comparison, SplattedPixel, SyntheticView};
+pub use crate::search::{Freedoms, Refined, Start};
 
 use crate::features::{FeatureState, Features, Match, MatchVerdict};
 use crate::fusion::share::Share;

@@ -11,18 +11,12 @@
 //! | `channels` | what a photo shows, three ways |
 //! | `chance` | 1 − NMI less its chance level |
 //! | `scorer` | the cost of many poses, on all threads |
-//! | `gather` | from a start to the deep minimum near it, by samples |
-//! | `shrink` | from a start to the minimum near it, by steps that shrink |
 //! | `params` | what decides it |
 
 mod chance;
 mod channels;
-mod gather;
 mod params;
 mod scorer;
-mod shrink;
 
-pub use gather::{Gathering, gather};
 pub use params::{Channels, JudgeParams};
 pub use scorer::Judge;
-pub use shrink::{Freedoms, Refined, Shrinking, Start, moved, shrink};

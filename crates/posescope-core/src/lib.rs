@@ -213,11 +213,12 @@ pub mod scale;
 #[doc(hidden)]
 pub mod scene;
 #[doc(hidden)]
+pub mod search;
+#[doc(hidden)]
 pub mod text;
 #[doc(hidden)]
 pub mod trace;
 
-mod descent;
 mod input;
 mod memo;
 mod stats;

@@ -12,13 +12,13 @@ use crate::grid::{GridParams, SurfaceParams};
 use crate::retrieval::{IndexParams, RetrievalParams};
 use crate::scale::Scale;
 
-pub use crate::descent::DescentParams;
 pub use crate::describe::{About, Described, Domain, ParamError, Value};
 pub use crate::estimator::{
     DepthRule, FeatureParams, GuidedParams, HybridParams, RobustParams, SixParams,
 };
 pub use crate::judge::{Channels, JudgeParams};
 pub use crate::render::RenderParams;
+pub use crate::search::descent::DescentParams;
 
 /// All parameters of all estimators, by group.
 #[derive(Clone, Debug, Default, PartialEq)]

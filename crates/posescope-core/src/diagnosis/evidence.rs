@@ -8,7 +8,7 @@ use crate::event::{
 };
 use crate::features::{FeatureState, Features, Match};
 use crate::grid::{Phase, ScoredLattice};
-use crate::judge::{Freedoms, Refined};
+use crate::search::{Freedoms, Refined};
 use crate::trace::{Cancelled, Record, Sink};
 
 /// The events of one method on one problem that verdicts are drawn from. Their payloads are shared, so

@@ -13,14 +13,14 @@ use rayon::prelude::*;
 use super::Family;
 use super::Subject;
 use super::confidence;
-use super::descent::compass_search;
 use crate::cost::shuffled;
 use crate::estimator::{self, Estimator};
 use crate::geometry::{Pose, PoseError, yaw};
 use crate::grid::{GridParams, Offset, Phase, least_covered};
-use crate::judge::moved;
 use crate::method::Method;
 use crate::render::{Score, Scorer};
+use crate::search::compass::compass_search;
+use crate::search::moved;
 use crate::stats::mean_and_squares;
 
 /// The method whose cost judges the poses of other systems: it bears the greatest changes of appearance.

@@ -6,7 +6,7 @@
 use super::{Family, Subject, confidence};
 use crate::estimator::{self, prior_penalty};
 use crate::geometry::{Pose, PoseError};
-use crate::judge::Refined;
+use crate::search::Refined;
 
 /// Where the truth leads, and the result.
 pub(super) struct Starts {

@@ -9,17 +9,17 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use super::starts::{Level, ManyStarts};
 use super::{Answered, CostSummary, Estimator, Failure, Halt, Outcome, separate_failure};
 use crate::cost::{self, Cost, CostSetting, SearchRule};
-use crate::descent::DescentParams;
 use crate::event::{CloudColored, Moment, PhaseSearched, PoseScored, Stage, ViewRendered};
 use crate::geometry::Pose;
 use crate::grid::{GridParams, Lattice, Offset, Phase, Scored, ScoredLattice, scan};
 use crate::image::FloatImage;
-use crate::judge::Refined;
 use crate::memo::{Key, Recalled, key};
 use crate::method::Method;
 use crate::params::Params;
 use crate::problem::Problem;
 use crate::render::{ColoredCloud, Objective as _, RenderParams, Score, Scorer, leave_out};
+use crate::search::Refined;
+use crate::search::descent::DescentParams;
 use crate::trace::{Cancelled, Trace};
 
 /// A direct estimator: it searches the pose whose synthetic view has the lowest cost.

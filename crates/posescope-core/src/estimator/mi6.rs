@@ -15,11 +15,12 @@ use super::{Entry, Estimator, Family, Halt, Outcome, separate_failure};
 use crate::cost;
 use crate::event::Stage;
 use crate::geometry::Pose;
-use crate::judge::{Channels, Judge, JudgeParams, Refined};
+use crate::judge::{Channels, Judge, JudgeParams};
 use crate::method::Method;
 use crate::params::Params;
 use crate::problem::Problem;
 use crate::render::{Comparison, Objective as _, RenderParams, Score, Scorer, leave_out};
+use crate::search::Refined;
 use crate::trace::{Cancelled, Trace};
 
 /// The method.

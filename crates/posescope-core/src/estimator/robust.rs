@@ -22,11 +22,11 @@ use super::{
 use crate::event::{BranchTaken, CandidatesJudged, JudgedPose, Stage};
 use crate::geometry::Pose;
 use crate::grid::Offset;
-use crate::judge::Refined;
 use crate::method::Method;
 use crate::params::Params;
 use crate::problem::Problem;
 use crate::render::{Comparison, leave_out};
+use crate::search::Refined;
 use crate::trace::{Cancelled, Trace};
 
 /// The method.

@@ -21,11 +21,11 @@ use super::{Answered, CostSummary, Failure, Halt};
 use crate::event::{Moment, PhaseSearched, PoseScored, Stage, StartsRefined, ViewRendered};
 use crate::geometry::{Pose, PoseError};
 use crate::grid::{GridParams, Lattice, Offset, Phase, Scored, ScoredLattice, scan};
-use crate::judge::{Freedoms, Gathering, Refined, Shrinking, Start};
 use crate::params::Params;
 use crate::problem::Problem;
 use crate::render::{Comparison, Objective, Score};
 use crate::scale::Scale;
+use crate::search::{CrossEntropy, Freedoms, PatternSearch, Refined, Start};
 use crate::trace::{Cancelled, Trace};
 
 /// The step below which the refinement of all starts ends, before the best go on in six freedoms \[m\], at the
@@ -110,8 +110,8 @@ impl ManyStarts {
     }
 
     /// The plan for the last refinement, in six freedoms.
-    fn in_six(&self) -> Shrinking {
-        Shrinking {
+    fn in_six(&self) -> PatternSearch {
+        PatternSearch {
             freedoms: Freedoms::Six,
             first_m: self.params.six_step_m.min(self.most_m()),
             last_m: self.params.last_step_m,
@@ -120,13 +120,13 @@ impl ManyStarts {
     }
 
     /// The samples around the best starts.
-    fn around(&self, problem: &Problem) -> Gathering {
-        let Shrinking { first_m, rad_per_m, .. } = self.in_the_plane();
-        Gathering { first_m, rad_per_m, fewest: MIN_REFINED, seed: problem.seed }
+    fn around(&self, problem: &Problem) -> CrossEntropy {
+        let PatternSearch { first_m, rad_per_m, .. } = self.in_the_plane();
+        CrossEntropy { first_m, rad_per_m, fewest: MIN_REFINED, seed: problem.seed }
     }
 
-    fn in_the_plane(&self) -> Shrinking {
-        Shrinking {
+    fn in_the_plane(&self) -> PatternSearch {
+        PatternSearch {
             freedoms: Freedoms::Plane,
             first_m: self.params.first_step_m.min(self.most_m()),
             last_m: self.scale.length(PLANE_LAST_M).min(self.most_m()),
@@ -302,9 +302,9 @@ impl ManyStarts {
         let SixParams { starts: most, finalists, .. } = self.params;
         let most_m = self.most_m();
         let walks = starts(&surfaces, 2 * most, price).iter().map(Refined::unmoved).collect();
-        let plan = Shrinking { last_m: most_m.min(0.1), ..self.in_the_plane() };
+        let plan = PatternSearch { last_m: most_m.min(0.1), ..self.in_the_plane() };
         let plane = self.halved(&level, walks, &plan, finalists, price, || trace.checkpoint())?;
-        let plan = Shrinking {
+        let plan = PatternSearch {
             freedoms: Freedoms::Six,
             first_m: most_m.min(0.2),
             last_m: most_m.min(0.05),
@@ -317,7 +317,7 @@ impl ManyStarts {
         trace.checkpoint()?;
         let best = self.apart(six, finalists, price);
         let poses: Vec<Pose> = best.iter().map(|start| start.pose).collect();
-        let plan = Shrinking { last_m: most_m.min(0.025), ..plan };
+        let plan = PatternSearch { last_m: most_m.min(0.025), ..plan };
         let walks = level.starts(&poses).iter().map(Refined::unmoved).collect();
         let refined =
             self.halved(&level, walks, &plan, MIN_REFINED, price, || trace.checkpoint())?;
@@ -386,7 +386,7 @@ impl ManyStarts {
         &self,
         search: &mut Search<'_, O>,
         walks: Vec<Refined>,
-        plan: &Shrinking,
+        plan: &PatternSearch,
         fewest: usize,
         price: impl Fn(&Pose, f64) -> f64,
         trace: &mut Trace<'_>,

@@ -11,9 +11,9 @@ use crate::features::{FeatureState, Features, Keypoint, Match, MatchVerdict};
 use crate::fusion::share::Share;
 use crate::geometry::{Pose, matrix_from_pose};
 use crate::grid::ScoredLattice;
-use crate::judge::Refined;
 use crate::render::{ColoredCloud, Comparison, Score};
 use crate::retrieval::{RankedReference, ReferenceRanking};
+use crate::search::Refined;
 
 /// Writes the entries of a map; `name: things => property` is an array.
 macro_rules! entries {
@@ -157,9 +157,9 @@ mod tests {
     use serde_json::{Value, json};
 
     use crate::event::*;
-    use crate::judge::Start;
     use crate::retrieval::{Criterion, Geometry, Ranked, RankedReference};
     use crate::robust::{Hypothesis, LikelihoodScore};
+    use crate::search::Start;
 
     fn data(event: impl Into<Event>) -> Value {
         serde_json::to_value(event.into()).expect("an object")

@@ -8,11 +8,12 @@ use posescope_core::event::{
 };
 use posescope_core::geometry::{Pose, PoseError};
 use posescope_core::history::History;
-use posescope_core::judge::{Channels, Freedoms, Judge, JudgeParams, Refined};
+use posescope_core::judge::{Channels, Judge, JudgeParams};
 use posescope_core::method::Method;
 use posescope_core::params::Params;
 use posescope_core::problem::Problem;
 use posescope_core::render::{Objective as _, RenderParams};
+use posescope_core::search::{Freedoms, Refined};
 use posescope_core::trace::Trace;
 
 use crate::two_walls::{cloud_of_the_walls, photo, problem, solvable};

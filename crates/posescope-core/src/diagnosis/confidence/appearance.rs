@@ -9,10 +9,11 @@ use std::convert::Infallible;
 
 use super::tamed;
 use crate::geometry::{Pose, yaw};
-use crate::judge::{Judge, moved};
+use crate::judge::Judge;
 use crate::params::Params;
 use crate::problem::Problem;
 use crate::render::{Objective as _, Score};
+use crate::search::moved;
 use crate::stats::median_and_deviation;
 
 /// How closely one looks. A method's coefficients belong to its look.

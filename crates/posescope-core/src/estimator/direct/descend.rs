@@ -6,16 +6,16 @@ use nalgebra::Point3;
 
 use super::Direct;
 use crate::cost::Statistic;
-use crate::descent::{Step, View, information, photometric};
 use crate::estimator::starts::Level;
 use crate::estimator::{Answered, CostSummary, Failure, Halt};
 use crate::event::{DescentStepped, Moment, PhaseSearched, Stage, ViewRendered};
 use crate::geometry::Pose;
 use crate::grid::{Lattice, Offset, Phase, Scored};
 use crate::image::gaussian_smoothed;
-use crate::judge::{Refined, Start};
 use crate::problem::Problem;
 use crate::render::{ColoredCloud, Score, Scorer};
+use crate::search::descent::{Step, View, information, photometric};
+use crate::search::{Refined, Start};
 use crate::trace::{Cancelled, Trace};
 
 /// Where a descent stands.

@@ -9,12 +9,12 @@ use crate::estimator::{Failure, Halt};
 use crate::fusion::share::Support;
 use crate::geometry::Pose;
 use crate::grid::{Offset, scan};
-use crate::judge::{Freedoms, Shrinking, Start, shrink};
 use crate::render::{Score, Scorer, at_a_time};
+use crate::search::{Freedoms, PatternSearch, Start, pattern_search};
 use crate::trace::{Cancelled, Trace};
 
 /// The first step is that of the grid's fine lattice, the last what neither a photo nor a scan tells apart.
-const REFINEMENT: Shrinking = Shrinking {
+const REFINEMENT: PatternSearch = PatternSearch {
     freedoms: Freedoms::Six,
     first_m: 0.2,
     last_m: 0.01,
@@ -150,7 +150,7 @@ impl Joint<'_> {
             .zip(costs(&poses)?)
             .filter_map(|(&pose, cost)| Some(Start { pose, cost: cost? }))
             .collect();
-        let refined = shrink(&starts, &REFINEMENT, costs)?;
+        let refined = pattern_search(&starts, &REFINEMENT, costs)?;
         // The first of equal ones, so that the grid's comes before those of single references.
         let best = refined.into_iter().min_by(|a, b| a.cost.total_cmp(&b.cost));
         Ok(best.map(|best| best.pose))

@@ -5,8 +5,8 @@
 
 use super::{Level, ManyStarts};
 use crate::geometry::Pose;
-use crate::judge::{Refined, Shrinking, Start};
 use crate::render::Objective;
+use crate::search::{PatternSearch, Refined, Start};
 
 impl ManyStarts {
     /// Refines the walks, of which at least `fewest` are refined to the end where so many lead to places of their
@@ -18,7 +18,7 @@ impl ManyStarts {
         &self,
         level: &Level<impl Objective>,
         mut walks: Vec<Refined>,
-        plan: &Shrinking,
+        plan: &PatternSearch,
         fewest: usize,
         price: impl Fn(&Pose, f64) -> f64,
         mut checkpoint: impl FnMut() -> Result<(), E>,
@@ -27,7 +27,7 @@ impl ManyStarts {
         while step_m >= plan.last_m {
             let here: Vec<Start> =
                 walks.iter().map(|&Refined { pose, cost, .. }| Start { pose, cost }).collect();
-            let plan = Shrinking { first_m: step_m, last_m: step_m, ..*plan };
+            let plan = PatternSearch { first_m: step_m, last_m: step_m, ..*plan };
             let moved = level.refined(&here, &plan, &mut checkpoint)?;
             for (walk, moved) in walks.iter_mut().zip(moved) {
                 (walk.pose, walk.cost) = (moved.pose, moved.cost);
@@ -73,9 +73,9 @@ mod tests {
     use std::convert::Infallible;
 
     use super::*;
-    use crate::judge::Freedoms;
     use crate::params::Params;
     use crate::render::Score;
+    use crate::search::Freedoms;
 
     /// Two bowls, at the origin and, not as deep, 4 m to the right.
     struct Bowls;
@@ -107,7 +107,7 @@ mod tests {
         let level = six.level(Bowls);
         let poses: Vec<Pose> = starts.iter().map(|&x| Pose::translation(x, 0.0, 0.0)).collect();
         let starts = level.starts(&poses);
-        let plan = Shrinking {
+        let plan = PatternSearch {
             freedoms: Freedoms::Six,
             first_m: 0.5,
             last_m: 0.004,

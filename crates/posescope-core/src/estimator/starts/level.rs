@@ -5,9 +5,9 @@ use std::convert::Infallible;
 use super::ManyStarts;
 use crate::geometry::Pose;
 use crate::grid::least_covered;
-use crate::judge::{Gathering, Refined, Shrinking, Start, gather, shrink};
 use crate::problem::Problem;
 use crate::render::{Objective, Score};
+use crate::search::{CrossEntropy, PatternSearch, Refined, Start, cross_entropy, pattern_search};
 
 /// A cost at one size of the photos.
 pub(in crate::estimator) struct Level<O> {
@@ -95,12 +95,12 @@ impl<O: Objective> Level<O> {
     pub(super) fn gathered<E>(
         &self,
         starts: &[Start],
-        plan: &Gathering,
+        plan: &CrossEntropy,
         price: impl Fn(&Pose, f64) -> f64,
         checkpoint: impl FnMut() -> Result<(), E>,
     ) -> Result<Vec<Refined>, E> {
         let mut walks: Vec<Refined> = starts.iter().map(Refined::unmoved).collect();
-        gather(&mut walks, plan, price, self.checked_costs(checkpoint))?;
+        cross_entropy(&mut walks, plan, price, self.checked_costs(checkpoint))?;
         Ok(walks)
     }
 
@@ -111,9 +111,9 @@ impl<O: Objective> Level<O> {
     pub(super) fn refined<E>(
         &self,
         starts: &[Start],
-        plan: &Shrinking,
+        plan: &PatternSearch,
         checkpoint: impl FnMut() -> Result<(), E>,
     ) -> Result<Vec<Refined>, E> {
-        shrink(starts, plan, self.checked_costs(checkpoint))
+        pattern_search(starts, plan, self.checked_costs(checkpoint))
     }
 }

@@ -68,8 +68,8 @@ mod tests {
     use nalgebra::UnitQuaternion;
 
     use super::*;
-    use crate::judge::{Refined, Start};
     use crate::params::Params;
+    use crate::search::{Refined, Start};
 
     #[test]
     fn a_level_pose_that_looks_the_same_way_is_likely_wherever_it_stands() {

@@ -1,4 +1,5 @@
-//! From a start to the minimum near it, by steps that shrink.
+//! From a start to the minimum near it: pattern search (Hooke, Jeeves, *Direct Search*, JACM 8(2), 1961), with a step to
+//! where parabolas through the costs beside a pose have their minima.
 
 use nalgebra::{Translation3, UnitQuaternion, Vector3};
 
@@ -29,9 +30,9 @@ impl Freedoms {
     }
 }
 
-/// How far the steps go, and where they end.
+/// How far the steps of a pattern search go, and where they end.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Shrinking {
+pub struct PatternSearch {
     /// The directions.
     pub freedoms: Freedoms,
     /// The first step \[m\].
@@ -44,7 +45,7 @@ pub struct Shrinking {
     pub in_place: bool,
 }
 
-impl Shrinking {
+impl PatternSearch {
     fn moved(&self, pose: &Pose, by: &[f64; 6]) -> Pose {
         if self.in_place { moved_in_place(pose, by, self.rad_per_m) } else { moved(pose, by) }
     }
@@ -113,9 +114,9 @@ struct Walk {
 ///
 /// # Errors
 /// Those of `costs`.
-pub fn shrink<E>(
+pub fn pattern_search<E>(
     starts: &[Start],
-    plan: &Shrinking,
+    plan: &PatternSearch,
     mut costs_of: impl FnMut(&[Pose]) -> Result<Vec<Option<f64>>, E>,
 ) -> Result<Vec<Refined>, E> {
     let mut walks: Vec<Walk> = starts
@@ -186,7 +187,7 @@ pub fn shrink<E>(
     Ok(walks.into_iter().map(|walk| walk.refined).collect())
 }
 
-fn step_along(axis: usize, step_m: f64, plan: &Shrinking) -> f64 {
+fn step_along(axis: usize, step_m: f64, plan: &PatternSearch) -> f64 {
     match axis {
         0..3 => step_m,
         _ => step_m * plan.rad_per_m,
@@ -194,7 +195,7 @@ fn step_along(axis: usize, step_m: f64, plan: &Shrinking) -> f64 {
 }
 
 /// The way to where the parabola along each axis is least, at most one step.
-fn vertex(walk: &Walk, costs: &[Option<f64>], plan: &Shrinking) -> [f64; 6] {
+fn vertex(walk: &Walk, costs: &[Option<f64>], plan: &PatternSearch) -> [f64; 6] {
     let here = walk.refined.cost;
     let mut by = [0.0; 6];
     for (&axis, sides) in plan.freedoms.axes().iter().zip(costs.chunks(2)) {
@@ -235,18 +236,18 @@ mod tests {
             + r.z.powi(2)
     }
 
-    fn plan(freedoms: Freedoms) -> Shrinking {
-        Shrinking { freedoms, first_m: 0.5, last_m: 1e-4, rad_per_m: 0.1, in_place: false }
+    fn plan(freedoms: Freedoms) -> PatternSearch {
+        PatternSearch { freedoms, first_m: 0.5, last_m: 1e-4, rad_per_m: 0.1, in_place: false }
     }
 
-    fn refined(truth: &Pose, start: Pose, plan: &Shrinking) -> Refined {
+    fn refined(truth: &Pose, start: Pose, plan: &PatternSearch) -> Refined {
         let cost = valley(truth, &start);
         let costs = |poses: &[Pose]| {
             assert!(poses.len() <= MAX_AT_A_TIME);
             let costs = poses.iter().map(|pose| Some(valley(truth, pose)));
             Ok::<_, Infallible>(costs.collect())
         };
-        let Ok(refined) = shrink(&[Start { pose: start, cost }], plan, costs);
+        let Ok(refined) = pattern_search(&[Start { pose: start, cost }], plan, costs);
         refined[0]
     }
 
@@ -291,7 +292,7 @@ mod tests {
     fn where_nothing_has_a_cost_a_start_stays_and_ends() {
         let start = Start { pose: Pose::identity(), cost: 0.7 };
         let nothing = |poses: &[Pose]| Ok::<_, Infallible>(vec![None; poses.len()]);
-        let Ok(refined) = shrink(&[start], &plan(Freedoms::Six), nothing);
+        let Ok(refined) = pattern_search(&[start], &plan(Freedoms::Six), nothing);
         assert_eq!((refined[0].pose, refined[0].cost), (start.pose, 0.7));
     }
 }

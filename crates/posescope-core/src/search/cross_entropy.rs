@@ -8,13 +8,13 @@ use nalgebra::{Matrix6, Vector6};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_pcg::Pcg64;
 
-use super::shrink::{Refined, moved_in_place};
+use super::pattern::{Refined, moved_in_place};
 use crate::geometry::Pose;
 use crate::render::MAX_AT_A_TIME;
 
-/// How samples gather.
+/// How the cross-entropy method draws its samples.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Gathering {
+pub struct CrossEntropy {
     /// The standard deviation of the first samples, to the right and forward \[m\].
     pub first_m: f64,
     /// Radians that count as a metre.
@@ -35,7 +35,7 @@ const SAMPLES: usize = 64;
 const ELITE: usize = 12;
 
 /// Standard deviations of the first samples to the right, down and forward, and about these axes, as shares of
-/// [`Gathering::first_m`]: a vehicle moves and turns in the plane more than it lifts or tilts.
+/// [`CrossEntropy::first_m`]: a vehicle moves and turns in the plane more than it lifts or tilts.
 const WIDTHS: [f64; 6] = [1.0, 0.3, 1.0, 0.3, 0.5, 0.3];
 
 /// Share of the covariance that the elite decides. The rest keeps samples from gathering in a dent too soon: it is the
@@ -55,13 +55,13 @@ struct Cloud {
 
 /// Moves each walk to the cheapest of the samples around it, where one costs less. After each round, the half whose poses
 /// have the higher prices stays where it is. All walks draw the same samples. `costs_of` is as for
-/// [`shrink`](super::shrink()).
+/// [`pattern_search`](super::pattern_search()).
 ///
 /// # Errors
 /// Those of `costs_of`.
-pub fn gather<E>(
+pub fn cross_entropy<E>(
     walks: &mut [Refined],
-    plan: &Gathering,
+    plan: &CrossEntropy,
     price: impl Fn(&Pose, f64) -> f64,
     mut costs_of: impl FnMut(&[Pose]) -> Result<Vec<Option<f64>>, E>,
 ) -> Result<(), E> {
@@ -127,9 +127,9 @@ mod tests {
 
     use super::*;
     use crate::geometry::PoseError;
-    use crate::judge::{Freedoms, Shrinking, Start, moved, shrink};
+    use crate::search::{Freedoms, PatternSearch, Start, moved, pattern_search};
 
-    const PLAN: Gathering = Gathering { first_m: 0.5, rad_per_m: 0.05, fewest: 3, seed: 0 };
+    const PLAN: CrossEntropy = CrossEntropy { first_m: 0.5, rad_per_m: 0.05, fewest: 3, seed: 0 };
 
     /// A bowl around a pose with dents every quarter of a metre, which hold what goes down step by step.
     fn dented(truth: &Pose, pose: &Pose) -> f64 {
@@ -148,7 +148,7 @@ mod tests {
             assert!(poses.len() <= MAX_AT_A_TIME);
             Ok::<_, Infallible>(poses.iter().map(|pose| Some(dented(truth, pose))).collect())
         };
-        let Ok(()) = gather(&mut walks, &PLAN, |_, cost| cost, costs);
+        let Ok(()) = cross_entropy(&mut walks, &PLAN, |_, cost| cost, costs);
         walks
     }
 
@@ -157,7 +157,7 @@ mod tests {
         let truth = moved(&Pose::identity(), &[3.0, -0.1, 7.0, 0.01, -0.1, 0.0]);
         let from = moved(&truth, &[0.5, 0.05, -0.6, 0.005, 0.02, -0.004]);
         let walk = start(&truth, from);
-        let plan = Shrinking {
+        let plan = PatternSearch {
             freedoms: Freedoms::Six,
             first_m: 0.1,
             last_m: 0.004,
@@ -167,7 +167,7 @@ mod tests {
         let costs = |poses: &[Pose]| {
             Ok::<_, Infallible>(poses.iter().map(|pose| Some(dented(&truth, pose))).collect())
         };
-        let Ok(stepped) = shrink(&[walk.start], &plan, costs);
+        let Ok(stepped) = pattern_search(&[walk.start], &plan, costs);
         let off = |refined: &Refined| PoseError::between(&truth, &refined.pose).translation_m;
         let gathered = gathered(&truth, vec![walk])[0];
         assert!(off(&stepped[0]) > 0.4, "{}", off(&stepped[0]));
@@ -194,8 +194,8 @@ mod tests {
         let mut walks = [9.0, 0.0, 6.0, 12.0, 3.0].map(away);
         // No sample has a cost, so each walk stays. The cheapest is nearest, and has the highest price.
         let nothing = |poses: &[Pose]| Ok::<_, Infallible>(vec![None; poses.len()]);
-        let plan = Gathering { fewest: 2, ..PLAN };
-        let Ok(()) = gather(&mut walks, &plan, |pose, _| -pose.translation.x, nothing);
+        let plan = CrossEntropy { fewest: 2, ..PLAN };
+        let Ok(()) = cross_entropy(&mut walks, &plan, |pose, _| -pose.translation.x, nothing);
         assert_eq!(walks.map(|walk| walk.evaluations), [256, 64, 128, 256, 64]);
     }
 
@@ -204,7 +204,7 @@ mod tests {
         let mut walks = [start(&Pose::identity(), Pose::translation(1.0, 0.0, 0.0))];
         let before = walks[0];
         let nothing = |poses: &[Pose]| Ok::<_, Infallible>(vec![None; poses.len()]);
-        let Ok(()) = gather(&mut walks, &PLAN, |_, cost| cost, nothing);
+        let Ok(()) = cross_entropy(&mut walks, &PLAN, |_, cost| cost, nothing);
         assert_eq!((walks[0].pose, walks[0].cost), (before.pose, before.cost));
     }
 }

@@ -2,11 +2,11 @@
 
 /// Where a descent ended.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Descended<const N: usize> {
+pub(crate) struct Descended<const N: usize> {
     /// The place.
-    pub(super) at: [f64; N],
+    pub(crate) at: [f64; N],
     /// The cost there.
-    pub(super) cost: f64,
+    pub(crate) cost: f64,
 }
 
 /// Compass search (Kolda, Lewis, Torczon, *Optimization by Direct Search*, SIAM Review 45(3), 2003): goes
@@ -15,7 +15,7 @@ pub(super) struct Descended<const N: usize> {
 ///
 /// `costs` scores many places at once; places without a cost, or with NaN, are never taken. `None` where
 /// the start has no cost.
-pub(super) fn compass_search<const N: usize>(
+pub(crate) fn compass_search<const N: usize>(
     start: [f64; N],
     mut steps: [f64; N],
     halvings: usize,
