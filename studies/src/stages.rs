@@ -8,7 +8,7 @@ use posescope::features::{SiftParams, SurfParams, nearest_neighbours, sift, surf
 use posescope::geometry::Pose;
 use posescope::method::Method;
 use posescope::params::Params;
-use posescope::render::{DepthCanvas, PointArrays, Scorer, Values};
+use posescope::render::{PointArrays, Scorer, Values, ZBuffer};
 use posescope::robust::{MlesacParams, mlesac};
 use posescope::solver::p3p;
 use posescope::trace::Trace;
@@ -131,7 +131,7 @@ fn both_costs<R>(splat_px: usize, measure: impl FnOnce(usize, &mut Work<'_>) -> 
     let of_query: Vec<_> = query.iter().copied().map(both).collect();
     let values = Values { query: &of_query, points: &of_points };
     let points = PointArrays::new(cloud.points.iter().map(|point| point.position));
-    let mut canvas = DepthCanvas::new(&PAIR.query.intrinsics, splat_px);
+    let mut canvas = ZBuffer::new(&PAIR.query.intrinsics, splat_px);
     let keep = |query: (f32, u8), synthetic: (f32, u8)| {
         let pair = IntensityPair { query: query.0, synthetic: synthetic.0 };
         (pair.squared_difference(), BinPair { query: query.1, synthetic: synthetic.1 })

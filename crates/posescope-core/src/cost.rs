@@ -27,7 +27,7 @@ pub use photometric::Photometric;
 pub use statistic::{CostOfPairs, Explanation, ExplanationKind, PhotometricWeights, Statistic};
 
 #[doc(hidden)]
-pub use entry::{CostSetting, CostSettings, Entry, RegisteredCost, SearchRule, Similarity};
+pub use entry::{CostEntry, CostSetting, CostSettings, RegisteredCost, SearchRule, Similarity};
 pub(crate) use joint_histogram::{MAX_BYTE_BINS, MIN_ENTROPY};
 #[doc(hidden)]
 pub use joint_histogram::{bin, byte_bin, count_pairs};
@@ -102,7 +102,7 @@ pub trait Cost: Send + Sync {
 
 /// Every cost.
 #[doc(hidden)]
-pub const ALL: &[Entry] =
+pub const ALL: &[CostEntry] =
     &[photometric::ENTRY, mutual_information::ENTRY, information_distance::ENTRY];
 
 #[cfg(test)]

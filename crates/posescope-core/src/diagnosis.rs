@@ -8,7 +8,7 @@
 //! |---|---|
 //! | `rules`, one file for each code in `rules/` | the table of verdicts: test, sentence, proof, remedies |
 //! | `case` | what a rule looks at |
-//! | `matches`, `search`, `starts` | what the truth says about matches, a grid search, a search from many starts |
+//! | `matches`, `search`, `free_search` | what the truth says about matches, a grid search, a search in six freedoms |
 //! | `confidence` | how likely a pose is right, without the truth |
 //! | `fused` | fused poses and rankings |
 //! | `remedies` | what may help |
@@ -20,6 +20,7 @@ mod assessment;
 mod case;
 pub mod confidence;
 mod evidence;
+mod free_search;
 mod fused;
 mod matches;
 mod numbers;
@@ -27,7 +28,6 @@ mod proof;
 pub mod remedies;
 mod rules;
 mod search;
-mod starts;
 mod tolerance;
 
 use serde::{Deserialize, Serialize};
@@ -49,7 +49,7 @@ use crate::geometry::{Pose, PoseError};
 use crate::method::Method;
 use crate::params::Params;
 use crate::problem::Problem;
-use search::Search;
+use search::FinishedSearch;
 
 /// A verdict on why a pose is wrong, missing or uncertain.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -152,7 +152,8 @@ pub fn diagnose(subject: &Subject<'_>) -> Vec<Diagnosis> {
         return failure.map(Diagnosis::of_failure).into_iter().collect();
     };
     let estimator = search::estimator_of(subject, family).filter(|_| grade != Grade::Right);
-    let search = estimator.as_ref().and_then(|one| Search::of(subject, family, one.as_ref()));
+    let search =
+        estimator.as_ref().and_then(|one| FinishedSearch::of(subject, family, one.as_ref()));
     let mut found = tried(&Case::new(subject, family, search.as_ref()), grade);
     // A method's own failure, unless a rule says more than that something else is suspect.
     let is_explained = found.iter().any(|one| one.code.is_failure() && one.code != Code::X1);

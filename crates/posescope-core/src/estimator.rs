@@ -13,8 +13,8 @@ mod given;
 mod hybrid;
 mod joint;
 mod mi6;
+mod multi_start;
 mod robust;
-mod starts;
 
 pub use direct::Direct;
 pub use failure::Failure;
@@ -25,11 +25,11 @@ pub use feature::{
 pub use given::Given;
 pub use hybrid::{Hybrid, HybridParams, HybridParts, hybrid_outcome};
 pub(crate) use joint::{JointReference, estimate_jointly};
-pub use mi6::SixFreedoms;
+pub use mi6::Mi6;
+use multi_start::Level;
+pub use multi_start::MultiStartParams;
+pub(crate) use multi_start::prior_penalty;
 pub use robust::{Robust, RobustParams};
-use starts::Level;
-pub use starts::SixParams;
-pub(crate) use starts::prior_penalty;
 
 use std::str::FromStr;
 use std::sync::LazyLock;
@@ -198,7 +198,7 @@ pub struct Entry {
     family: fn(&Self, &Params) -> Option<Family>,
     /// The groups of parameters that it reads beside those of its search and of the methods that it runs inside.
     groups: Vec<&'static str>,
-    cost: Option<&'static cost::Entry>,
+    cost: Option<&'static cost::CostEntry>,
     hybrid: Option<HybridParts>,
     runs: &'static [Method],
     make: Make,
@@ -241,7 +241,7 @@ impl Entry {
     pub fn reads(&self, params: &Params, key: &str) -> bool {
         let of_search: &[&str] = match self.family(params) {
             Some(Family::Grid) => &["grid"],
-            Some(Family::Starts) => {
+            Some(Family::MultiStart) => {
                 &["mi6", "grid.coarse_step", "grid.coverage_floor", "fb.radius_slack"]
             }
             Some(Family::Descent) => &["descent", "grid.coverage_floor"],
@@ -256,7 +256,7 @@ impl Entry {
     }
 
     /// The cost that it searches by itself, or by which its views are explained.
-    pub fn cost(&self) -> Option<&'static cost::Entry> {
+    pub fn cost(&self) -> Option<&'static cost::CostEntry> {
         self.cost
     }
 
@@ -305,7 +305,7 @@ fn hybrid() -> Entry {
 }
 
 /// The search of a cost over the grid.
-fn direct(cost: &'static cost::Entry) -> Entry {
+fn direct(cost: &'static cost::CostEntry) -> Entry {
     Entry {
         family: |entry, params| Some(params.costs.search(entry.cost?).into()),
         groups: vec![cost.name, "render"],

@@ -18,7 +18,7 @@ use crate::recent::{Limit, Recent};
 /// 1241 × 376 px. Turning one knob through all its values stays within.
 const BYTES: usize = 64 << 20;
 
-/// Values that one memo keeps: some settings of each stage with several references, so that going back to the
+/// KeptValues that one memo keeps: some settings of each stage with several references, so that going back to the
 /// last setting costs nothing either.
 const VALUES: usize = 256;
 
@@ -47,7 +47,7 @@ pub fn key(inputs: impl fmt::Debug) -> Key {
 /// A memo belongs to data that do not change. A clone of the data may be changed, so a clone of a
 /// memo starts empty.
 #[derive(Default)]
-pub(crate) struct Memo(Option<Arc<Values>>);
+pub(crate) struct Memo(Option<Arc<KeptValues>>);
 
 /// Identifies a memo or a scene: no two are the same within one process.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -60,13 +60,13 @@ impl Id {
     }
 }
 
-struct Values {
+struct KeptValues {
     id: Id,
-    recent: Recent<(TypeId, Key), Entry>,
+    recent: Recent<(TypeId, Key), KeptValue>,
 }
 
 #[derive(Clone)]
-struct Entry {
+struct KeptValue {
     value: Arc<dyn Any + Send + Sync>,
     bytes: usize,
 }
@@ -89,9 +89,9 @@ impl Memo {
     /// An empty memo.
     pub(crate) fn new() -> Self {
         let limit = Limit { count: VALUES, bytes: BYTES };
-        Self(Some(Arc::new(Values {
+        Self(Some(Arc::new(KeptValues {
             id: Id::new(),
-            recent: Recent::within(limit, |entry: &Entry| entry.bytes, |_| false),
+            recent: Recent::within(limit, |entry: &KeptValue| entry.bytes, |_| false),
         })))
     }
 
@@ -140,7 +140,7 @@ impl Memo {
             return Ok(Recalled { value, reused: true });
         }
         let made = Arc::new(make()?);
-        let entry = Entry {
+        let entry = KeptValue {
             bytes: size_of::<T>() + heap_bytes(&made),
             value: Arc::clone(&made) as Arc<dyn Any + Send + Sync>,
         };

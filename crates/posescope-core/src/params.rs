@@ -14,7 +14,7 @@ use crate::scale::Scale;
 
 pub use crate::describe::{About, Described, Domain, ParamError, Value};
 pub use crate::estimator::{
-    DepthRule, FeatureParams, GuidedParams, HybridParams, RobustParams, SixParams,
+    DepthRule, FeatureParams, GuidedParams, HybridParams, MultiStartParams, RobustParams,
 };
 pub use crate::judge::{Channels, JudgeParams};
 pub use crate::render::RenderParams;
@@ -46,7 +46,7 @@ pub struct Params {
     /// `judge`: the cost by which poses of several methods are compared.
     pub judge: JudgeParams,
     /// `mi6`: the search in six freedoms.
-    pub mi6: SixParams,
+    pub mi6: MultiStartParams,
     /// `robust`: the decision between the poses of several methods.
     pub robust: RobustParams,
     /// `retrieval`: visual words, and the verification of what they find.

@@ -2,7 +2,6 @@
 //! elsewhere (paper, appendix B, "generation of synthetic views").
 
 mod color;
-mod depth_canvas;
 mod device;
 mod points;
 mod pool;
@@ -10,9 +9,9 @@ mod projection;
 mod score;
 mod scorer;
 mod splat;
+mod z_buffer;
 
 pub use color::{ColoredCloud, ColoredPoint, ColoringCounts, VisibleCloud, color_cloud};
-pub use depth_canvas::DepthCanvas;
 pub(crate) use device::leave_out;
 pub use device::{Device, Loaded, Tally, Workload, use_device};
 pub use points::{PointArrays, Values};
@@ -22,6 +21,7 @@ pub use projection::ProjectionRows;
 pub use score::{Objective, Score};
 pub use scorer::{Comparison, Scorer};
 pub use splat::{Rasterizer, SplattedPixel, SyntheticView};
+pub use z_buffer::ZBuffer;
 
 use crate::describe::parameters;
 

@@ -12,13 +12,13 @@ pub enum SearchRule {
     #[default]
     Grid,
     /// It refines many minima of a coarse grid in six freedoms, as `mi6` does.
-    Starts,
+    MultiStart,
     /// It goes down from the reference pose by derivatives, as the methods do that the paper takes its
     /// costs from.
     Descent,
 }
 
-choice!(SearchRule: Grid = "grid", Starts = "starts", Descent = "descent");
+choice!(SearchRule: Grid = "grid", MultiStart = "starts", Descent = "descent");
 
 impl SearchRule {
     /// The word that sets it.
@@ -50,7 +50,7 @@ pub struct Similarity {
 
 /// A cost's place in the registry.
 #[derive(Debug)]
-pub struct Entry {
+pub struct CostEntry {
     /// The name of the method that searches the pose of least cost, and of the parameters' group.
     pub name: &'static str,
     /// One phrase.
@@ -63,7 +63,7 @@ pub struct Entry {
     pub make: fn() -> Box<dyn RegisteredCost>,
 }
 
-impl Entry {
+impl CostEntry {
     /// How it explains itself, if it does.
     pub fn explains(&self) -> Option<ExplanationKind> {
         (self.make)().statistic().explains()
@@ -81,7 +81,7 @@ pub struct CostSetting {
 
 impl CostSetting {
     /// The default setting of a cost.
-    pub fn new(entry: &Entry) -> Self {
+    pub fn new(entry: &CostEntry) -> Self {
         Self { cost: (entry.make)(), search: SearchRule::default() }
     }
 }
@@ -115,12 +115,12 @@ impl CostSettings {
     }
 
     /// How the minimum of a registered cost is found.
-    pub fn search(&self, entry: &Entry) -> SearchRule {
+    pub fn search(&self, entry: &CostEntry) -> SearchRule {
         self.of(entry).map_or_else(SearchRule::default, |setting| setting.search)
     }
 
     /// The setting of a registered cost.
-    pub fn of(&self, entry: &Entry) -> Option<&CostSetting> {
+    pub fn of(&self, entry: &CostEntry) -> Option<&CostSetting> {
         let place = ALL.iter().position(|known| known.name == entry.name)?;
         self.0.get(place)
     }

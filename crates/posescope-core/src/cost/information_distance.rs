@@ -3,13 +3,13 @@
 //! Pascoe, Maddern, Tanner, Piniés, Newman, *NID-SLAM: Robust Monocular SLAM using Normalised
 //! Information Distance*, CVPR 2017, equation 3.
 
-use super::{Cost, Entropies, Entry, MIN_ENTROPY, Similarity, Statistic};
+use super::{Cost, CostEntry, Entropies, MIN_ENTROPY, Similarity, Statistic};
 use crate::describe::parameters;
 use crate::image::{FloatImage, GrayImage, gaussian_smoothed};
 use crate::memo::{Key, key};
 
 /// NID among all costs.
-pub(super) const ENTRY: Entry = Entry {
+pub(super) const ENTRY: CostEntry = CostEntry {
     name: "nid",
     about: "normalised information distance",
     sees: "grey value",

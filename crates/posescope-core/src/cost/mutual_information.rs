@@ -1,12 +1,12 @@
 //! 1 − normalised mutual information, the cost of MI (paper, section 2.3).
 
-use super::{Cost, Entropies, Entry, Similarity, Statistic};
+use super::{Cost, CostEntry, Entropies, Similarity, Statistic};
 use crate::describe::parameters;
 use crate::image::{FloatImage, GrayImage, gaussian_smoothed};
 use crate::memo::{Key, key};
 
 /// MI's cost among all costs.
-pub(super) const ENTRY: Entry = Entry {
+pub(super) const ENTRY: CostEntry = CostEntry {
     name: "mi",
     about: "1 − mutual information normalised by the larger entropy",
     sees: "grey value",

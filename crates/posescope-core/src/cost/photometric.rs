@@ -1,12 +1,12 @@
 //! The robust photometric error of PM (paper, appendix B, "direct photometric matching").
 
-use super::{Cost, Entry, Statistic};
+use super::{Cost, CostEntry, Statistic};
 use crate::describe::parameters;
 use crate::image::{FloatImage, GrayImage, gaussian_smoothed};
 use crate::memo::{Key, key};
 
 /// PM's cost among all costs.
-pub(super) const ENTRY: Entry = Entry {
+pub(super) const ENTRY: CostEntry = CostEntry {
     name: "pm",
     about: "squared difference of grey values, the worse half ignored",
     sees: "grey value",

@@ -73,14 +73,14 @@ impl Ask<'_> {
     /// The searches of a cost that compare more than one place, in place of a descent.
     pub(super) fn other_searches(&self) -> Vec<Remedy> {
         let set = |search: SearchRule| self.word(&format!("{}.search", self.method), search.name());
-        [SearchRule::Grid, SearchRule::Starts].map(|search| vec![set(search)]).into()
+        [SearchRule::Grid, SearchRule::MultiStart].map(|search| vec![set(search)]).into()
     }
 
     /// A longer search of the method's kind; `None` for methods without a search.
     pub(super) fn more_search(&self) -> Option<Change> {
         match self.family {
             Family::Grid => Some(self.rounds()),
-            Family::Starts => {
+            Family::MultiStart => {
                 let starts = (2 * self.params.mi6.starts).min(200);
                 Some(self.set("mi6.starts", starts as f64))
             }

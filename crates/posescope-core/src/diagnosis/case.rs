@@ -5,9 +5,9 @@ use std::cell::OnceCell;
 
 use super::Family;
 use super::confidence::{self, PoseConfidence};
+use super::free_search::FreeSearch;
 use super::matches::{Matching, TrueMatches};
-use super::search::Search;
-use super::starts::Starts;
+use super::search::FinishedSearch;
 use super::{Diagnosis, Subject, Tolerance};
 use crate::estimator::{self, Failure, FeatureBased, FeatureParams, HybridParts};
 use crate::fusion::Share;
@@ -23,11 +23,11 @@ pub struct Case<'a> {
     /// The method whose pose it is: of a hybrid the one that it took.
     pub(super) responsible: Method,
     /// The search on a grid, or what stands for one.
-    pub(super) search: Option<&'a Search<'a>>,
+    pub(super) search: Option<&'a FinishedSearch<'a>>,
     /// How the method matches features, if it does.
     features: FeatureBased,
     matches: OnceCell<Option<TrueMatches>>,
-    starts: OnceCell<Option<Starts>>,
+    starts: OnceCell<Option<FreeSearch>>,
     contrast: OnceCell<f64>,
 }
 
@@ -35,7 +35,7 @@ impl<'a> Case<'a> {
     pub(super) fn new(
         subject: &'a Subject<'a>,
         family: Family,
-        search: Option<&'a Search<'a>>,
+        search: Option<&'a FinishedSearch<'a>>,
     ) -> Self {
         Self {
             subject,
@@ -66,8 +66,8 @@ impl<'a> Case<'a> {
     }
 
     /// Where the truth leads under the cost of a search in six freedoms.
-    pub(super) fn starts(&self) -> Option<&Starts> {
-        let starts = || Starts::of(self.subject, self.family);
+    pub(super) fn free_search(&self) -> Option<&FreeSearch> {
+        let starts = || FreeSearch::of(self.subject, self.family);
         self.starts.get_or_init(starts).as_ref()
     }
 

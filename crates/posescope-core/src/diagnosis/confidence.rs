@@ -3,7 +3,7 @@
 //! The evidence of an estimator shows how far its pose stands out from chance. For feature-based methods these are
 //! the inliers beyond chance, how well they determine the pose, and whether the photos agree better there than
 //! elsewhere. For a grid search it is the depth of the minimum compared with other hypotheses, the runner-up and
-//! shuffled pixels. For a search from many starts it is how many of them end there, and whether features agree. A
+//! shuffled pixels. For a multi-start search it is how many of them end there, and whether features agree. A
 //! logistic function of these signals is the probability of being within [`WITHIN_M`]. Its coefficients were
 //! fitted on some conditions of the street with default parameters, and evaluated on others (numbers in
 //! `studies/README.md`).
@@ -198,13 +198,13 @@ fn left_behind(subject: &Subject<'_>) -> Option<(Signals, PoseConfidence)> {
         Family::Features => inliers::signals(subject, Look::QUICK),
         Family::Guided => inliers::signals(subject, Look::THOROUGH),
         Family::Grid => minimum::signals(outcome, evidence),
-        Family::Starts => settled::signals(outcome, evidence),
+        Family::MultiStart => settled::signals(outcome, evidence),
         Family::Descent | Family::Given => None,
     }
 }
 
 /// Large values say little more than moderate ones.
-fn tamed(value: f64) -> f64 {
+fn signed_log(value: f64) -> f64 {
     value.signum() * value.abs().ln_1p()
 }
 

@@ -47,26 +47,26 @@ pub(super) struct Funnel {
 impl Funnel {
     /// The step before `lifted` that lost the greatest share of what it got, and both counts. One more on each side
     /// keeps a step from the blame that got one or two.
-    pub(super) fn worst_step(&self) -> (Step, usize, usize) {
+    pub(super) fn worst_step(&self) -> (FunnelStep, usize, usize) {
         let steps = [
-            (Step::Detect, self.visible, self.detected),
-            (Step::Match, self.detected, self.nearest),
-            (Step::Ratio, self.nearest, self.ratio),
-            (Step::Unique, self.ratio, self.unique),
+            (FunnelStep::Detect, self.visible, self.detected),
+            (FunnelStep::Match, self.detected, self.nearest),
+            (FunnelStep::Ratio, self.nearest, self.ratio),
+            (FunnelStep::Unique, self.ratio, self.unique),
         ];
         let kept = |before: usize, after: usize| (after + 1) as f64 / (before + 1) as f64;
         let worst = steps
             .into_iter()
             .filter(|(_, before, _)| *before > 0)
             .min_by(|a, b| kept(a.1, a.2).total_cmp(&kept(b.1, b.2)));
-        worst.unwrap_or((Step::View, self.with_depth, self.visible))
+        worst.unwrap_or((FunnelStep::View, self.with_depth, self.visible))
     }
 }
 
 /// A step at which true matches are lost.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub(super) enum Step {
+pub(super) enum FunnelStep {
     /// Reference keypoints are out of the query's view.
     View,
     /// No query keypoint is where one must be.

@@ -42,12 +42,12 @@ const SHUFFLES: u64 = 12;
 
 /// A pose and what it costs.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Place {
+pub(super) struct PoseCost {
     pub(super) offset: Offset,
     pub(super) cost: f64,
 }
 
-impl Place {
+impl PoseCost {
     /// The one of lower cost, of equals this.
     fn lower(self, next: Self) -> Self {
         if next.cost < self.cost { next } else { self }
@@ -79,9 +79,9 @@ impl AgainstChance {
 /// What became of the truth in the search.
 pub(super) struct Rivals {
     /// The best pose near the truth that the search could have reached.
-    pub(super) near: Place,
+    pub(super) near: PoseCost,
     /// The pose that beats it: the result, or one that a better search would have ended in.
-    pub(super) winner: Place,
+    pub(super) winner: PoseCost,
     /// Whether the photos share nothing even at the truth.
     pub(super) is_changed: bool,
     /// Whether a better search would have found the truth.
@@ -89,7 +89,7 @@ pub(super) struct Rivals {
 }
 
 /// A finished search, and the truth in the reference camera's frame.
-pub(super) struct Search<'a> {
+pub(super) struct FinishedSearch<'a> {
     pub(super) subject: &'a Subject<'a>,
     pub(super) scorer: Scorer<'a>,
     pub(super) grid: &'a GridParams,
@@ -102,7 +102,7 @@ pub(super) struct Search<'a> {
     pub(super) least_covered: u32,
     /// The method whose cost judges another system's pose.
     pub(super) judge: Option<Method>,
-    near_truth: OnceLock<Option<Place>>,
+    near_truth: OnceLock<Option<PoseCost>>,
     rivals: OnceLock<Option<Rivals>>,
     /// What was shuffled already: several rules ask for the same poses.
     against_chance: Mutex<Vec<(Offset, Option<AgainstChance>)>>,
@@ -113,12 +113,12 @@ pub(super) fn estimator_of(subject: &Subject<'_>, family: Family) -> Option<Box<
     let method = match family {
         Family::Grid => confidence::responsible(subject.method, subject.outcome),
         Family::Given => JUDGE,
-        Family::Features | Family::Guided | Family::Starts | Family::Descent => return None,
+        Family::Features | Family::Guided | Family::MultiStart | Family::Descent => return None,
     };
     Some(estimator::find(method)?.make(subject.params))
 }
 
-impl<'a> Search<'a> {
+impl<'a> FinishedSearch<'a> {
     /// The search that the subject's method ended, or what stands for one; `None` without the truth.
     pub(super) fn of(
         subject: &'a Subject<'a>,
@@ -156,7 +156,7 @@ impl<'a> Search<'a> {
             let elsewhere = is_lower.then(|| self.lower_elsewhere(near.cost)).flatten();
             let is_changed = self.is_changed(&near);
             let can_win = self.can_be_right(&near.offset) && !is_changed;
-            let winner = elsewhere.unwrap_or(Place { offset: self.result, cost: result_cost });
+            let winner = elsewhere.unwrap_or(PoseCost { offset: self.result, cost: result_cost });
             Some(Rivals {
                 near,
                 winner,
@@ -222,11 +222,11 @@ impl<'a> Search<'a> {
     /// The lowest cost near the truth that the search could have reached, of eligible poses: from the best
     /// of a small lattice of positions around it, and from the nearest reachable pose itself, as far as the
     /// fine steps go.
-    pub(super) fn near_truth(&self) -> Option<Place> {
+    pub(super) fn near_truth(&self) -> Option<PoseCost> {
         *self.near_truth.get_or_init(|| self.descended_near_truth())
     }
 
-    fn descended_near_truth(&self) -> Option<Place> {
+    fn descended_near_truth(&self) -> Option<PoseCost> {
         const AROUND: [f64; 5] = [-0.8, -0.4, 0.0, 0.4, 0.8];
         let centre = self.nearest_reachable();
         let within_m = self.subject.tolerance.translation_m;
@@ -248,8 +248,8 @@ impl<'a> Search<'a> {
             .collect();
         let costs = self.costs(&lattice);
         let scored = lattice.iter().zip(costs);
-        let scored = scored.filter_map(|(&offset, cost)| Some(Place { offset, cost: cost? }));
-        let best = scored.reduce(Place::lower).map(|place| place.offset);
+        let scored = scored.filter_map(|(&offset, cost)| Some(PoseCost { offset, cost: cost? }));
+        let best = scored.reduce(PoseCost::lower).map(|place| place.offset);
         let starts: Vec<Offset> =
             std::iter::once(centre).chain(best.filter(|best| *best != centre)).collect();
         self.lowest(&starts, &is_near)
@@ -261,10 +261,10 @@ impl<'a> Search<'a> {
         &self,
         starts: &[Offset],
         is_allowed: &(dyn Fn(&Offset) -> bool + Sync),
-    ) -> Option<Place> {
-        let minima: Vec<Option<Place>> =
+    ) -> Option<PoseCost> {
+        let minima: Vec<Option<PoseCost>> =
             starts.par_iter().map(|start| self.descended(*start, is_allowed)).collect();
-        minima.into_iter().flatten().reduce(Place::lower)
+        minima.into_iter().flatten().reduce(PoseCost::lower)
     }
 
     fn costs(&self, offsets: &[Offset]) -> Vec<Option<f64>> {
@@ -277,7 +277,7 @@ impl<'a> Search<'a> {
         &self,
         start: Offset,
         is_allowed: &dyn Fn(&Offset) -> bool,
-    ) -> Option<Place> {
+    ) -> Option<PoseCost> {
         const HALVINGS: usize = 2;
         let grid = self.grid;
         let steps =
@@ -289,12 +289,12 @@ impl<'a> Search<'a> {
             let costs = self.costs(&offsets).into_iter().zip(&offsets);
             costs.map(|(cost, offset)| cost.filter(|_| is_allowed(offset))).collect()
         })?;
-        Some(Place { offset: offset(&found.at), cost: found.cost })
+        Some(PoseCost { offset: offset(&found.at), cost: found.cost })
     }
 
     /// A pose away from the truth that costs less than this: the minimum of the result's own basin, or,
     /// where that does not, the lowest of those that the best coarse minima lead to.
-    fn lower_elsewhere(&self, than: f64) -> Option<Place> {
+    fn lower_elsewhere(&self, than: f64) -> Option<PoseCost> {
         let is_elsewhere = |offset: &Offset| !self.can_be_right(offset);
         let is_allowed = |offset: &Offset| self.is_reachable(offset) && is_elsewhere(offset);
         let lower = |starts: &[Offset]| {
@@ -364,7 +364,7 @@ impl<'a> Search<'a> {
     }
 
     /// Whether the images share nothing at a pose.
-    fn is_changed(&self, near: &Place) -> bool {
+    fn is_changed(&self, near: &PoseCost) -> bool {
         self.against_chance(&near.offset).is_some_and(|against| {
             against.pixels >= TELLING_PIXELS && against.deviations() < BEYOND_CHANCE
         })
@@ -392,7 +392,7 @@ impl<'a> Search<'a> {
     }
 
     /// The least cost near the truth in all six freedoms.
-    pub(super) fn best_in_six_freedoms(&self, near: &Place) -> Option<f64> {
+    pub(super) fn best_in_six_freedoms(&self, near: &PoseCost) -> Option<f64> {
         const HALVINGS: usize = 2;
         let from = |start: &Pose| {
             let degree = 1_f64.to_radians();

@@ -6,7 +6,7 @@ mod descend;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use super::starts::{Level, ManyStarts};
+use super::multi_start::{Level, MultiStart};
 use super::{Answered, CostSummary, Estimator, Failure, Halt, Outcome, separate_failure};
 use crate::cost::{self, Cost, CostSetting, SearchRule};
 use crate::event::{CloudColored, Moment, PhaseSearched, PoseScored, Stage, ViewRendered};
@@ -29,7 +29,7 @@ pub struct Direct {
     search: SearchRule,
     render: RenderParams,
     descent: DescentParams,
-    pub(super) starts: ManyStarts,
+    pub(super) multi_start: MultiStart,
     /// Which cost, with all its parameters.
     cost_key: Key,
 }
@@ -37,7 +37,7 @@ pub struct Direct {
 impl Direct {
     /// The estimator that searches the pose of least registered cost.
     #[doc(hidden)]
-    pub fn new(entry: &cost::Entry, params: &Params) -> Self {
+    pub fn new(entry: &cost::CostEntry, params: &Params) -> Self {
         let setting = params.costs.of(entry).cloned();
         let CostSetting { cost, search } = setting.unwrap_or_else(|| CostSetting::new(entry));
         let cost_key = key((entry.name, &cost));
@@ -57,7 +57,7 @@ impl Direct {
             search: SearchRule::Grid,
             render: params.render.clone(),
             descent: params.descent.clone(),
-            starts: ManyStarts::new(params),
+            multi_start: MultiStart::new(params),
             cost_key: key(("unregistered", MADE.fetch_add(1, Ordering::Relaxed))),
         }
     }
@@ -67,7 +67,7 @@ impl Estimator for Direct {
     fn estimate(&self, problem: &Problem, trace: &mut Trace<'_>) -> Result<Outcome, Cancelled> {
         let found = trace.stage(Stage::Estimator(self.method), |trace| match self.search {
             SearchRule::Grid => self.search_grid(problem, trace),
-            SearchRule::Starts => self.search_starts(problem, trace),
+            SearchRule::MultiStart => self.search_starts(problem, trace),
             SearchRule::Descent => self.descend(problem, trace),
         });
         Ok(Outcome::searched(separate_failure(found)?))
@@ -80,10 +80,10 @@ impl Estimator for Direct {
     fn led_from(&self, problem: &Problem, reference_from_camera: &Pose) -> Option<Refined> {
         match self.search {
             SearchRule::Grid => None,
-            SearchRule::Starts => {
+            SearchRule::MultiStart => {
                 let cloud = self.colored(problem).value;
-                let level = self.starts.level(self.scorer_of(problem, cloud));
-                self.starts.basin_of(problem, &level, reference_from_camera)
+                let level = self.multi_start.level(self.scorer_of(problem, cloud));
+                self.multi_start.basin_of(problem, &level, reference_from_camera)
             }
             SearchRule::Descent => self.descended_from(problem, reference_from_camera),
         }
@@ -97,7 +97,7 @@ impl Direct {
         trace: &mut Trace<'_>,
     ) -> Result<(Pose, CostSummary), Halt> {
         let radius = problem.uncertainty_radius_m;
-        check_size(&self.starts.grid, radius)?;
+        check_size(&self.multi_start.grid, radius)?;
         if !self.cost.statistic().is_counted() {
             leave_out(self.method, "has a cost that whole numbers do not decide");
         }
@@ -108,12 +108,12 @@ impl Direct {
 
         // The reference pose is the starting value, and its coverage the measure of all others.
         let start = Offset::default();
-        let level = self.starts.level(scorer);
-        let mut search = Search { direct: self, problem, level: &level, evaluations: 1 };
+        let level = self.multi_start.level(scorer);
+        let mut search = GridSearch { direct: self, problem, level: &level, evaluations: 1 };
         trace.emit(|| search.render(Moment::Start, start))?;
         let best = Best { offset: start, score: Some(level.initial) };
         let (best, coarse) =
-            coarse_to_fine(&self.starts.grid, radius, best, trace, |lattice, trace| {
+            coarse_to_fine(&self.multi_start.grid, radius, best, trace, |lattice, trace| {
                 search.phase(lattice, trace)
             })?;
 
@@ -144,11 +144,11 @@ impl Direct {
         problem: &Problem,
         trace: &mut Trace<'_>,
     ) -> Result<(Pose, CostSummary), Halt> {
-        self.starts.check_size(problem)?;
+        self.multi_start.check_size(problem)?;
         let cloud = self.color(problem, trace)?;
-        let level = self.starts.level(self.scorer_of(problem, cloud));
+        let level = self.multi_start.level(self.scorer_of(problem, cloud));
         let compare = |pose: &Pose, _| level.objective.compare(pose);
-        let found = self.starts.search(problem, &level, None, &compare, trace)?;
+        let found = self.multi_start.search(problem, &level, None, &compare, trace)?;
         Ok((problem.world_from_query(&found.refined[0].pose), found.summary))
     }
 
@@ -294,14 +294,14 @@ pub(super) fn check_size(grid: &GridParams, radius_m: f64) -> Result<(), Failure
 }
 
 /// The state of a search over the grid.
-struct Search<'a, 'cost> {
+struct GridSearch<'a, 'cost> {
     direct: &'a Direct,
     problem: &'a Problem,
     level: &'a Level<Scorer<'cost>>,
     evaluations: u64,
 }
 
-impl Search<'_, '_> {
+impl GridSearch<'_, '_> {
     /// Scores a lattice and emits its hypotheses, and the view of each that is the best so far.
     fn phase(
         &mut self,

@@ -19,8 +19,8 @@ pub enum Family {
     Guided,
     /// A cost searched on a grid: `pm`, `mi` and other costs.
     Grid,
-    /// A cost searched from many starts in six freedoms: `mi6`, `robust`, and costs with `search=starts`.
-    Starts,
+    /// Multi-start: a cost searched from many starts in six freedoms: `mi6`, `robust`, and costs with `search=starts`.
+    MultiStart,
     /// A cost followed downhill from the reference pose: costs with `search=descent`.
     Descent,
     /// Another system's pose.
@@ -30,13 +30,13 @@ pub enum Family {
 impl Family {
     /// Every family.
     pub const ALL: &[Self] =
-        &[Self::Features, Self::Guided, Self::Grid, Self::Starts, Self::Descent, Self::Given];
+        &[Self::Features, Self::Guided, Self::Grid, Self::MultiStart, Self::Descent, Self::Given];
     /// Those that match features.
     pub const MATCHING: &[Self] = &[Self::Features, Self::Guided];
     /// Those that search a cost.
-    pub const SEARCHING: &[Self] = &[Self::Grid, Self::Starts, Self::Descent];
+    pub const SEARCHING: &[Self] = &[Self::Grid, Self::MultiStart, Self::Descent];
     /// Those whose pose has a cost: searched, or given by another system.
-    pub const COSTED: &[Self] = &[Self::Grid, Self::Starts, Self::Descent, Self::Given];
+    pub const COSTED: &[Self] = &[Self::Grid, Self::MultiStart, Self::Descent, Self::Given];
 
     /// The family in one phrase.
     pub fn words(self) -> &'static str {
@@ -44,7 +44,7 @@ impl Family {
             Self::Features => "features (fb)",
             Self::Guided => "features (fb2)",
             Self::Grid => "grid search (pm, mi)",
-            Self::Starts => "many starts (mi6, robust)",
+            Self::MultiStart => "many starts (mi6, robust)",
             Self::Descent => "descent (search=descent)",
             Self::Given => "other systems",
         }
@@ -61,7 +61,7 @@ impl From<SearchRule> for Family {
     fn from(search: SearchRule) -> Self {
         match search {
             SearchRule::Grid => Self::Grid,
-            SearchRule::Starts => Self::Starts,
+            SearchRule::MultiStart => Self::MultiStart,
             SearchRule::Descent => Self::Descent,
         }
     }

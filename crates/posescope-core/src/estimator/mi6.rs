@@ -3,14 +3,14 @@
 //! MI searches three freedoms one after the other: position first, with the reference's heading, then
 //! yaw. Three things keep it from the truth where it fails. Only one coarse minimum is followed; height,
 //! pitch and roll stay the reference's, which costs more information than the last decimetres give; and
-//! grey values alone change with the light. So here the [search](super::starts) has many starts and six freedoms,
+//! grey values alone change with the light. So here the [search](super::multi_start) has many starts and six freedoms,
 //! and the cost is that of the [judge](crate::judge): three channels in smaller copies of the photos, and local
 //! contrast in the photos themselves.
 
 use std::cell::LazyCell;
 
 use super::direct::Direct;
-use super::starts::{Found, Level, ManyStarts};
+use super::multi_start::{Found, Level, MultiStart};
 use super::{Entry, Estimator, Family, Halt, Outcome, separate_failure};
 use crate::cost;
 use crate::event::Stage;
@@ -30,15 +30,15 @@ pub(super) const METHOD: Method = Method::named("mi6");
 pub(super) fn entry() -> Entry {
     let about = "mutual information in six freedoms: several yaws, starts and channels, refined";
     Entry {
-        family: |_, _| Some(Family::Starts),
+        family: |_, _| Some(Family::MultiStart),
         groups: vec!["judge", "render"],
         cost: Some(shown()),
-        ..Entry::new(METHOD, about, |params| Box::new(SixFreedoms::new(params)))
+        ..Entry::new(METHOD, about, |params| Box::new(Mi6::new(params)))
     }
 }
 
 /// The registered cost by which the views are explained.
-pub(super) fn shown() -> &'static cost::Entry {
+pub(super) fn shown() -> &'static cost::CostEntry {
     let shown = cost::ALL.iter().find(|entry| entry.name == Method::MI.name());
     shown.expect("the paper's cost is registered")
 }
@@ -47,19 +47,19 @@ pub(super) fn shown() -> &'static cost::Entry {
 pub(super) const JUDGED: &str = "compares more than grey values";
 
 /// The search in six freedoms.
-pub struct SixFreedoms {
-    pub(super) starts: ManyStarts,
+pub struct Mi6 {
+    pub(super) multi_start: MultiStart,
     render: RenderParams,
     judge: JudgeParams,
     /// What draws the pictures: grey values, explained by the joint histogram of MI.
     view: Direct,
 }
 
-impl SixFreedoms {
+impl Mi6 {
     /// The estimator with these parameters.
     pub fn new(params: &Params) -> Self {
         Self {
-            starts: ManyStarts::new(params),
+            multi_start: MultiStart::new(params),
             render: params.render.clone(),
             judge: params.judge.clone(),
             view: Direct::new(shown(), params),
@@ -71,7 +71,7 @@ impl SixFreedoms {
     pub(super) fn level(&self, problem: &Problem, shrink: u32) -> Level<Judge> {
         let channels = if shrink > 1 { Channels::Three } else { self.judge.channels };
         let judge = JudgeParams { channels, ..self.judge.clone() };
-        self.starts.level(Judge::new(problem, &self.render, &judge, shrink))
+        self.multi_start.level(Judge::new(problem, &self.render, &judge, shrink))
     }
 
     /// The view at a pose beside the query, with the score that the judge gave it.
@@ -86,17 +86,17 @@ impl SixFreedoms {
         level: &Level<Judge>,
         trace: &mut Trace<'_>,
     ) -> Result<Found, Halt> {
-        self.starts.check_size(problem)?;
+        self.multi_start.check_size(problem)?;
         let cloud = self.view.color(problem, trace)?;
         let smaller = |shrink| self.level(problem, shrink);
         // Only what is shown is drawn in grey values.
         let view = LazyCell::new(|| self.view.scorer_of(problem, cloud));
         let compare = |pose: &Pose, score| Self::compare(&view, pose, score);
-        self.starts.search(problem, level, Some(&smaller), &compare, trace)
+        self.multi_start.search(problem, level, Some(&smaller), &compare, trace)
     }
 }
 
-impl Estimator for SixFreedoms {
+impl Estimator for Mi6 {
     fn estimate(&self, problem: &Problem, trace: &mut Trace<'_>) -> Result<Outcome, Cancelled> {
         leave_out(METHOD, JUDGED);
         let found = trace.stage(Stage::Estimator(METHOD), |trace| {
@@ -109,7 +109,7 @@ impl Estimator for SixFreedoms {
     }
 
     fn led_from(&self, problem: &Problem, reference_from_camera: &Pose) -> Option<Refined> {
-        self.starts.basin_of(problem, &self.level(problem, 1), reference_from_camera)
+        self.multi_start.basin_of(problem, &self.level(problem, 1), reference_from_camera)
     }
 
     fn compare_at(&self, problem: &Problem, world_from_query: &Pose) -> Option<Comparison> {

@@ -14,9 +14,9 @@ pub use params::RobustParams;
 
 use super::feature::Proposal;
 use super::mi6::{self, JUDGED, shown};
-use super::starts::Found;
+use super::multi_start::Found;
 use super::{
-    CostSummary, Entry, Estimator, Failure, Family, FeatureBased, Halt, Outcome, SixFreedoms, fb2,
+    CostSummary, Entry, Estimator, Failure, Family, FeatureBased, Halt, Mi6, Outcome, fb2,
     separate_failure,
 };
 use crate::event::{BranchTaken, CandidatesJudged, JudgedPose, Stage};
@@ -36,7 +36,7 @@ const METHOD: Method = Method::named("robust");
 pub(super) fn entry() -> Entry {
     let about = "the cheapest of the poses of fb, fb2 and mi6, refined under one cost";
     Entry {
-        family: |_, _| Some(Family::Starts),
+        family: |_, _| Some(Family::MultiStart),
         groups: vec!["robust"],
         cost: Some(shown()),
         runs: &[Method::FB, fb2::METHOD, mi6::METHOD],
@@ -49,7 +49,7 @@ pub(super) fn entry() -> Entry {
 pub struct Robust {
     feature: FeatureBased,
     guided: FeatureBased,
-    six: SixFreedoms,
+    six: Mi6,
     params: RobustParams,
 }
 
@@ -59,7 +59,7 @@ impl Robust {
         Self {
             feature: FeatureBased::new(params),
             guided: FeatureBased::guided(params),
-            six: SixFreedoms::new(params),
+            six: Mi6::new(params),
             params: params.robust.clone(),
         }
     }
@@ -91,20 +91,22 @@ impl Robust {
             for &(method, Proposal { ref outcome, consensus }) in proposals {
                 let Some(pose) = consensus else { continue };
                 let checkpoint = || trace.checkpoint();
-                if let Some(refined) = self.six.starts.refined(problem, &level, pose, checkpoint)? {
+                if let Some(refined) =
+                    self.six.multi_start.refined(problem, &level, pose, checkpoint)?
+                {
                     let accepted = outcome.pose.is_ok();
                     candidates.push(JudgedPose { method, refined, from_features: true, accepted });
                 }
             }
             // The features' poses come last and the sort is stable: of equally cheap ones the search's
             // stands.
-            let price = |candidate: &JudgedPose| {
+            let map_cost = |candidate: &JudgedPose| {
                 let is_agreed = candidate.from_features && candidate.accepted;
                 let credit = if is_agreed { self.params.credit } else { 0.0 };
                 let Refined { pose, cost, .. } = candidate.refined;
-                -spread.deviations(self.six.starts.price(&spread, &pose, cost)) - credit
+                -spread.deviations(self.six.multi_start.map_cost(&spread, &pose, cost)) - credit
             };
-            candidates.sort_by(|a, b| price(a).total_cmp(&price(b)));
+            candidates.sort_by(|a, b| map_cost(a).total_cmp(&map_cost(b)));
             let best = candidates[0].clone();
             let deviations = spread.deviations(best.refined.cost);
             let needed = self.params.deviations;
@@ -127,7 +129,8 @@ impl Robust {
             let refining: u64 = of_features.map(|one| one.refined.evaluations).sum();
             let others = candidates[1..].iter().map(|other| &other.refined);
             let evaluations = summary.evaluations + refining;
-            let answered = self.six.starts.answered(&level, &best.refined, others, evaluations);
+            let answered =
+                self.six.multi_start.answered(&level, &best.refined, others, evaluations);
             let summary = CostSummary::of(problem, &level, &answered);
             let pose = answered.reference_from_camera;
             trace.emit(|| summary.assessed(Offset::of(&pose)))?;

@@ -43,13 +43,13 @@ const BOXES: usize = SIDE + 1;
 type Gradients = [[[f32; 4]; SIDE]; SIDE];
 
 /// Computes descriptors.
-pub(super) struct Describer {
+pub(super) struct SurfDescriber {
     level: Level,
     gradient_weights: [[f32; REGION_SIDE]; REGION_SIDE],
     region_weights: [[f32; REGIONS]; REGIONS],
 }
 
-impl Describer {
+impl SurfDescriber {
     pub(super) fn new() -> Self {
         Self {
             level: Level::new(),
@@ -195,7 +195,7 @@ mod tests {
 
     fn describe(image: &GrayImage, keypoint: Keypoint) -> Descriptor {
         let integral = IntegralImage::new(image);
-        Describer::new().describe(&integral, &keypoint, &mut Strips::default())
+        SurfDescriber::new().describe(&integral, &keypoint, &mut Strips::default())
     }
 
     fn distance(a: &Descriptor, b: &Descriptor) -> f32 {

@@ -160,7 +160,7 @@ impl<const N: usize> Panel<N> {
 /// Six queries and what is near them.
 struct Group<const N: usize> {
     queries: [[f32; N]; QUERIES],
-    near: [Near; QUERIES],
+    near: [Neighbour; QUERIES],
 }
 
 impl<const N: usize> Group<N> {
@@ -168,7 +168,7 @@ impl<const N: usize> Group<N> {
     fn new(queries: &[[f32; N]], margin: f32) -> Self {
         let mut group = Self {
             queries: [[0.0; N]; QUERIES],
-            near: std::array::from_fn(|_| Near::within(margin)),
+            near: std::array::from_fn(|_| Neighbour::within(margin)),
         };
         group.queries[..queries.len()].copy_from_slice(queries);
         for near in &mut group.near[queries.len()..] {
@@ -198,7 +198,7 @@ fn search<S: Simd, const N: usize>(simd: S, panels: &[Panel<N>], groups: &mut [G
 }
 
 /// The references that may be the nearest two of a query.
-struct Near {
+struct Neighbour {
     /// The largest two scores so far.
     largest: [f32; 2],
     margin: f32,
@@ -208,7 +208,7 @@ struct Near {
     candidates: Vec<(f32, usize)>,
 }
 
-impl Near {
+impl Neighbour {
     fn within(margin: f32) -> Self {
         Self {
             largest: [f32::NEG_INFINITY; 2],

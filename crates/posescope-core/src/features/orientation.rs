@@ -48,7 +48,7 @@ struct Wavelet {
 }
 
 /// Weighted wavelet responses, vectors, and their directions \[rad\].
-struct Responses {
+struct HaarResponses {
     directions: [f32; WAVELETS],
     dx: [f32; WAVELETS],
     dy: [f32; WAVELETS],
@@ -117,10 +117,10 @@ impl OrientationEstimator {
         integral: &IntegralImage,
         keypoint: &Keypoint,
         strips: &mut Strips,
-    ) -> Responses {
+    ) -> HaarResponses {
         let sums = corner_sums(integral, keypoint, strips);
         let mut responses =
-            Responses { directions: [0.0; WAVELETS], dx: [0.0; WAVELETS], dy: [0.0; WAVELETS] };
+            HaarResponses { directions: [0.0; WAVELETS], dx: [0.0; WAVELETS], dy: [0.0; WAVELETS] };
         for (i, wavelet) in self.wavelets.iter().enumerate() {
             [responses.dx[i], responses.dy[i]] = wavelet.response(&sums);
         }
@@ -135,7 +135,7 @@ impl OrientationEstimator {
     }
 }
 
-impl Responses {
+impl HaarResponses {
     /// The responses by their directions.
     fn in_order(&self) -> [usize; WAVELETS] {
         // Numbers in the order of the directions, with the responses' own below.
@@ -250,8 +250,8 @@ mod tests {
 
     /// The sum of the responses in the window that starts at each, of each of the widths, by the
     /// directions of the standard library.
-    fn sums_in_windows(responses: &Responses) -> Vec<[[f32; 2]; WIDTHS.len()]> {
-        let Responses { dx, dy, .. } = responses;
+    fn sums_in_windows(responses: &HaarResponses) -> Vec<[[f32; 2]; WIDTHS.len()]> {
+        let HaarResponses { dx, dy, .. } = responses;
         let directions: Vec<f32> = (0..WAVELETS).map(|i| dy[i].atan2(dx[i])).collect();
         let sum_from = |start: f32, width: f32| {
             let inside = |i: &usize| (directions[*i] - start + 1e-6).rem_euclid(TAU) < width + 1e-6;

@@ -15,8 +15,8 @@ use rayon::prelude::*;
 use super::surf::strongest_first;
 use super::{Features, Keypoint};
 use crate::describe::parameters;
-use description::{Describer, Grid};
-use octave::{BASE_SIGMA, Extremum, Octave};
+use description::{Grid, SiftDescriber};
+use octave::{BASE_SIGMA, Extremum, SiftOctave};
 use plane::{Gaussian, Plane, SMALLEST_SIDE};
 
 parameters! {
@@ -78,7 +78,7 @@ pub fn sift_interruptible<E>(
     let mut octaves = Vec::new();
     let mut found: Vec<(usize, Extremum)> = Vec::new();
     while has_room(&base) {
-        let mut octave = Octave::of(base, pixel, params, &mut checkpoint)?;
+        let mut octave = SiftOctave::of(base, pixel, params, &mut checkpoint)?;
         checkpoint()?;
         let number = octaves.len();
         found.extend(octave.extrema(params).into_iter().map(|extremum| (number, extremum)));
@@ -93,14 +93,14 @@ pub fn sift_interruptible<E>(
     }
     // In the order of the images' rows, whose pixels then are still in the cache.
     found.sort_by(|(a, one), (b, other)| a.cmp(b).then(one.y.total_cmp(&other.y)));
-    let describer = Describer::new();
+    let describer = SiftDescriber::new();
     let mut described: Vec<(Keypoint, SiftDescriptor)> = Vec::new();
     for some in found.chunks(KEYPOINTS_AT_A_TIME) {
         checkpoint()?;
         let of_some = some.par_iter().fold(Default::default, |(mut grid, mut into), of| {
             let (number, extremum) = of;
             let level = (extremum.level.round() as usize).clamp(1, params.intervals);
-            let Octave { smoothed, pixel } = &octaves[*number];
+            let SiftOctave { smoothed, pixel } = &octaves[*number];
             describer.describe(&smoothed[level], *pixel, extremum, params, &mut grid, &mut into);
             (grid, into)
         });

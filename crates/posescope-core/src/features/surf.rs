@@ -6,7 +6,7 @@ use image::GrayImage;
 use rayon::prelude::*;
 
 use super::boxes::Strips;
-use super::descriptor::Describer;
+use super::descriptor::SurfDescriber;
 use super::detector::detect;
 use super::integral::IntegralImage;
 use super::orientation::OrientationEstimator;
@@ -60,7 +60,7 @@ pub fn surf_interruptible<E>(
         keypoints.truncate(params.max_keypoints);
     }
     let estimator = OrientationEstimator::new();
-    let describer = Describer::new();
+    let describer = SurfDescriber::new();
     let mut descriptors = Vec::with_capacity(keypoints.len());
     for keypoints in keypoints.chunks_mut(KEYPOINTS_AT_A_TIME) {
         checkpoint()?;

@@ -15,8 +15,8 @@ use crate::geometry::Pose;
 use crate::image::{FloatImage, GrayImage};
 use crate::problem::Problem;
 use crate::render::{
-    ColoredPoint, DepthCanvas, Objective, PointArrays, Pool, Rasterizer, RenderParams, Score,
-    ShownPoints, SplattedPixel, Values, at_a_time,
+    ColoredPoint, Objective, PointArrays, Pool, Rasterizer, RenderParams, Score, ShownPoints,
+    SplattedPixel, Values, ZBuffer, at_a_time,
 };
 
 /// The bins of at most three channels at one place.
@@ -29,7 +29,7 @@ pub struct Judge {
     intrinsics: Intrinsics,
     splat_px: usize,
     params: JudgeParams,
-    pool: Pool<(DepthCanvas<Pair<Bins>>, Vec<u32>)>,
+    pool: Pool<(ZBuffer<Pair<Bins>>, Vec<u32>)>,
 }
 
 impl Judge {
@@ -91,13 +91,13 @@ impl Objective for Judge {
     /// the cost where no pixel is covered or all channels are constant, and for images of more than 16
     /// million pixels, which cannot be drawn.
     fn score(&self, reference_from_camera: &[Pose]) -> Vec<Score> {
-        if !DepthCanvas::<u8>::can_draw(&self.intrinsics, self.splat_px) {
+        if !ZBuffer::<u8>::can_draw(&self.intrinsics, self.splat_px) {
             return vec![Score { cost: None, covered: 0 }; reference_from_camera.len()];
         }
         let positions = &self.reference.positions;
         let values = Values { query: &self.query, points: &self.reference.values };
         let pair = |query, synthetic| Pair { query, synthetic };
-        let worker = || (DepthCanvas::new(&self.intrinsics, self.splat_px), Vec::new());
+        let worker = || (ZBuffer::new(&self.intrinsics, self.splat_px), Vec::new());
         self.pool.score(reference_from_camera, worker, |(canvas, counts), pose| {
             let pairs = canvas.draw(positions, values, &pose.inverse(), pair);
             Score { cost: self.cost_of(pairs, counts), covered: pairs.len() as u32 }

@@ -9,7 +9,7 @@ mod work;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use self::work::{Answer, Estimated, MethodOutcome, Place, QueryWork};
+use self::work::{Answer, Estimated, MethodOutcome, QueryWork, ReferencePlace};
 use super::observer::checkpoint;
 use super::single::estimate_traced;
 use super::{
@@ -176,13 +176,13 @@ impl<'a> Localizer<'a> {
         mut hand_out: impl FnMut(QueryResult, StageTimes) -> Result<(), E>,
     ) -> Result<(), E> {
         let loaded = self.queries.query(query)?;
-        let mut places: Vec<Place> = Vec::new();
+        let mut places: Vec<ReferencePlace> = Vec::new();
         let mut problems = Vec::new();
         let mut members: Vec<Vec<usize>> = Vec::new();
         for request in requests {
             let mut of_request = Vec::new();
             for &reference in &request.references.frames {
-                let place = Place {
+                let place = ReferencePlace {
                     reference,
                     radius_m: request.radius_m,
                     within_m: request.references.within_m,

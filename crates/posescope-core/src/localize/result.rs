@@ -315,7 +315,7 @@ pub fn evaluate(scene: &str, subject: &Subject<'_>, assessment: Assessment) -> Q
         match family {
             Some(Family::Grid) => grid.is_on_rim(&minimum.offset, radius_m),
             // The headings of its starts end elsewhere, and no heading is out of their reach.
-            Some(Family::Starts) => grid.is_on_edge(&minimum.offset, radius_m),
+            Some(Family::MultiStart) => grid.is_on_edge(&minimum.offset, radius_m),
             _ => false,
         }
     });

@@ -55,17 +55,17 @@ pub fn color_cloud(
 /// The points of a cloud that a camera sees, and where in its image.
 #[derive(Clone, Debug, Default)]
 pub struct VisibleCloud {
-    points: Vec<Projected>,
+    points: Vec<VisiblePoint>,
     counts: ColoringCounts,
 }
 
 impl VisibleCloud {
     /// What the camera sees of the cloud, which is in its frame.
     pub fn new(cloud: &Cloud, intrinsics: &Intrinsics, params: &RenderParams) -> Self {
-        let in_view: Vec<Projected> = cloud
+        let in_view: Vec<VisiblePoint> = cloud
             .points
             .par_iter()
-            .filter_map(|&position| Projected::new(position, intrinsics))
+            .filter_map(|&position| VisiblePoint::new(position, intrinsics))
             .collect();
         let outside = cloud.len() - in_view.len();
         let projected = in_view.len();
@@ -73,7 +73,7 @@ impl VisibleCloud {
             in_view
         } else {
             let hidden_beyond = HorizonMap::new(&in_view, intrinsics, params);
-            let is_seen = |point: &Projected| hidden_beyond.shows(point);
+            let is_seen = |point: &VisiblePoint| hidden_beyond.shows(point);
             in_view.into_par_iter().filter(is_seen).collect()
         };
         let counts =
@@ -93,7 +93,7 @@ impl VisibleCloud {
 
     /// The points with any value 0 … 255 at their projections \[px\].
     pub fn colored_by(&self, value: impl Fn(f32, f32) -> f32 + Sync) -> ColoredCloud {
-        let colored = |point: &Projected| ColoredPoint {
+        let colored = |point: &VisiblePoint| ColoredPoint {
             position: point.position,
             intensity: value(point.u, point.v),
         };
@@ -103,13 +103,13 @@ impl VisibleCloud {
 
 /// A point that projects into the image.
 #[derive(Clone, Copy, Debug)]
-struct Projected {
+struct VisiblePoint {
     position: Point3<f32>,
     u: f32,
     v: f32,
 }
 
-impl Projected {
+impl VisiblePoint {
     fn new(position: Point3<f32>, intrinsics: &Intrinsics) -> Option<Self> {
         let pixel = intrinsics.project(&position.cast())?;
         intrinsics.contains(&pixel).then_some(Self {
@@ -128,7 +128,7 @@ struct HorizonMap {
 }
 
 impl HorizonMap {
-    fn new(points: &[Projected], intrinsics: &Intrinsics, params: &RenderParams) -> Self {
+    fn new(points: &[VisiblePoint], intrinsics: &Intrinsics, params: &RenderParams) -> Self {
         let [width, height] = [intrinsics.width, intrinsics.height].map(|side| side as usize);
         let mut map = Self { width, height, hidden_beyond: Vec::new() };
         let mut hidden_beyond = vec![f32::INFINITY; width * height];
@@ -154,12 +154,12 @@ impl HorizonMap {
         map
     }
 
-    fn shows(&self, point: &Projected) -> bool {
+    fn shows(&self, point: &VisiblePoint) -> bool {
         let (x, y) = self.nearest_pixel(point);
         point.position.z <= self.hidden_beyond[y * self.width + x]
     }
 
-    fn nearest_pixel(&self, point: &Projected) -> (usize, usize) {
+    fn nearest_pixel(&self, point: &VisiblePoint) -> (usize, usize) {
         let x = (point.u.round().max(0.0) as usize).min(self.width - 1);
         let y = (point.v.round().max(0.0) as usize).min(self.height - 1);
         (x, y)

@@ -67,7 +67,7 @@ pub struct Values<'a, T> {
 
 /// Where the points fall.
 #[derive(Default)]
-pub(super) struct Projected {
+pub(super) struct ProjectedPoints {
     /// Position of the nearest pixel, or one that no image has: row-major where a point covers its own
     /// pixel alone, and otherwise the row in the upper bits and the column in the lower.
     pub(super) pixels: Vec<u32>,
@@ -79,7 +79,7 @@ pub(super) struct Projected {
     turned: [Vec<[f32; LANES]>; 3],
 }
 
-impl Projected {
+impl ProjectedPoints {
     #[inline(always)]
     pub(super) fn project<S: Simd>(
         &mut self,

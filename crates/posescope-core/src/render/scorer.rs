@@ -7,8 +7,8 @@ use std::sync::{Arc, OnceLock};
 use super::device::device_in_use;
 use super::pool::{Pool, ShownPoints, at_a_time};
 use super::{
-    ColoredCloud, DepthCanvas, Objective, PointArrays, Rasterizer, Score, SplattedPixel,
-    SyntheticView, Values,
+    ColoredCloud, Objective, PointArrays, Rasterizer, Score, SplattedPixel, SyntheticView, Values,
+    ZBuffer,
 };
 use crate::camera::Intrinsics;
 use crate::cost::{
@@ -52,14 +52,14 @@ enum Threads {
     Plain,
     LesserHalf {
         points: ShownPoints<f32>,
-        pool: Pool<(DepthCanvas<f32>, LesserHalfFinder)>,
+        pool: Pool<(ZBuffer<f32>, LesserHalfFinder)>,
     },
     Histogram {
         bins: usize,
         cost: fn(&Entropies) -> Option<f64>,
         query: Vec<u8>,
         points: ShownPoints<u8>,
-        pool: Pool<(DepthCanvas<BinPair>, Vec<u32>)>,
+        pool: Pool<(ZBuffer<BinPair>, Vec<u32>)>,
     },
 }
 
@@ -137,7 +137,7 @@ impl<'a> Scorer<'a> {
         self.threads.get_or_init(|| {
             let positions = || PointArrays::new(self.cloud.points.iter().map(|p| p.position));
             let values = self.cloud.points.iter().map(|point| point.intensity);
-            let is_large = !DepthCanvas::<u8>::can_draw(&self.intrinsics, self.splat_px);
+            let is_large = !ZBuffer::<u8>::can_draw(&self.intrinsics, self.splat_px);
             match self.statistic {
                 _ if is_large => Threads::Plain,
                 Statistic::LesserHalf { power: 1 } => Threads::LesserHalf {
@@ -160,8 +160,8 @@ impl<'a> Scorer<'a> {
         })
     }
 
-    fn canvas<K: Copy + Default>(&self) -> DepthCanvas<K> {
-        DepthCanvas::new(&self.intrinsics, self.splat_px)
+    fn canvas<K: Copy + Default>(&self) -> ZBuffer<K> {
+        ZBuffer::new(&self.intrinsics, self.splat_px)
     }
 
     /// The synthetic view of one camera beside the query.

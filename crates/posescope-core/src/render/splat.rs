@@ -30,7 +30,7 @@ pub struct SyntheticView {
 const EMPTY: u32 = u32::MAX;
 
 /// Draws synthetic views of one camera, one after the other, reusing its buffers, in the plain way
-/// that [`DepthCanvas`](super::DepthCanvas) is measured by.
+/// that [`ZBuffer`](super::ZBuffer) is measured by.
 ///
 /// A view covers a few per cent of the image, so the cost of a view must not depend on the size of
 /// the image: only the pixels that the last view touched are cleared.

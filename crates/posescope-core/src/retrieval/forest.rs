@@ -82,7 +82,8 @@ impl Forest {
         scratch: &mut Scratch,
     ) -> Option<(u32, f32)> {
         scratch.begin(self.points);
-        let mut search = Search { points, query, scratch, best: None, checks_left: checks.max(1) };
+        let mut search =
+            TreeSearch { points, query, scratch, best: None, checks_left: checks.max(1) };
         for (number, tree) in self.trees.iter().enumerate() {
             search.descend(tree, number as u32, 0, 0.0);
         }
@@ -106,7 +107,7 @@ impl Scratch {
     }
 }
 
-struct Search<'a> {
+struct TreeSearch<'a> {
     points: &'a [Descriptor],
     query: &'a Descriptor,
     scratch: &'a mut Scratch,
@@ -114,7 +115,7 @@ struct Search<'a> {
     checks_left: usize,
 }
 
-impl Search<'_> {
+impl TreeSearch<'_> {
     /// Walks to the leaf on the query's side, queues the other sides, compares the leaf's points.
     fn descend(&mut self, tree: &Tree, number: u32, mut node: u32, bound: f32) {
         loop {

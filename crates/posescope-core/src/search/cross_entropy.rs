@@ -46,7 +46,7 @@ const WEIGHT_OF_ELITE: f64 = 0.7;
 const SHRINKING: f64 = 0.6;
 
 /// The distribution of the samples of one walk, as steps from where it began.
-struct Cloud {
+struct Samples {
     origin: Pose,
     mean: Vector6<f64>,
     /// The lower Cholesky factor of the covariance.
@@ -54,7 +54,7 @@ struct Cloud {
 }
 
 /// Moves each walk to the cheapest of the samples around it, where one costs less. After each round, the half whose poses
-/// have the higher prices stays where it is. All walks draw the same samples. `costs_of` is as for
+/// rank behind stays where it is. All walks draw the same samples. `costs_of` is as for
 /// [`pattern_search`](super::pattern_search()).
 ///
 /// # Errors
@@ -62,18 +62,18 @@ struct Cloud {
 pub fn cross_entropy<E>(
     walks: &mut [Refined],
     plan: &CrossEntropy,
-    price: impl Fn(&Pose, f64) -> f64,
+    rank: impl Fn(&Pose, f64) -> f64,
     mut costs_of: impl FnMut(&[Pose]) -> Result<Vec<Option<f64>>, E>,
 ) -> Result<(), E> {
     let first = Vector6::from_fn(|axis, _| {
         plan.first_m * WIDTHS[axis] * if axis < 3 { 1.0 } else { plan.rad_per_m }
     });
-    let cloud = |walk: &Refined| Cloud {
+    let cloud = |walk: &Refined| Samples {
         origin: walk.pose,
         mean: Vector6::zeros(),
         factor: Matrix6::from_diagonal(&first),
     };
-    let mut active: Vec<(Cloud, &mut Refined)> =
+    let mut active: Vec<(Samples, &mut Refined)> =
         walks.iter_mut().map(|walk| (cloud(walk), walk)).collect();
     let mut rng = Pcg64::seed_from_u64(plan.seed);
     for round in 1..=ROUNDS {
@@ -107,8 +107,8 @@ pub fn cross_entropy<E>(
                 cloud.factor = covariance.cholesky().map_or(cloud.factor, |it| it.unpack());
             }
         }
-        let price = |walk: &Refined| price(&walk.pose, walk.cost);
-        active.sort_by(|(_, a), (_, b)| price(a).total_cmp(&price(b)));
+        let rank = |walk: &Refined| rank(&walk.pose, walk.cost);
+        active.sort_by(|(_, a), (_, b)| rank(a).total_cmp(&rank(b)));
         active.truncate(plan.fewest.max(active.len().div_ceil(2)));
     }
     Ok(())
@@ -192,7 +192,7 @@ mod tests {
     fn half_of_the_walks_are_given_up_after_each_round_by_price() {
         let away = |x: f64| start(&Pose::identity(), Pose::translation(x, 0.0, 0.0));
         let mut walks = [9.0, 0.0, 6.0, 12.0, 3.0].map(away);
-        // No sample has a cost, so each walk stays. The cheapest is nearest, and has the highest price.
+        // No sample has a cost, so each walk stays. The cheapest is nearest, and ranks last.
         let nothing = |poses: &[Pose]| Ok::<_, Infallible>(vec![None; poses.len()]);
         let plan = CrossEntropy { fewest: 2, ..PLAN };
         let Ok(()) = cross_entropy(&mut walks, &plan, |pose, _| -pose.translation.x, nothing);

@@ -299,7 +299,7 @@ fn the_minimum_of_a_direct_method_is_the_least_eligible_cost_that_was_told() {
         assert!(cost.best <= cost.initial.expect("textured"));
         assert!(cost.shuffled.expect("textured") > cost.best);
         // What is refined after the lattices has no cell there.
-        if entry.family(&Params::default()) == Some(Family::Starts) {
+        if entry.family(&Params::default()) == Some(Family::MultiStart) {
             let (_, refined) = history.all::<StartsRefined>().last().expect("was refined");
             assert!(cost.best <= refined.refinements[0].start.cost);
             continue;

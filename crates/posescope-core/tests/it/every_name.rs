@@ -37,7 +37,7 @@ use posescope_core::image::{
 use posescope_core::nalgebra::{Matrix3x4, Point2, Point3};
 use posescope_core::params::{
     About, Channels, DepthRule, DescentParams, Described, Domain, FeatureParams, GuidedParams,
-    HybridParams, JudgeParams, ParamError, RenderParams, RobustParams, SixParams, Value,
+    HybridParams, JudgeParams, MultiStartParams, ParamError, RenderParams, RobustParams, Value,
 };
 use posescope_core::retrieval::{
     Affine, BuildError, BuildProgress, BuildRequest, BuildStep, BuildSummary, Clustering,
@@ -279,7 +279,7 @@ fn parameters_are_set_by_name_or_field() {
     let (fb, fb2): (&FeatureParams, &GuidedParams) = (&params.fb, &params.fb2);
     let hy: &HybridParams = &params.hy;
     assert!(!hy.per_reference);
-    let (mi6, robust): (&SixParams, &RobustParams) = (&params.mi6, &params.robust);
+    let (mi6, robust): (&MultiStartParams, &RobustParams) = (&params.mi6, &params.robust);
     let (judge, render): (&JudgeParams, &RenderParams) = (&params.judge, &params.render);
     let (descent, surface): (&DescentParams, &SurfaceParams) = (&params.descent, &params.surface);
     let (retrieval, index): (&RetrievalParams, &IndexParams) = (&params.retrieval, &params.index);

@@ -20,7 +20,7 @@ use crate::two_walls::{cloud_of_the_walls, photo, problem, solvable};
 
 /// Every method with every search that it can be set to.
 fn settings() -> Vec<(String, Method, Params)> {
-    let searches = [SearchRule::Grid, SearchRule::Starts, SearchRule::Descent];
+    let searches = [SearchRule::Grid, SearchRule::MultiStart, SearchRule::Descent];
     let mut settings = Vec::new();
     for entry in estimator::all() {
         let has_search = |key: &String| Params::default().list().iter().any(|row| row.key == *key);
@@ -160,7 +160,7 @@ fn a_search_is_the_family_that_its_parameter_says() {
     let family =
         |method: Method, assignments: &[&str]| estimator::entry(method).family(&with(assignments));
     assert_eq!(family(Method::PM, &[]), Some(Family::Grid));
-    assert_eq!(family(Method::PM, &["pm.search=starts"]), Some(Family::Starts));
+    assert_eq!(family(Method::PM, &["pm.search=starts"]), Some(Family::MultiStart));
     assert_eq!(family(Method::PM, &["pm.search=descent"]), Some(Family::Descent));
     assert_eq!(family(Method::MI, &["pm.search=descent"]), Some(Family::Grid));
     assert_eq!(family(Method::HY, &["mi.search=descent"]), None);

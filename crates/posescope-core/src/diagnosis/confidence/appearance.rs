@@ -7,7 +7,7 @@
 
 use std::convert::Infallible;
 
-use super::tamed;
+use super::signed_log;
 use crate::geometry::{Pose, yaw};
 use crate::judge::Judge;
 use crate::params::Params;
@@ -119,11 +119,11 @@ impl Appearance {
 
     fn signals(&self) -> [(&'static str, f64); 6] {
         [
-            ("seen_depth", tamed(self.depth)),
-            ("seen_margin", tamed(self.margin)),
-            ("seen_rise", tamed(self.rises[0])),
-            ("seen_rise_farther", tamed(self.rises[1])),
-            ("seen_above_start", tamed(self.below_start)),
+            ("seen_depth", signed_log(self.depth)),
+            ("seen_margin", signed_log(self.margin)),
+            ("seen_rise", signed_log(self.rises[0])),
+            ("seen_rise_farther", signed_log(self.rises[1])),
+            ("seen_above_start", signed_log(self.below_start)),
             ("seen_gain", self.gain.max(MIN_GAIN).ln()),
         ]
     }

@@ -1,6 +1,6 @@
 //! What the lattices of a search say about its minimum.
 
-use super::{Costs, PoseConfidence, Signals, gain_and_coverage, tamed};
+use super::{Costs, PoseConfidence, Signals, gain_and_coverage, signed_log};
 use crate::diagnosis::Evidence;
 use crate::estimator::Outcome;
 use crate::grid::{Phase, ScoredLattice};
@@ -22,13 +22,13 @@ pub(super) fn signals(outcome: &Outcome, evidence: &Evidence) -> Option<(Signals
     let above = |runner_up: f64| (runner_up - coarse.least) / coarse.deviation;
     let runner_up_margin = summary.runner_up.map(above);
     let mut signals = vec![
-        ("depth", tamed(depth)),
-        ("refined_by", tamed(depth - coarse_depth)),
-        ("margin", tamed(runner_up_margin.unwrap_or(coarse_depth))),
-        ("above_start", tamed(depth - start_depth)),
+        ("depth", signed_log(depth)),
+        ("refined_by", signed_log(depth - coarse_depth)),
+        ("margin", signed_log(runner_up_margin.unwrap_or(coarse_depth))),
+        ("above_start", signed_log(depth - start_depth)),
     ];
     signals.extend(gain_and_coverage(summary));
-    signals.push(("yaw_depth", tamed(yaw_depth)));
+    signals.push(("yaw_depth", signed_log(yaw_depth)));
     let deviations = deviations(evidence, coarse.deviation);
     let confidence = PoseConfidence {
         position_std_m: deviations.map(|[right, forward, _]| [right, 0.0, forward]),

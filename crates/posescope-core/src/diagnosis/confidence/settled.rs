@@ -1,6 +1,6 @@
-//! What a search from many starts says about the pose in which they settled.
+//! What a multi-start search says about the pose in which they settled.
 
-use super::{Costs, PoseConfidence, Signals, gain_and_coverage, tamed};
+use super::{Costs, PoseConfidence, Signals, gain_and_coverage, signed_log};
 use crate::diagnosis::Evidence;
 use crate::estimator::Outcome;
 use crate::geometry::{Pose, PoseError};
@@ -30,9 +30,9 @@ pub(super) fn signals(outcome: &Outcome, evidence: &Evidence) -> Option<(Signals
     let above = |runner_up: f64| (runner_up - summary.best) / coarse.deviation;
     let runner_up_margin = summary.runner_up.map(above);
     let mut signals = vec![
-        ("depth", tamed(depth)),
-        ("margin", tamed(runner_up_margin.unwrap_or(depth))),
-        ("above_start", tamed(depth - start_depth)),
+        ("depth", signed_log(depth)),
+        ("margin", signed_log(runner_up_margin.unwrap_or(depth))),
+        ("above_start", signed_log(depth - start_depth)),
     ];
     signals.extend(gain_and_coverage(summary));
     // The share of the refined starts that ended there.

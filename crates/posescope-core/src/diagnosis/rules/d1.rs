@@ -34,7 +34,7 @@ fn test(case: &Case<'_>) -> Option<Diagnosis> {
 }
 
 /// At another system's pose, next to nothing of the reference's cloud is in view.
-fn out_of_view(search: &Search<'_>) -> Diagnosis {
+fn out_of_view(search: &FinishedSearch<'_>) -> Diagnosis {
     RULE.found(&OutOfView {
         judge: search.judge.map(|method| method.name()),
         covered: search.covered(&search.result),
@@ -48,7 +48,7 @@ evidence!(OutOfView { judge: Option<&'static str>, covered: usize, covered_at_re
 );
 
 /// So few pixels match by chance.
-fn too_few_pixels(search: &Search<'_>) -> Option<Diagnosis> {
+fn too_few_pixels(search: &FinishedSearch<'_>) -> Option<Diagnosis> {
     let rivals = search.rivals()?;
     let at_truth = search.covered(&rivals.near.offset);
     let at_result = search.covered(&rivals.winner.offset);

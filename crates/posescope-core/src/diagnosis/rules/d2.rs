@@ -15,13 +15,13 @@ pub(super) const RULE: Rule = Rule {
 
 fn test(case: &Case<'_>) -> Option<Diagnosis> {
     match case.family {
-        Family::Starts | Family::Descent => by_starts(case.starts()?),
+        Family::MultiStart | Family::Descent => in_six_freedoms(case.free_search()?),
         _ => by_grid(case.search?),
     }
 }
 
 /// Tried last of all causes, it holds wherever none of the others ended the list.
-fn by_grid(search: &Search<'_>) -> Option<Diagnosis> {
+fn by_grid(search: &FinishedSearch<'_>) -> Option<Diagnosis> {
     let judge = search.judge.map(|method| method.name());
     let cost_at_result = search.result_cost?;
     let Some(rivals) = search.rivals() else {
@@ -77,23 +77,23 @@ evidence!(Preferred {
     }
 });
 
-fn by_starts(starts: &Starts) -> Option<Diagnosis> {
-    let near = starts.near.as_ref()?;
-    (!starts.is_missed()).then(|| {
-        RULE.found(&PreferredBySix {
+fn in_six_freedoms(search: &FreeSearch) -> Option<Diagnosis> {
+    let near = search.near.as_ref()?;
+    (!search.is_missed()).then(|| {
+        RULE.found(&PreferredInSix {
             cost_near_truth: near.refined.cost,
-            cost_at_result: starts.result_cost,
+            cost_at_result: search.result_cost,
             penalty_near_truth: near.penalty,
-            penalty_at_result: starts.result_penalty,
+            penalty_at_result: search.result_penalty,
             near_truth_error: near.error,
             leads_away: !near.is_right,
-            turned_by_prior: starts.is_turned_by_prior(),
-            is_descent: starts.is_descent,
+            turned_by_prior: search.is_turned_by_prior(),
+            is_descent: search.is_descent,
         })
     })
 }
 
-evidence!(PreferredBySix {
+evidence!(PreferredInSix {
     cost_near_truth: f64,
     cost_at_result: f64,
     penalty_near_truth: f64,

@@ -1,7 +1,7 @@
 //! D3: the search missed a lower cost near the truth.
 
 use super::*;
-use crate::diagnosis::search::Place;
+use crate::diagnosis::search::PoseCost;
 use crate::grid::ScoredLattice;
 
 pub(super) const RULE: Rule = Rule {
@@ -12,7 +12,9 @@ pub(super) const RULE: Rule = Rule {
         Family::Descent => {
             Some("use search=grid or search=starts; a descent stops in the first minimum")
         }
-        Family::Starts => Some("raise mi6.starts or mi6.coarse_yaws, or lower grid.coarse_step"),
+        Family::MultiStart => {
+            Some("raise mi6.starts or mi6.coarse_yaws, or lower grid.coarse_step")
+        }
         _ => None,
     },
     advice_on: |found| {
@@ -31,13 +33,13 @@ pub(super) const RULE: Rule = Rule {
 
 fn test(case: &Case<'_>) -> Option<Diagnosis> {
     match case.family {
-        Family::Starts | Family::Descent => by_starts(case.starts()?),
+        Family::MultiStart | Family::Descent => in_six_freedoms(case.free_search()?),
         Family::Given => by_given(case.search?),
         _ => by_grid(case.search?),
     }
 }
 
-fn by_grid(search: &Search<'_>) -> Option<Diagnosis> {
+fn by_grid(search: &FinishedSearch<'_>) -> Option<Diagnosis> {
     let rivals = search.rivals().filter(|rivals| rivals.is_missed)?;
     let lost = lost_in(search, &rivals.near);
     // Then places between coarse cells are in no fine grid.
@@ -92,7 +94,7 @@ evidence!(Missed {
 });
 
 /// Another system's pose costs more than the truth.
-fn by_given(search: &Search<'_>) -> Option<Diagnosis> {
+fn by_given(search: &FinishedSearch<'_>) -> Option<Diagnosis> {
     let cost_at_result = search.result_cost?;
     let cost_near_truth = match search.rivals() {
         Some(rivals) => rivals.is_missed.then_some(rivals.near.cost)?,
@@ -109,20 +111,20 @@ evidence!(CheaperTruth { judge: &'static str, cost_near_truth: f64, cost_at_resu
     )
 });
 
-fn by_starts(starts: &Starts) -> Option<Diagnosis> {
-    let near = starts.near.as_ref().filter(|_| starts.is_missed())?;
-    Some(RULE.found(&MissedBySix {
+fn in_six_freedoms(search: &FreeSearch) -> Option<Diagnosis> {
+    let near = search.near.as_ref().filter(|_| search.is_missed())?;
+    Some(RULE.found(&MissedInSix {
         cost_near_truth: near.refined.cost,
-        cost_at_result: starts.result_cost,
+        cost_at_result: search.result_cost,
         penalty_near_truth: near.penalty,
-        penalty_at_result: starts.result_penalty,
+        penalty_at_result: search.result_penalty,
         near_truth_error: near.error,
-        turned_by_prior: starts.is_turned_by_prior(),
-        is_descent: starts.is_descent,
+        turned_by_prior: search.is_turned_by_prior(),
+        is_descent: search.is_descent,
     }))
 }
 
-evidence!(MissedBySix {
+evidence!(MissedInSix {
     cost_near_truth: f64,
     cost_at_result: f64,
     penalty_near_truth: f64,
@@ -147,20 +149,20 @@ evidence!(MissedBySix {
 
 /// Where the search turned away from the truth.
 #[derive(Default)]
-struct Loss {
+struct TurnedAway {
     phase: Option<Phase>,
     rank: Option<usize>,
     margin: Option<f64>,
 }
 
 /// The phase that turned away from the truth.
-fn lost_in(search: &Search<'_>, near: &Place) -> Loss {
+fn lost_in(search: &FinishedSearch<'_>, near: &PoseCost) -> TurnedAway {
     let at = |phase: Phase| {
         let surface = search.subject.evidence.surface(phase)?;
         Some((surface, surface.lattice.offset(surface.minimum()?)?))
     };
     let Some((coarse, chosen)) = at(Phase::PositionCoarse) else {
-        return Loss::default();
+        return TurnedAway::default();
     };
     let away = |offset: &Offset| offset.distance_from(&near.offset);
     let fine_reach = search.grid.fine_range_m.hypot(search.grid.fine_range_m);
@@ -172,12 +174,12 @@ fn lost_in(search: &Search<'_>, near: &Place) -> Loss {
         Some((_, chosen)) if away(&chosen) > tolerance_m => Some(Phase::PositionFine),
         _ => search.subject.evidence.surface(Phase::YawCoarse).map(|_| Phase::YawCoarse),
     };
-    Loss { phase, ..Loss::default() }
+    TurnedAway { phase, ..TurnedAway::default() }
 }
 
 /// The rank of the coarse cell nearest to the target, and what it costs more than the one chosen.
-fn lost_among_coarse(coarse: &ScoredLattice, away: &dyn Fn(&Offset) -> f64) -> Loss {
-    let lost = Loss { phase: Some(coarse.lattice.phase), ..Loss::default() };
+fn lost_among_coarse(coarse: &ScoredLattice, away: &dyn Fn(&Offset) -> f64) -> TurnedAway {
+    let lost = TurnedAway { phase: Some(coarse.lattice.phase), ..TurnedAway::default() };
     let nearest = coarse
         .lattice
         .hypotheses()
@@ -191,14 +193,14 @@ fn lost_among_coarse(coarse: &ScoredLattice, away: &dyn Fn(&Offset) -> f64) -> L
         .filter_map(|cell| coarse.eligible_cost(cell))
         .filter(|other| *other < cost)
         .count();
-    Loss { rank: Some(lower + 1), margin: Some(cost - least), ..lost }
+    TurnedAway { rank: Some(lower + 1), margin: Some(cost - least), ..lost }
 }
 
 fn remedies(ask: &Ask<'_>) -> Vec<Remedy> {
     let (floor, splat) = (ask.floor(3.0, 0.15), ask.wider_splat());
     match ask.family {
         Family::Descent => ask.other_searches(),
-        Family::Starts => {
+        Family::MultiStart => {
             let mi6 = &ask.params.mi6;
             let starts = ask.set("mi6.starts", (2 * mi6.starts).min(200) as f64);
             let finalists = ask.set("mi6.finalists", (2 * mi6.finalists).min(100) as f64);

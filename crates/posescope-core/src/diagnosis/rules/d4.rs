@@ -32,12 +32,12 @@ fn advice_on(evidence: &Value) -> Option<&'static str> {
 fn test(case: &Case<'_>) -> Option<Diagnosis> {
     let radius_m = case.subject.problem.uncertainty_radius_m;
     match case.family {
-        Family::Starts | Family::Descent => by_starts(case.starts()?, radius_m),
+        Family::MultiStart | Family::Descent => in_six_freedoms(case.free_search()?, radius_m),
         _ => by_grid(case.search?, radius_m),
     }
 }
 
-fn by_grid(search: &Search<'_>, radius_m: f64) -> Option<Diagnosis> {
+fn by_grid(search: &FinishedSearch<'_>, radius_m: f64) -> Option<Diagnosis> {
     let truth = search.truth_offset();
     let outside = |is_turned: bool| {
         RULE.found(&Outside {
@@ -90,11 +90,11 @@ evidence!(Uncovered { covered: usize, least_covered: u32 } =>
      {least_covered}."
 );
 
-fn by_starts(starts: &Starts, radius_m: f64) -> Option<Diagnosis> {
-    starts
+fn in_six_freedoms(search: &FreeSearch, radius_m: f64) -> Option<Diagnosis> {
+    search
         .near
         .is_none()
-        .then(|| RULE.found(&Unreached { distance_m: starts.distance_m, radius_m }))
+        .then(|| RULE.found(&Unreached { distance_m: search.distance_m, radius_m }))
 }
 
 evidence!(Unreached { distance_m: f64, radius_m: f64 } => {
@@ -115,7 +115,7 @@ fn remedies(ask: &Ask<'_>) -> Vec<Remedy> {
             tried.extend(wider);
             tried
         }
-        Family::Starts => {
+        Family::MultiStart => {
             let mut tried = Vec::from(wider);
             tried.push(vec![ask.set("mi6.yaw_step", 2.0 * ask.params.mi6.yaw_step_deg)]);
             tried.push(vec![ask.floor(0.2, 0.0)]);

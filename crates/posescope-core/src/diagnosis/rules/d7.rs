@@ -1,7 +1,7 @@
 //! D7: height, pitch or roll, which are not searched, are off.
 
 use super::*;
-use crate::diagnosis::search::Place;
+use crate::diagnosis::search::PoseCost;
 
 /// How far the truth must be off the plane of the search for that to be a cause, at the paper's scale.
 const OFF_PLANE_M: f64 = 0.1;
@@ -37,9 +37,9 @@ fn test(case: &Case<'_>) -> Option<Diagnosis> {
 }
 
 fn found(
-    search: &Search<'_>,
+    search: &FinishedSearch<'_>,
     frozen_error: PoseError,
-    near: &Place,
+    near: &PoseCost,
     won: Option<(f64, f64)>,
 ) -> Diagnosis {
     RULE.found(&Frozen {

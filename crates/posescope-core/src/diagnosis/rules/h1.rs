@@ -6,7 +6,7 @@ pub(super) const RULE: Rule = Rule {
     title: "the wrong method's pose was kept",
     advice: "run the other method alone, or use robust",
     advice_of: |family| match family {
-        Family::Starts => Some("run the better method alone, or change robust.credit"),
+        Family::MultiStart => Some("run the better method alone, or change robust.credit"),
         _ => None,
     },
     applies_to: Family::ALL,
@@ -16,7 +16,7 @@ pub(super) const RULE: Rule = Rule {
 
 fn test(case: &Case<'_>) -> Option<Diagnosis> {
     match case.family {
-        Family::Starts => passed_over(case),
+        Family::MultiStart => passed_over(case),
         _ => kept_by_hybrid(case),
     }
 }

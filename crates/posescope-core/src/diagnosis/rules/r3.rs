@@ -1,7 +1,7 @@
 //! R3: too few true matches.
 
 use super::*;
-use crate::diagnosis::matches::Step;
+use crate::diagnosis::matches::FunnelStep;
 
 /// Fewer true matches stand out from no crowd of false ones.
 pub(super) const FEW_MATCHES: usize = 8;
@@ -35,7 +35,7 @@ fn test(case: &Case<'_>) -> Option<Diagnosis> {
         lost_at,
         before,
         after,
-        limit: case.keypoint_limit().filter(|_| lost_at == Step::Detect),
+        limit: case.keypoint_limit().filter(|_| lost_at == FunnelStep::Detect),
         true_matches: funnel,
     }))
 }
@@ -43,7 +43,7 @@ fn test(case: &Case<'_>) -> Option<Diagnosis> {
 #[derive(Serialize)]
 struct Matches {
     unique: usize,
-    lost_at: Step,
+    lost_at: FunnelStep,
     before: usize,
     after: usize,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -55,11 +55,17 @@ impl fmt::Display for Matches {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (before, lost) = (self.before, self.before - self.after.min(self.before));
         let (of, lost_by) = match self.lost_at {
-            Step::View => ("reference keypoints with a depth", "are outside the query's view"),
-            Step::Detect => ("reference keypoints in the query's view", "were not detected there"),
-            Step::Match => ("keypoints detected in both photos", "have a wrong nearest neighbour"),
-            Step::Ratio => ("true nearest neighbours", "fail the ratio test"),
-            Step::Unique => ("true matches", "are not mutually best"),
+            FunnelStep::View => {
+                ("reference keypoints with a depth", "are outside the query's view")
+            }
+            FunnelStep::Detect => {
+                ("reference keypoints in the query's view", "were not detected there")
+            }
+            FunnelStep::Match => {
+                ("keypoints detected in both photos", "have a wrong nearest neighbour")
+            }
+            FunnelStep::Ratio => ("true nearest neighbours", "fail the ratio test"),
+            FunnelStep::Unique => ("true matches", "are not mutually best"),
         };
         let true_matches = self.true_matches.unique;
         write!(f, "Too few true matches: {true_matches} of {}. ", self.unique)?;
@@ -100,7 +106,7 @@ mod tests {
         let said = |limit: Option<&str>| {
             let matches = Matches {
                 unique: 6,
-                lost_at: Step::Detect,
+                lost_at: FunnelStep::Detect,
                 before: 40,
                 after: 2,
                 limit: limit.map(str::to_owned),

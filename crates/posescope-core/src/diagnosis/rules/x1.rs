@@ -57,7 +57,7 @@ fn test(case: &Case<'_>) -> Option<Diagnosis> {
                 .or_else(|| truth_by_cost(case, search))
                 .or_else(|| camera_by_fb(case, false))
         }
-        Family::Starts | Family::Descent => poses(case),
+        Family::MultiStart | Family::Descent => poses(case),
     }
 }
 
@@ -291,7 +291,7 @@ evidence!(TruthByMatches {
 
 /// The result is as certain as results ever are, and it is not the stated truth. Where the images agree at
 /// the truth too, though less, both are there, and the truth is not suspect.
-fn truth_by_cost(case: &Case<'_>, search: &Search<'_>) -> Option<Diagnosis> {
+fn truth_by_cost(case: &Case<'_>, search: &FinishedSearch<'_>) -> Option<Diagnosis> {
     const NEARLY_CERTAIN: f64 = 0.97;
     const SUPPORTED: f64 = 0.5;
     let probability = case.subject.confidence.as_ref()?.probability;

@@ -6,7 +6,7 @@ use nalgebra::Point3;
 
 use super::Direct;
 use crate::cost::Statistic;
-use crate::estimator::starts::Level;
+use crate::estimator::multi_start::Level;
 use crate::estimator::{Answered, CostSummary, Failure, Halt};
 use crate::event::{DescentStepped, Moment, PhaseSearched, Stage, ViewRendered};
 use crate::geometry::Pose;
@@ -43,7 +43,7 @@ impl Direct {
         trace: &mut Trace<'_>,
     ) -> Result<(Pose, CostSummary), Halt> {
         let cloud = self.color(problem, trace)?;
-        let level = self.starts.level(self.scorer_of(problem, Arc::clone(&cloud)));
+        let level = self.multi_start.level(self.scorer_of(problem, Arc::clone(&cloud)));
         trace.checkpoint()?;
         let scorer = &level.objective;
         let mut standing = Standing {
@@ -149,7 +149,7 @@ impl Direct {
         let is_inside =
             |pose: &Pose| pose.translation.vector.norm() <= problem.uncertainty_radius_m;
         let cloud = self.colored(problem).value;
-        let level = self.starts.level(self.scorer_of(problem, Arc::clone(&cloud)));
+        let level = self.multi_start.level(self.scorer_of(problem, Arc::clone(&cloud)));
         let cost_of = |pose: Pose| {
             let score = level.objective.score(&[pose])[0];
             score.eligible_cost(level.least_covered).filter(|_| is_inside(&pose))
@@ -174,7 +174,7 @@ impl Direct {
     ) -> Result<(), Cancelled> {
         let (start, phase) = (Offset::default(), Phase::PositionCoarse);
         let radius_m = problem.uncertainty_radius_m;
-        let Ok(lattice) = Lattice::new(phase, start, radius_m, &self.starts.grid) else {
+        let Ok(lattice) = Lattice::new(phase, start, radius_m, &self.multi_start.grid) else {
             return Ok(());
         };
         trace.stage(Stage::Search(phase), |trace| {

@@ -27,7 +27,7 @@ pub(in crate::estimator) enum Detector {
 
 /// The features of one photo.
 #[derive(Clone)]
-pub(in crate::estimator) struct Described {
+pub(in crate::estimator) struct DescribedPhoto {
     /// Without descriptors where these are SIFT's.
     pub(in crate::estimator) features: Arc<Features>,
     pub(in crate::estimator) sift: Option<Arc<SiftFeatures>>,
@@ -36,8 +36,8 @@ pub(in crate::estimator) struct Described {
 
 /// The features of both photos.
 pub(in crate::estimator) struct Detected {
-    pub(in crate::estimator) query: Described,
-    pub(in crate::estimator) reference: Described,
+    pub(in crate::estimator) query: DescribedPhoto,
+    pub(in crate::estimator) reference: DescribedPhoto,
 }
 
 impl Detected {
@@ -64,7 +64,7 @@ impl FeatureBased {
         side: Side,
         problem: &Problem,
         trace: &mut Trace<'_>,
-    ) -> Result<Described, Halt> {
+    ) -> Result<DescribedPhoto, Halt> {
         let (photo, memo) = match side {
             Side::Query => (&problem.query.photo, &problem.query.memo),
             Side::Reference => (&problem.reference.photo, &problem.reference.memo),
@@ -78,7 +78,7 @@ impl FeatureBased {
                     })),
                     None => kept_surf(&photo.gray, memo, surf, || trace.checkpoint())?,
                 };
-                Described { features: found.value, sift: None, reused: found.reused }
+                DescribedPhoto { features: found.value, sift: None, reused: found.reused }
             }
             Detector::Sift(sift) => {
                 let found = memo.try_recall(sift, SiftFeatures::heap_bytes, || {
@@ -86,7 +86,7 @@ impl FeatureBased {
                 })?;
                 let (keypoints, descriptors) = (found.value.keypoints.clone(), Vec::new());
                 let features = Arc::new(Features { keypoints, descriptors });
-                Described { features, sift: Some(found.value), reused: found.reused }
+                DescribedPhoto { features, sift: Some(found.value), reused: found.reused }
             }
         };
         let features = &described.features;

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::{JointPose, JointReference, between, lead};
 use crate::estimator::direct::{Best, Direct, check_size, coarse_to_fine};
-use crate::estimator::starts::Level;
+use crate::estimator::multi_start::Level;
 use crate::estimator::{Failure, Halt};
 use crate::fusion::share::Support;
 use crate::geometry::Pose;
@@ -24,7 +24,7 @@ const REFINEMENT: PatternSearch = PatternSearch {
 };
 
 /// A reference that shows something.
-struct Member<'a> {
+struct JointMember<'a> {
     index: usize,
     level: Level<Scorer<'a>>,
     /// Its camera's frame seen from that of the lead.
@@ -52,7 +52,7 @@ impl Direct {
         trace: &mut Trace<'_>,
     ) -> Result<JointPose, Halt> {
         let lead = references[lead(references)].problem;
-        let (grid, radius_m) = (&self.starts.grid, lead.uncertainty_radius_m);
+        let (grid, radius_m) = (&self.multi_start.grid, lead.uncertainty_radius_m);
         check_size(grid, radius_m)?;
         let mut members = Vec::new();
         for (index, reference) in references.iter().enumerate() {
@@ -60,9 +60,9 @@ impl Direct {
             let cloud = self.colored(reference.problem).value;
             if !cloud.points.is_empty() {
                 trace.checkpoint()?;
-                let level = self.starts.level(self.scorer_of(reference.problem, cloud));
+                let level = self.multi_start.level(self.scorer_of(reference.problem, cloud));
                 let member_from_lead = between(reference.problem, lead);
-                members.push(Member { index, level, member_from_lead });
+                members.push(JointMember { index, level, member_from_lead });
             }
         }
         if members.is_empty() {
@@ -105,7 +105,7 @@ impl Direct {
     }
 }
 
-impl Member<'_> {
+impl JointMember<'_> {
     /// The member's own scores of cameras in the frame of the lead.
     fn scores(&self, lead_from_camera: &[Pose]) -> Vec<Score> {
         let own = lead_from_camera.iter();
@@ -116,7 +116,7 @@ impl Member<'_> {
 
 /// The members at work.
 struct Joint<'a> {
-    members: Vec<Member<'a>>,
+    members: Vec<JointMember<'a>>,
 }
 
 impl Joint<'_> {

@@ -239,7 +239,7 @@ fn a_method_that_takes_one_reference_at_a_time_says_so() {
 fn a_search_that_takes_one_reference_at_a_time_says_so_and_no_grid_is_searched_instead() {
     let problems = problems(vec![reference(places()[0], TEXTURE, 0.0..WIDTH)]);
     let references = [JointReference { problem: &problems[0], matches: 9, alone: None }];
-    for (search, word) in [(SearchRule::Descent, "descent"), (SearchRule::Starts, "starts")] {
+    for (search, word) in [(SearchRule::Descent, "descent"), (SearchRule::MultiStart, "starts")] {
         let mut params = Params::default();
         params.set("pm.search", word).expect("a search");
         let (pose, _) =

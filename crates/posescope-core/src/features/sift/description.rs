@@ -32,7 +32,7 @@ const MAX_SHARE: f32 = 0.2;
 const ROW: usize = 32;
 
 /// The weights of the samples.
-pub(super) struct Describer {
+pub(super) struct SiftDescriber {
     level: Level,
     /// A Gaussian over the descriptor, with half its width.
     of_samples: [[f32; ROW]; SIDE],
@@ -59,7 +59,7 @@ impl Default for Grid {
     }
 }
 
-impl Describer {
+impl SiftDescriber {
     pub(super) fn new() -> Self {
         let half_field = SAMPLES_PER_FIELD as f32;
         Self {

@@ -17,7 +17,7 @@ const BORDER: usize = 5;
 const ROWS: usize = 32;
 
 /// Images of one size, each smoother than the one before.
-pub(super) struct Octave {
+pub(super) struct SiftOctave {
     /// Size of a pixel in those of the photo.
     pub(super) pixel: f32,
     pub(super) smoothed: Vec<Plane>,
@@ -34,7 +34,7 @@ pub(super) struct Extremum {
     pub(super) is_dark: bool,
 }
 
-impl Octave {
+impl SiftOctave {
     pub(super) fn of<E>(
         base: Plane,
         pixel: f32,
@@ -81,7 +81,7 @@ impl Octave {
         let least = (0.5 * params.contrast) as f32;
         let simd = Level::new();
         let bands: Vec<usize> = (BORDER..height - BORDER).step_by(ROWS).collect();
-        let of_band = |differences: &mut Differences, &top: &usize| {
+        let of_band = |differences: &mut DifferenceOfGaussians, &top: &usize| {
             let rows = top..(top + ROWS).min(height - BORDER);
             let mut found = Vec::new();
             dispatch!(simd, simd => self.among_neighbours(simd, rows, least, differences, &mut found));
@@ -92,7 +92,7 @@ impl Octave {
         };
         bands
             .par_iter()
-            .map_init(|| Differences::new(self.smoothed.len() - 1, width), of_band)
+            .map_init(|| DifferenceOfGaussians::new(self.smoothed.len() - 1, width), of_band)
             .flatten_iter()
             .collect()
     }
@@ -104,7 +104,7 @@ impl Octave {
         simd: S,
         rows: std::ops::Range<usize>,
         least: f32,
-        differences: &mut Differences,
+        differences: &mut DifferenceOfGaussians,
         found: &mut Vec<[usize; 3]>,
     ) {
         let last = self.size().0 - BORDER;
@@ -187,15 +187,15 @@ impl Octave {
 
 /// Three rows of each difference of two smoothed images; whole images of them would be written and read once, in
 /// more time than their numbers take to compute.
-struct Differences {
+struct DifferenceOfGaussians {
     /// For each level the rows whose numbers leave 0, 1 and 2 when divided by three.
     rows: Vec<[Vec<f32>; 3]>,
 }
 
 /// The rows above, at and below a place, of the level before, its own and the level behind.
-type Near<'a> = [[&'a [f32]; 3]; 3];
+type Neighbourhood<'a> = [[&'a [f32]; 3]; 3];
 
-impl Differences {
+impl DifferenceOfGaussians {
     fn new(levels: usize, width: usize) -> Self {
         // Eight columns at a time end behind the last.
         let row = || vec![0.0; width + 8];
@@ -212,7 +212,7 @@ impl Differences {
         }
     }
 
-    fn around(&self, level: usize, y: usize) -> Near<'_> {
+    fn around(&self, level: usize, y: usize) -> Neighbourhood<'_> {
         [level - 1, level, level + 1]
             .map(|level| [y - 1, y, y + 1].map(|y| self.rows[level][y % 3].as_slice()))
     }
@@ -221,7 +221,7 @@ impl Differences {
 /// Whether one of eight values is large and exceeds its six nearest neighbours. Few do, and of most that do not this
 /// is seen at once.
 #[inline(always)]
-fn is_promising<S: Simd>(simd: S, near: &Near<'_>, x: usize, least: f32) -> bool {
+fn is_promising<S: Simd>(simd: S, near: &Neighbourhood<'_>, x: usize, least: f32) -> bool {
     let lanes = |row: &[f32], x: usize| f32x8::from_slice(simd, &row[x..][..8]);
     let [[_, before, _], [above, row, below], [_, behind, _]] = *near;
     let here = lanes(row, x);
@@ -235,7 +235,7 @@ fn is_promising<S: Simd>(simd: S, near: &Near<'_>, x: usize, least: f32) -> bool
 }
 
 /// Whether a value is large and exceeds its 26 neighbours.
-fn is_extremum(near: &Near<'_>, x: usize, least: f32) -> bool {
+fn is_extremum(near: &Neighbourhood<'_>, x: usize, least: f32) -> bool {
     let value = near[1][1][x];
     if value.abs() < least {
         return false;

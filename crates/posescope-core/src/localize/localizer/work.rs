@@ -47,7 +47,7 @@ pub(super) struct QueryWork<'a> {
     /// The query's position in its scene.
     pub(super) frame: usize,
     /// What each problem was made of.
-    pub(super) places: Vec<Place>,
+    pub(super) places: Vec<ReferencePlace>,
     /// Feature matches by problem, once they are known.
     pub(super) matches: Vec<Option<usize>>,
     /// What each method made of each problem.
@@ -56,7 +56,7 @@ pub(super) struct QueryWork<'a> {
 
 /// A reference, and what is known about the distance of the query \[m\].
 #[derive(Clone, Copy, PartialEq)]
-pub(super) struct Place {
+pub(super) struct ReferencePlace {
     /// The reference's position in its scene.
     pub(super) reference: usize,
     /// The radius of the search.
@@ -115,7 +115,7 @@ impl QueryWork<'_> {
 
     /// The request that gives the result of a problem by itself.
     pub(super) fn asked_alone(&self, problem: usize) -> Request {
-        let Place { reference, radius_m, within_m } = self.places[problem];
+        let ReferencePlace { reference, radius_m, within_m } = self.places[problem];
         Request {
             radius_m,
             references: References { within_m, ..vec![reference].into() },

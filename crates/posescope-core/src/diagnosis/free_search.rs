@@ -1,4 +1,4 @@
-//! A search in six freedoms beside the truth: one from many starts, or a descent.
+//! A search in six freedoms beside the truth: a multi-start search, or a descent.
 //!
 //! Nothing is frozen and no step is too coarse in six freedoms, so the pose that the truth leads to under
 //! the same cost tells search from cost.
@@ -9,7 +9,7 @@ use crate::geometry::{Pose, PoseError};
 use crate::search::Refined;
 
 /// Where the truth leads, and the result.
-pub(super) struct Starts {
+pub(super) struct FreeSearch {
     /// Whether the search went downhill from the reference pose alone.
     pub(super) is_descent: bool,
     /// The pose that the truth leads to; `None` where too little of the cloud is seen from there, or the
@@ -34,7 +34,7 @@ pub(super) struct Near {
     pub(super) is_right: bool,
 }
 
-impl Starts {
+impl FreeSearch {
     pub(super) fn of(subject: &Subject<'_>, family: Family) -> Option<Self> {
         let is_descent = family == Family::Descent;
         let truth = subject.reference_from_truth()?;
@@ -47,7 +47,7 @@ impl Starts {
         let estimator = estimator::find(responsible)?.make(subject.params);
         // A descent has no prior on poses.
         let penalty = |pose: &Pose| match family {
-            Family::Starts => prior_penalty(subject.params, &subject.evidence.surfaces, pose),
+            Family::MultiStart => prior_penalty(subject.params, &subject.evidence.surfaces, pose),
             _ => 0.0,
         };
         let near = estimator.led_from(subject.problem, &truth).map(|refined| {

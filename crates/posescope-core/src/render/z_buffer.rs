@@ -4,7 +4,7 @@ use std::hint::select_unpredictable;
 
 use fearless_simd::{Level, Simd, SimdBase as _, dispatch, f32x4};
 
-use super::points::{MAX_ROWS, PointArrays, Projected, ROW_BITS, Values};
+use super::points::{MAX_ROWS, PointArrays, ProjectedPoints, ROW_BITS, Values};
 use super::projection::{OUT_OF_VIEW, Projection};
 use crate::camera::Intrinsics;
 use crate::geometry::Pose;
@@ -26,18 +26,18 @@ const STREAMS: usize = 4;
 /// pixels where the depth is its own, and leaves them empty, so that of two at the same depth the first
 /// takes them, and nothing is to be cleared. Neither has a branch: which of several points is the nearest cannot
 /// be foreseen, and a third of a drawing's time went into guessing it.
-pub struct DepthCanvas<K> {
+pub struct ZBuffer<K> {
     level: Level,
     intrinsics: Intrinsics,
     reach: usize,
     /// Depths \[m\], row by row, with a margin of twice the reach on all sides: every square lies within.
     nearest: Vec<f32>,
     /// Where the points fall: of squares the upper left pixel, the margin's counted.
-    projected: Projected,
+    projected: ProjectedPoints,
     kept: Vec<K>,
 }
 
-impl<K: Copy + Default> DepthCanvas<K> {
+impl<K: Copy + Default> ZBuffer<K> {
     /// Whether there is a canvas for a camera: not for more than 16 million pixels, or 65,000 in a row.
     pub fn can_draw(intrinsics: &Intrinsics, splat_px: usize) -> bool {
         let sides = Self::sides(intrinsics, splat_px / 2);
@@ -58,7 +58,7 @@ impl<K: Copy + Default> DepthCanvas<K> {
             reach,
             // A row of three is written as one of four.
             nearest: vec![NOTHING; sides[0] * sides[1] + 1],
-            projected: Projected::default(),
+            projected: ProjectedPoints::default(),
             kept: Vec::new(),
         }
     }
@@ -100,7 +100,7 @@ impl<K: Copy + Default> DepthCanvas<K> {
 
     #[inline(always)]
     fn draw_points<T: Copy>(&mut self, values: Values<'_, T>, keep: impl Fn(T, T) -> K) -> usize {
-        let Projected { pixels, depths, .. } = &self.projected;
+        let ProjectedPoints { pixels, depths, .. } = &self.projected;
         let nearest = &mut self.nearest[..values.query.len()];
         // So that the compiler knows that both have the same length.
         let query = &values.query[..nearest.len()];
@@ -133,7 +133,7 @@ impl<K: Copy + Default> DepthCanvas<K> {
             [self.intrinsics.width, self.intrinsics.height].map(|side| side as usize);
         let margin = 2 * self.reach;
         let stride = width + 2 * margin;
-        let Projected { pixels, depths, .. } = &self.projected;
+        let ProjectedPoints { pixels, depths, .. } = &self.projected;
         let nearest = self.nearest.as_mut_slice();
 
         let stream = pixels.len().div_ceil(STREAMS);
@@ -287,9 +287,9 @@ mod tests {
         ) {
             let arrays = PointArrays::new(points.iter().map(|point| point.position));
             let level = if baseline { Level::baseline() } else { Level::new() };
-            let mut canvas = DepthCanvas {
+            let mut canvas = ZBuffer {
                 level,
-                ..DepthCanvas::new(&small_camera(), splat_px)
+                ..ZBuffer::new(&small_camera(), splat_px)
             };
             let pixels: Vec<f32> = (0..63).map(|pixel| pixel as f32).collect();
             let intensities: Vec<f32> = points.iter().map(|point| point.intensity).collect();
@@ -318,7 +318,7 @@ mod tests {
         let arrays = PointArrays::new([point.position].into_iter());
         let values = Values { query: &[0.0; 63], points: &[7.0] };
         for splat_px in [1, 3] {
-            let mut canvas = DepthCanvas::new(&small_camera(), splat_px);
+            let mut canvas = ZBuffer::new(&small_camera(), splat_px);
             assert!(canvas.draw(&arrays, values, &twice_as_far, |_, seen| seen).is_empty());
             let mut plainly = Rasterizer::new(&small_camera(), splat_px);
             assert!(plainly.splat(&[point], &twice_as_far).is_empty());
@@ -328,7 +328,7 @@ mod tests {
     #[test]
     fn a_huge_image_has_no_canvas() {
         let huge = Intrinsics { width: 1 << 13, height: (1 << 11) + 1, ..small_camera() };
-        assert!(!DepthCanvas::<u8>::can_draw(&huge, 1));
-        assert!(DepthCanvas::<u8>::can_draw(&small_camera(), 1));
+        assert!(!ZBuffer::<u8>::can_draw(&huge, 1));
+        assert!(ZBuffer::<u8>::can_draw(&small_camera(), 1));
     }
 }

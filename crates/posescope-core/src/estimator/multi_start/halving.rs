@@ -1,16 +1,16 @@
-//! Refining many starts, and ending the worse ones early.
+//! Successive halving: many starts are refined side by side, and the worse half ends early.
 //!
 //! This is successive halving. After a few long steps, most starts are seen to lead to a high minimum, or to the minimum
-//! of a better start. Each time the step is halved, the search drops the half with the higher prices.
+//! of a better start. Each time the step is halved, the search drops the half with the higher MAP costs.
 
-use super::{Level, ManyStarts};
+use super::{Level, MultiStart};
 use crate::geometry::Pose;
 use crate::render::Objective;
 use crate::search::{PatternSearch, Refined, Start};
 
-impl ManyStarts {
+impl MultiStart {
     /// Refines the walks, of which at least `fewest` are refined to the end where so many lead to places of their
-    /// own. The lowest price comes first.
+    /// own. The lowest MAP cost comes first.
     ///
     /// # Errors
     /// What the checkpoint says, which is asked before each round.
@@ -20,7 +20,7 @@ impl ManyStarts {
         mut walks: Vec<Refined>,
         plan: &PatternSearch,
         fewest: usize,
-        price: impl Fn(&Pose, f64) -> f64,
+        map_cost: impl Fn(&Pose, f64) -> f64,
         mut checkpoint: impl FnMut() -> Result<(), E>,
     ) -> Result<Vec<Refined>, E> {
         let (mut ended, mut step_m) = (Vec::new(), plan.first_m);
@@ -33,7 +33,7 @@ impl ManyStarts {
                 (walk.pose, walk.cost) = (moved.pose, moved.cost);
                 walk.evaluations += moved.evaluations;
             }
-            sort_by_price(&mut walks, &price);
+            sort_by_map_cost(&mut walks, &map_cost);
             let most = fewest.max(walks.len().div_ceil(2));
             let (kept, others) = self.partition(walks, most);
             walks = kept;
@@ -41,7 +41,7 @@ impl ManyStarts {
             step_m *= 0.5;
         }
         walks.extend(ended);
-        sort_by_price(&mut walks, &price);
+        sort_by_map_cost(&mut walks, &map_cost);
         Ok(walks)
     }
 
@@ -64,8 +64,8 @@ impl ManyStarts {
     }
 }
 
-pub(super) fn sort_by_price(refined: &mut [Refined], price: impl Fn(&Pose, f64) -> f64) {
-    refined.sort_by(|a, b| price(&a.pose, a.cost).total_cmp(&price(&b.pose, b.cost)));
+pub(super) fn sort_by_map_cost(refined: &mut [Refined], map_cost: impl Fn(&Pose, f64) -> f64) {
+    refined.sort_by(|a, b| map_cost(&a.pose, a.cost).total_cmp(&map_cost(&b.pose, b.cost)));
 }
 
 #[cfg(test)]
@@ -103,7 +103,7 @@ mod tests {
     }
 
     fn refined(starts: &[f64], fewest: usize) -> (Vec<Refined>, Vec<Refined>) {
-        let six = ManyStarts::new(&Params::default());
+        let six = MultiStart::new(&Params::default());
         let level = six.level(Bowls);
         let poses: Vec<Pose> = starts.iter().map(|&x| Pose::translation(x, 0.0, 0.0)).collect();
         let starts = level.starts(&poses);
@@ -116,10 +116,10 @@ mod tests {
         };
         let never = || Ok::<_, Infallible>(());
         let Ok(mut all) = level.refined(&starts, &plan, never);
-        let price = |_: &Pose, cost: f64| cost;
-        sort_by_price(&mut all, price);
+        let map_cost = |_: &Pose, cost: f64| cost;
+        sort_by_map_cost(&mut all, map_cost);
         let walks = starts.iter().map(Refined::unmoved).collect();
-        let Ok(halved) = six.halved(&level, walks, &plan, fewest, price, never);
+        let Ok(halved) = six.halved(&level, walks, &plan, fewest, map_cost, never);
         (halved, all)
     }
 

@@ -6,7 +6,7 @@ parameters! {
     /// Parameters of the search in six freedoms. Coarse positions and the coverage floor are those of
     /// the grid.
     #[derive(Clone, Debug, PartialEq)]
-    pub struct SixParams {
+    pub struct MultiStartParams {
         /// Coarse lattices, each at a yaw of its own, where no smaller copies are searched.
         pub yaws: usize = 5 => count("yaws", "", 1..=61),
         /// Yaw between neighbouring coarse lattices.

@@ -2,7 +2,7 @@
 
 use std::convert::Infallible;
 
-use super::ManyStarts;
+use super::MultiStart;
 use crate::geometry::Pose;
 use crate::grid::least_covered;
 use crate::problem::Problem;
@@ -18,7 +18,7 @@ pub(in crate::estimator) struct Level<O> {
     pub(in crate::estimator) least_covered: u32,
 }
 
-impl ManyStarts {
+impl MultiStart {
     /// The level of a cost.
     pub(in crate::estimator) fn level<O: Objective>(&self, objective: O) -> Level<O> {
         let initial = objective.score(&[Pose::identity()])[0];
@@ -42,16 +42,16 @@ impl ManyStarts {
         if pose.translation.vector.norm() > reach {
             return Ok(None);
         }
-        let price = |_: &Pose, cost: f64| cost;
+        let map_cost = |_: &Pose, cost: f64| cost;
         let starts = level.starts(&[pose]);
-        let walks = level.gathered(&starts, &self.around(problem), price, &mut checkpoint)?;
-        let refined = self.halved(level, walks, &self.in_six(), 1, price, checkpoint)?;
+        let walks = level.gathered(&starts, &self.around(problem), map_cost, &mut checkpoint)?;
+        let refined = self.halved(level, walks, &self.in_six(), 1, map_cost, checkpoint)?;
         let inside = refined.first().filter(|one| one.pose.translation.vector.norm() <= reach);
         Ok(inside.copied())
     }
 }
 
-impl ManyStarts {
+impl MultiStart {
     /// The minimum that a pose leads to, though no search started there; `None` where there is none.
     pub(in crate::estimator) fn basin_of(
         &self,
@@ -96,11 +96,11 @@ impl<O: Objective> Level<O> {
         &self,
         starts: &[Start],
         plan: &CrossEntropy,
-        price: impl Fn(&Pose, f64) -> f64,
+        map_cost: impl Fn(&Pose, f64) -> f64,
         checkpoint: impl FnMut() -> Result<(), E>,
     ) -> Result<Vec<Refined>, E> {
         let mut walks: Vec<Refined> = starts.iter().map(Refined::unmoved).collect();
-        cross_entropy(&mut walks, plan, price, self.checked_costs(checkpoint))?;
+        cross_entropy(&mut walks, plan, map_cost, self.checked_costs(checkpoint))?;
         Ok(walks)
     }
 

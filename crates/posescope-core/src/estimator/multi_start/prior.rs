@@ -8,24 +8,24 @@
 
 use nalgebra::Vector3;
 
-use super::{ManyStarts, SixParams, Spread};
+use super::{MultiStart, MultiStartParams, Spread};
 use crate::geometry::Pose;
 use crate::grid::Offset;
 
-impl ManyStarts {
-    /// What a pose and its cost are worth: the cost, and more for a pose that is less likely, by the
-    /// standard deviation of the coarse costs.
-    pub(in crate::estimator) fn price(&self, spread: &Spread, pose: &Pose, cost: f64) -> f64 {
-        cost + spread.deviation() * self.unlikeliness(pose)
+impl MultiStart {
+    /// The maximum-a-posteriori cost of a pose: its cost and the prior penalty, in standard deviations of the coarse
+    /// costs.
+    pub(in crate::estimator) fn map_cost(&self, spread: &Spread, pose: &Pose, cost: f64) -> f64 {
+        cost + spread.deviation() * self.prior_penalty(pose)
     }
 
     /// Whether a pose is not as unlikely as can be.
     pub(super) fn is_plausible(&self, pose: &Pose) -> bool {
-        self.params.unlikely == 0.0 || self.unlikeliness(pose) < self.params.unlikely
+        self.params.unlikely == 0.0 || self.prior_penalty(pose) < self.params.unlikely
     }
 
-    fn unlikeliness(&self, pose: &Pose) -> f64 {
-        unlikeliness(&self.params, self.scale.length(MIN_BEND_M), pose)
+    fn prior_penalty(&self, pose: &Pose) -> f64 {
+        prior_penalty(&self.params, self.scale.length(MIN_BEND_M), pose)
     }
 }
 
@@ -35,10 +35,10 @@ const USUAL_BEND_DEG: f64 = 22.0;
 /// The tightest bend that a vehicle takes: its radius \[m\], at the paper's scale.
 const MIN_BEND_M: f64 = 5.0;
 
-/// How unlikely a pose `reference_from_camera` is, in standard deviations of the coarse costs: the squares
+/// The penalty of a pose `reference_from_camera` under the prior, in standard deviations of the coarse costs: the squares
 /// of its heading, height and tilt over what is usual for each, together no more than the most. A heading may be off the
 /// reference's, or off what the bend from there turns.
-fn unlikeliness(params: &SixParams, min_bend_m: f64, pose: &Pose) -> f64 {
+fn prior_penalty(params: &MultiStartParams, min_bend_m: f64, pose: &Pose) -> f64 {
     let offset = Offset::of(pose);
     let bend_rad = bend(&offset, min_bend_m);
     let [yaw_deg, bend_deg, off_bend_deg] =
@@ -73,18 +73,18 @@ mod tests {
 
     #[test]
     fn a_level_pose_that_looks_the_same_way_is_likely_wherever_it_stands() {
-        let params = SixParams::default();
+        let params = MultiStartParams::default();
         let there = Pose::translation(3.0, 0.0, -7.0);
-        assert_eq!(unlikeliness(&params, MIN_BEND_M, &there), 0.0);
+        assert_eq!(prior_penalty(&params, MIN_BEND_M, &there), 0.0);
     }
 
     #[test]
     fn a_turn_along_a_bend_is_likelier_than_one_the_other_way_or_on_the_spot() {
-        let params = SixParams::default();
+        let params = MultiStartParams::default();
         let on_bend = |radius_m: f64, turn: f64, yaw_rad: f64| {
             let [right_m, forward_m] = [radius_m * (1.0 - turn.cos()), radius_m * turn.sin()];
             let pose = Offset { right_m, forward_m, yaw_rad }.reference_from_camera();
-            unlikeliness(&params, MIN_BEND_M, &pose)
+            prior_penalty(&params, MIN_BEND_M, &pose)
         };
         let usual = USUAL_BEND_DEG.to_radians();
         // Ahead to the right, and, before the bend, behind to the right.
@@ -98,23 +98,23 @@ mod tests {
 
     #[test]
     fn heading_height_and_tilt_count_by_what_is_usual_and_never_more_than_the_most() {
-        let params = SixParams::default();
+        let params = MultiStartParams::default();
         let turned = |axis: Vector3<f64>, deg: f64| {
             let rotation = UnitQuaternion::from_scaled_axis(axis * deg.to_radians());
-            unlikeliness(&params, MIN_BEND_M, &Pose::from_parts(Vector3::zeros().into(), rotation))
+            prior_penalty(&params, MIN_BEND_M, &Pose::from_parts(Vector3::zeros().into(), rotation))
         };
         let is_one = |value: f64| (value - 1.0).abs() < 1e-9;
         assert!(is_one(turned(Vector3::y(), params.usual_yaw_deg)));
         assert!(is_one(turned(Vector3::x(), -params.usual_tilt_deg)));
         assert!(is_one(turned(Vector3::z(), params.usual_tilt_deg)));
         let lifted = Pose::translation(0.0, -params.usual_height_m, 0.0);
-        assert!(is_one(unlikeliness(&params, MIN_BEND_M, &lifted)));
+        assert!(is_one(prior_penalty(&params, MIN_BEND_M, &lifted)));
         assert_eq!(turned(Vector3::x(), 60.0), params.unlikely);
     }
 
     #[test]
     fn of_refined_poses_the_likelier_comes_first_where_the_other_is_hardly_cheaper() {
-        let six = ManyStarts::new(&Params::default());
+        let six = MultiStart::new(&Params::default());
         let spread = Spread { median: 1.0, deviation: 0.01 };
         let lifted = Pose::translation(5.0, -six.params.usual_height_m, 0.0);
         let refined = |pose: Pose, cost: f64| Refined {
@@ -125,7 +125,7 @@ mod tests {
         };
         let first = |cost_of_lifted: f64| {
             let both = vec![refined(lifted, cost_of_lifted), refined(Pose::identity(), 0.9)];
-            six.apart(both, 2, |pose, cost| six.price(&spread, pose, cost))[0].pose
+            six.apart(both, 2, |pose, cost| six.map_cost(&spread, pose, cost))[0].pose
         };
         assert_eq!(first(0.895), Pose::identity());
         assert_eq!(first(0.885), lifted);
@@ -133,7 +133,7 @@ mod tests {
 
     #[test]
     fn nothing_is_unlikely_where_the_most_is_nothing() {
-        let params = SixParams { unlikely: 0.0, ..SixParams::default() };
-        assert_eq!(unlikeliness(&params, MIN_BEND_M, &Pose::translation(0.0, 5.0, 0.0)), 0.0);
+        let params = MultiStartParams { unlikely: 0.0, ..MultiStartParams::default() };
+        assert_eq!(prior_penalty(&params, MIN_BEND_M, &Pose::translation(0.0, 5.0, 0.0)), 0.0);
     }
 }

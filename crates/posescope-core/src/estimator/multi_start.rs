@@ -1,4 +1,4 @@
-//! The search from many starts, in six freedoms, for any cost.
+//! Multi-start search: from many starts, in six freedoms, for any cost.
 //!
 //! 1. Coarse positions are scored at several yaws, at once and not one after the other,
 //! 2. many of their minima are starts, each refined in right, forward and yaw,
@@ -15,7 +15,7 @@ mod prior;
 use std::sync::Arc;
 
 pub(super) use level::Level;
-pub use params::SixParams;
+pub use params::MultiStartParams;
 
 use super::{Answered, CostSummary, Failure, Halt};
 use crate::event::{Moment, PhaseSearched, PoseScored, Stage, StartsRefined, ViewRendered};
@@ -40,9 +40,9 @@ const SAME_M: f64 = 0.3;
 /// Starts whose headings differ by less are one where they are at one place.
 const SAME_DEG: f64 = 1.0;
 
-/// The search from many starts.
-pub(super) struct ManyStarts {
-    params: SixParams,
+/// The multi-start search.
+pub(super) struct MultiStart {
+    params: MultiStartParams,
     pub(super) grid: GridParams,
     /// How far outside the disc a pose may be, as a share of its radius.
     radius_slack: f64,
@@ -87,10 +87,10 @@ impl Spread {
     }
 }
 
-/// What the prior on poses adds to the cost of a pose (`reference_from_camera`) of a search from many starts, given the
+/// What the prior on poses adds to the cost of a pose (`reference_from_camera`) of a multi-start search, given the
 /// costs of its coarse positions.
 pub(crate) fn prior_penalty(params: &Params, coarse: &[Arc<ScoredLattice>], pose: &Pose) -> f64 {
-    ManyStarts::new(params).price(&Spread::of(coarse), pose, 0.0)
+    MultiStart::new(params).map_cost(&Spread::of(coarse), pose, 0.0)
 }
 
 fn middle(values: &mut [f64]) -> f64 {
@@ -98,7 +98,7 @@ fn middle(values: &mut [f64]) -> f64 {
     values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
 }
 
-impl ManyStarts {
+impl MultiStart {
     /// The search with these parameters.
     pub(super) fn new(params: &Params) -> Self {
         Self {
@@ -182,8 +182,8 @@ impl ManyStarts {
             Ok::<_, Halt>(surfaces)
         })?;
         let spread = Spread::of(&surfaces);
-        let price = |pose: &Pose, cost: f64| self.price(&spread, pose, cost);
-        let starts = starts(&surfaces, self.params.starts, price);
+        let map_cost = |pose: &Pose, cost: f64| self.map_cost(&spread, pose, cost);
+        let starts = starts(&surfaces, self.params.starts, map_cost);
         if starts.is_empty() {
             return Err(Halt::from(Failure::NothingComparable {
                 hypotheses: search.evaluations as usize,
@@ -206,14 +206,14 @@ impl ManyStarts {
             let refined = trace.stage(Stage::RefinePlane, |trace| {
                 let walks = starts.iter().map(Refined::unmoved).collect();
                 let plan = self.in_the_plane();
-                self.refine(&mut search, walks, &plan, self.params.finalists, price, trace)
+                self.refine(&mut search, walks, &plan, self.params.finalists, map_cost, trace)
             })?;
-            finalists = self.apart(refined, self.params.finalists, price);
+            finalists = self.apart(refined, self.params.finalists, map_cost);
         }
         let mut refined = trace.stage(Stage::RefineSix, |trace| {
-            let walks =
-                level.gathered(&finalists, &self.around(problem), price, || trace.checkpoint())?;
-            self.refine(&mut search, walks, &self.in_six(), MIN_REFINED, price, trace)
+            let walks = level
+                .gathered(&finalists, &self.around(problem), map_cost, || trace.checkpoint())?;
+            self.refine(&mut search, walks, &self.in_six(), MIN_REFINED, map_cost, trace)
         })?;
         // A walk may leave the disc, where no query can be.
         let reach_m = self.reach(problem);
@@ -298,30 +298,32 @@ impl ManyStarts {
             surfaces.push(Arc::new(surface));
         }
         let spread = Spread::of(&surfaces);
-        let price = |pose: &Pose, cost: f64| self.price(&spread, pose, cost);
-        let SixParams { starts: most, finalists, .. } = self.params;
+        let map_cost = |pose: &Pose, cost: f64| self.map_cost(&spread, pose, cost);
+        let MultiStartParams { starts: most, finalists, .. } = self.params;
         let most_m = self.most_m();
-        let walks = starts(&surfaces, 2 * most, price).iter().map(Refined::unmoved).collect();
+        let walks = starts(&surfaces, 2 * most, map_cost).iter().map(Refined::unmoved).collect();
         let plan = PatternSearch { last_m: most_m.min(0.1), ..self.in_the_plane() };
-        let plane = self.halved(&level, walks, &plan, finalists, price, || trace.checkpoint())?;
+        let plane =
+            self.halved(&level, walks, &plan, finalists, map_cost, || trace.checkpoint())?;
         let plan = PatternSearch {
             freedoms: Freedoms::Six,
             first_m: most_m.min(0.2),
             last_m: most_m.min(0.05),
             ..plan
         };
-        let walks = self.apart(plane, most, price).iter().map(Refined::unmoved).collect();
-        let six = self.halved(&level, walks, &plan, MIN_REFINED, price, || trace.checkpoint())?;
+        let walks = self.apart(plane, most, map_cost).iter().map(Refined::unmoved).collect();
+        let six =
+            self.halved(&level, walks, &plan, MIN_REFINED, map_cost, || trace.checkpoint())?;
 
         let level = smaller(shrink_by.div_ceil(2));
         trace.checkpoint()?;
-        let best = self.apart(six, finalists, price);
+        let best = self.apart(six, finalists, map_cost);
         let poses: Vec<Pose> = best.iter().map(|start| start.pose).collect();
         let plan = PatternSearch { last_m: most_m.min(0.025), ..plan };
         let walks = level.starts(&poses).iter().map(Refined::unmoved).collect();
         let refined =
-            self.halved(&level, walks, &plan, MIN_REFINED, price, || trace.checkpoint())?;
-        let best = self.apart(refined, finalists, price);
+            self.halved(&level, walks, &plan, MIN_REFINED, map_cost, || trace.checkpoint())?;
+        let best = self.apart(refined, finalists, map_cost);
         Ok(best.into_iter().map(|start| start.pose).collect())
     }
 }
@@ -363,7 +365,7 @@ impl<O: Objective> Search<'_, O> {
 fn starts(
     surfaces: &[Arc<ScoredLattice>],
     most: usize,
-    price: impl Fn(&Pose, f64) -> f64,
+    map_cost: impl Fn(&Pose, f64) -> f64,
 ) -> Vec<Start> {
     let mut minima: Vec<Start> = surfaces
         .iter()
@@ -375,24 +377,24 @@ fn starts(
             })
         })
         .collect();
-    minima.sort_by(|a, b| price(&a.pose, a.cost).total_cmp(&price(&b.pose, b.cost)));
+    minima.sort_by(|a, b| map_cost(&a.pose, a.cost).total_cmp(&map_cost(&b.pose, b.cost)));
     minima.truncate(most);
     minima
 }
 
-impl ManyStarts {
-    /// Refines the starts, at least `fewest` of them to the end, and emits where they ended, the lowest price first.
+impl MultiStart {
+    /// Refines the starts, at least `fewest` of them to the end, and emits where they ended, the lowest MAP cost first.
     fn refine<O: Objective>(
         &self,
         search: &mut Search<'_, O>,
         walks: Vec<Refined>,
         plan: &PatternSearch,
         fewest: usize,
-        price: impl Fn(&Pose, f64) -> f64,
+        map_cost: impl Fn(&Pose, f64) -> f64,
         trace: &mut Trace<'_>,
     ) -> Result<Vec<Refined>, Cancelled> {
         let refined =
-            self.halved(search.level, walks, plan, fewest, price, || trace.checkpoint())?;
+            self.halved(search.level, walks, plan, fewest, map_cost, || trace.checkpoint())?;
         search.evaluations += refined.iter().map(|one| one.evaluations).sum::<u64>();
         trace.emit(|| StartsRefined {
             freedoms: plan.freedoms,
@@ -406,9 +408,9 @@ impl ManyStarts {
         &self,
         mut refined: Vec<Refined>,
         most: usize,
-        price: impl Fn(&Pose, f64) -> f64,
+        map_cost: impl Fn(&Pose, f64) -> f64,
     ) -> Vec<Start> {
-        halving::sort_by_price(&mut refined, price);
+        halving::sort_by_map_cost(&mut refined, map_cost);
         let (kept, _) = self.partition(refined, most);
         kept.iter().map(|one| Start { pose: one.pose, cost: one.cost }).collect()
     }
@@ -492,7 +494,7 @@ mod tests {
         let reference =
             ReferenceTuple::new("reference", photo(), camera, Pose::identity(), Cloud::default());
         let problem = Problem::new(query, reference.expect("fits"), 25.0).expect("a radius");
-        let starts = ManyStarts::new(&Params::default());
+        let starts = MultiStart::new(&Params::default());
         let level = starts.level(Cones { rounds: Mutex::default() });
         let compare = |_: &Pose, _: Score| unreachable!("nobody looks");
         let found = starts
