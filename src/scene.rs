@@ -34,8 +34,8 @@ mod view_crop;
 use std::path::{Path, PathBuf};
 
 pub use posescope_core::scene::{
-    CachedScene, DegradedScene, Entry, FrameStore, Lengths, Scene, SceneError, SceneSize, degraded,
-    frame_range,
+    CachedScene, DegradedScene, FrameStore, Lengths, Scene, SceneError, SceneFormat, SceneSize,
+    degraded, frame_range,
 };
 pub use posescope_street as street;
 
@@ -46,7 +46,7 @@ pub use pair_matches::{MatchFolder, write_matches};
 pub use retriever::{IndexOptions, NoIndex, Retriever};
 
 /// Every format, in the order in which they are tried.
-pub const ALL: &[Entry] = &[
+pub const ALL: &[SceneFormat] = &[
     street::ENTRY,
     kitti::ENTRY,
     kitti_raw::ENTRY,

@@ -20,10 +20,10 @@ pub(super) use self::text::{camera as camera_of_line, image_lines};
 use super::file_scene::{Clouds, FileScene, Frame};
 use super::folder::{folder_name, within};
 use super::lens::developed_camera;
-use super::{Entry, Lengths, Scene, SceneError};
+use super::{Lengths, Scene, SceneError, SceneFormat};
 use crate::cloud::Cloud;
 
-pub(super) const ENTRY: Entry = Entry {
+pub(super) const ENTRY: SceneFormat = SceneFormat {
     name: "colmap",
     about: "COLMAP: a folder with cameras, images and points3D as .bin or .txt, in it or in sparse/0, \
             and the photos in images",

@@ -30,14 +30,14 @@ use super::file_scene::{Clouds, Develop, FileScene, Frame};
 use super::folder::{folder_name, stem, warn_without_poses, within};
 use super::lens::{Distortion, developed_camera, pinhole};
 use super::map_blocks::MapBlocks;
-use super::{Entry, Scene, SceneError, lines, photo_file, view_crop};
+use super::{Scene, SceneError, SceneFormat, lines, photo_file, view_crop};
 use crate::camera::Intrinsics;
 use crate::cloud::Cloud;
 use crate::geometry::{Pose, pose_from_matrix};
 
 const FILE: &str = "scene.toml";
 
-pub(super) const ENTRY: Entry = Entry {
+pub(super) const ENTRY: SceneFormat = SceneFormat {
     name: "toml",
     about: "anything else: a scene.toml, or the folder with it, that names images, poses, camera and \
             cloud (PLY, PCD, LAS, LAZ, XYZ)",

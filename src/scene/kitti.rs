@@ -10,10 +10,10 @@ use super::folder::{folder_name, numbered, warn_without_poses};
 use super::kitti_format::{Camera, Scans, labelled, optional, split_projection};
 use super::lines::TextFile;
 use super::pose_text::{PoseLines, by_line};
-use super::{Entry, Scene, SceneError, photo_file};
+use super::{Scene, SceneError, SceneFormat, photo_file};
 use crate::geometry::{Pose, matrix_from_pose};
 
-pub(super) const ENTRY: Entry = Entry {
+pub(super) const ENTRY: SceneFormat = SceneFormat {
     name: "kitti",
     about: "KITTI odometry: a folder sequences/NN, or one camera of it, sequences/NN/image_2",
     recognizes: |argument| {

@@ -20,9 +20,9 @@ use self::sweep::Sweep;
 use super::file_scene::{FileScene, Frame};
 use super::folder::{folder_name, numbered, split_word, warn_without_poses};
 use super::kitti_format::{Camera, Scans};
-use super::{Entry, Scene, SceneError, photo_file};
+use super::{Scene, SceneError, SceneFormat, photo_file};
 
-pub(super) const ENTRY: Entry = Entry {
+pub(super) const ENTRY: SceneFormat = SceneFormat {
     name: "kitti-raw",
     about: "KITTI raw: a drive's folder DATE/DATE_drive_NNNN_sync, or one camera of it, …/image_02; \
             :uncorrected keeps the distortion of the scans by motion",

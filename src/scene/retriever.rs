@@ -15,7 +15,7 @@ use crate::retrieval::{
     IndexError, Ranked, Retrieval, RetrievalParams, build,
 };
 use crate::trace::Cancelled;
-use posescope_core::files::user_cache_folder;
+use posescope_street::user_cache_folder;
 
 /// The extension of the files.
 const EXTENSION: &str = "posescope-index";

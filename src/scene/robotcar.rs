@@ -24,10 +24,10 @@ use super::file_scene::{Develop, FileScene, Frame};
 use super::folder::{folder_name, numbered, split_word, warn_without_poses};
 use super::lines::{Line, TextFile};
 use super::trajectory::Trajectory;
-use super::{Entry, Scene, SceneError, photo_file};
+use super::{Scene, SceneError, SceneFormat, photo_file};
 use crate::image::Photo;
 
-pub(super) const ENTRY: Entry = Entry {
+pub(super) const ENTRY: SceneFormat = SceneFormat {
     name: "robotcar",
     about: "Oxford RobotCar: a traversal's folder with stereo/centre or mono_rear, or one camera of it. The \
             SDK's models and extrinsics must be in it, next to it, or in sdk or robotcar-dataset-sdk there. \

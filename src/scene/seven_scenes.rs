@@ -16,11 +16,11 @@ use super::file_scene::{FileScene, Frame};
 use super::folder::{entries, folder_name, split_word};
 use super::lens::pinhole;
 use super::lines::TextFile;
-use super::{Entry, Scene, SceneError, photo_file};
+use super::{Scene, SceneError, SceneFormat, photo_file};
 use crate::camera::Intrinsics;
 use crate::geometry::{Pose, pose_from_matrix};
 
-pub(super) const ENTRY: Entry = Entry {
+pub(super) const ENTRY: SceneFormat = SceneFormat {
     name: "7scenes",
     about: "7-Scenes: a scene's folder with folders seq-NN (:train or :test selects a split), or one \
             folder seq-NN",

@@ -14,10 +14,10 @@ use super::lens::pinhole;
 use super::lines::TextFile;
 use super::pose_text::by_time;
 use super::trajectory::{Trajectory, associated};
-use super::{Entry, Scene, SceneError, photo_file};
+use super::{Scene, SceneError, SceneFormat, photo_file};
 use crate::camera::Intrinsics;
 
-pub(super) const ENTRY: Entry = Entry {
+pub(super) const ENTRY: SceneFormat = SceneFormat {
     name: "tum",
     about: "TUM RGB-D: a folder with rgb.txt, depth.txt and groundtruth.txt",
     recognizes: |argument| {

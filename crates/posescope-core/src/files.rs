@@ -1,11 +1,8 @@
-//! Writing files that are whole or not there, and where cached ones go.
+//! Writing files that are whole or not there.
 
-use std::env;
 use std::fs::File;
 use std::io::{self, Write as _};
-use std::path::{Path, PathBuf};
-
-use directories::ProjectDirs;
+use std::path::Path;
 
 /// Writes a file under a temporary name beside it, which begins with `tmp-` and ends with the same
 /// extension, and gives it its name when it is complete: no reader sees half of it, and a full disk
@@ -46,19 +43,6 @@ pub(crate) fn folder_of(path: &Path) -> &Path {
         Some(folder) if !folder.as_os_str().is_empty() => folder,
         _ => Path::new("."),
     }
-}
-
-/// Names the cache directory; empty turns caching off.
-const CACHE_VARIABLE: &str = "POSESCOPE_CACHE";
-
-/// The folder `name` of the user's cache directory, where the environment or else the system says;
-/// `None` where caching is turned off or the user has no cache directory.
-pub fn user_cache_folder(name: &str) -> Option<PathBuf> {
-    let folder = match env::var_os(CACHE_VARIABLE) {
-        Some(folder) => PathBuf::from(folder),
-        None => ProjectDirs::from("", "", "posescope")?.cache_dir().to_owned(),
-    };
-    (!folder.as_os_str().is_empty()).then(|| folder.join(name))
 }
 
 #[cfg(test)]

@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::geometry::{Pose, PoseError};
+
 /// The length that is to a scene what one metre is to the streets of the paper.
 ///
 /// A view changes with the ratio of a step to the distance of what is seen. So where everything is ten times nearer,
@@ -71,6 +73,14 @@ impl Scale {
     /// What is given per metre in the paper, per unit of length at this scale.
     pub fn per_length(self, paper_per_m: f64) -> f64 {
         if self.metre == 1.0 { paper_per_m } else { short(paper_per_m / self.metre) }
+    }
+
+    /// Whether two poses of a search are one: at one place and with one heading.
+    pub(crate) fn is_same_pose(self, a: &Pose, b: &Pose) -> bool {
+        const SAME_M: f64 = 0.3;
+        const SAME_DEG: f64 = 1.0;
+        let between = PoseError::between(a, b);
+        between.translation_m <= self.length(SAME_M) && between.rotation_deg <= SAME_DEG
     }
 
     /// Whether its length is one.

@@ -233,7 +233,7 @@ pub fn stem(name: &str) -> &str {
 }
 
 /// A format's place in the registry.
-pub struct SceneFrame {
+pub struct SceneFormat {
     /// The name that `--format` takes.
     pub name: &'static str,
     /// What a scene argument of this format looks like.

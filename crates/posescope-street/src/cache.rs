@@ -4,11 +4,13 @@
 //! neither is an error.
 
 mod disk;
+mod user_folder;
 
 use std::sync::Arc;
 
 pub(crate) use disk::DiskCache;
 use posescope_core::recent::Recent;
+pub use user_folder::user_cache_folder;
 
 /// A value that can be kept as bytes.
 pub(crate) trait Stored: Sized {

@@ -13,10 +13,10 @@ use posescope_core::camera::Intrinsics;
 use posescope_core::cloud::Cloud;
 use posescope_core::geometry::Pose;
 use posescope_core::image::Photo;
-use posescope_core::scene::{Scene, SceneError, SceneFrame, fingerprint};
+use posescope_core::scene::{Scene, SceneError, SceneFormat, fingerprint};
 
 /// The street among the scene formats.
-pub const ENTRY: SceneFrame = SceneFrame {
+pub const ENTRY: SceneFormat = SceneFormat {
     name: "street",
     about: "the built-in street: street, or one of its conditions such as street:night",
     recognizes: |argument| argument.split(':').next() == Some(NAME),

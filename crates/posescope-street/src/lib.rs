@@ -48,6 +48,7 @@ mod walls;
 mod weather;
 mod world;
 
+pub use cache::user_cache_folder;
 pub use condition::Condition;
 pub use dataset::{ENTRY, Street, WORLD_SEED};
 pub use lidar::ScanPoint;

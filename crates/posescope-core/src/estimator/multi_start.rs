@@ -19,13 +19,14 @@ pub use params::MultiStartParams;
 
 use super::{Answered, CostSummary, Failure, Halt};
 use crate::event::{Moment, PhaseSearched, PoseScored, Stage, StartsRefined, ViewRendered};
-use crate::geometry::{Pose, PoseError};
+use crate::geometry::Pose;
 use crate::grid::{GridParams, Lattice, Offset, Phase, Scored, ScoredLattice, scan};
 use crate::params::Params;
 use crate::problem::Problem;
 use crate::render::{Comparison, Objective, Score};
 use crate::scale::Scale;
 use crate::search::{CrossEntropy, Freedoms, PatternSearch, Refined, Start};
+use crate::stats::upper_median;
 use crate::trace::{Cancelled, Trace};
 
 /// The step below which the refinement of all starts ends, before the best go on in six freedoms \[m\], at the
@@ -34,11 +35,6 @@ const PLANE_LAST_M: f64 = 0.05;
 
 /// At least so many minima are followed to the end: the answer, and what it is compared with.
 const MIN_REFINED: usize = 5;
-
-/// Starts nearer to each other than this are one, unless their headings differ \[m\], at the paper's scale.
-const SAME_M: f64 = 0.3;
-/// Starts whose headings differ by less are one where they are at one place.
-const SAME_DEG: f64 = 1.0;
 
 /// The multi-start search.
 pub(super) struct MultiStart {
@@ -71,9 +67,9 @@ impl Spread {
     pub(super) fn of(surfaces: &[Arc<ScoredLattice>]) -> Self {
         let cells = surfaces.iter().flat_map(|surface| surface.eligible());
         let mut costs: Vec<f64> = cells.map(|(_, cost)| cost).collect();
-        let median = middle(&mut costs);
+        let median = upper_median(&mut costs);
         let mut away: Vec<f64> = costs.iter().map(|cost| (cost - median).abs()).collect();
-        Self { median, deviation: 1.4826 * middle(&mut away) }
+        Self { median, deviation: 1.4826 * upper_median(&mut away) }
     }
 
     /// How far a cost is below the middle, in standard deviations.
@@ -91,11 +87,6 @@ impl Spread {
 /// costs of its coarse positions.
 pub(crate) fn prior_penalty(params: &Params, coarse: &[Arc<ScoredLattice>], pose: &Pose) -> f64 {
     MultiStart::new(params).map_cost(&Spread::of(coarse), pose, 0.0)
-}
-
-fn middle(values: &mut [f64]) -> f64 {
-    values.sort_unstable_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
 }
 
 impl MultiStart {
@@ -416,8 +407,7 @@ impl MultiStart {
     }
 
     fn is_apart(&self, a: &Pose, b: &Pose) -> bool {
-        let between = PoseError::between(a, b);
-        between.translation_m > self.scale.length(SAME_M) || between.rotation_deg > SAME_DEG
+        !self.scale.is_same_pose(a, b)
     }
 }
 
@@ -428,7 +418,7 @@ mod tests {
     use super::*;
     use crate::camera::Intrinsics;
     use crate::cloud::Cloud;
-    use crate::geometry::yaw;
+    use crate::geometry::{PoseError, yaw};
     use crate::image::Photo;
     use crate::problem::{Query, ReferenceTuple};
 

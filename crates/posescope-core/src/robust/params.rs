@@ -1,7 +1,5 @@
 //! MLESAC's parameters, and how many correspondences make a sample.
 
-use serde::{Deserialize, Serialize};
-
 use crate::describe::parameters;
 use crate::solver::{Loss, LossShape};
 
@@ -18,8 +16,7 @@ parameters! {
     /// with 1 px of noise and 10 to 70 % true matches out of 200 and 1,000: fewer than 100 trials at
     /// least (50) and more rounds of EM (8) change nothing that can be measured; for Gaussian noise
     /// the Huber loss at 1.5 px costs 2 % of accuracy against least squares, Cauchy at 2 px 5 %.
-    #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-    #[serde(default)]
+    #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct MlesacParams {
         /// MLESAC: σ, the noise of a true match along each image axis.
         pub sigma_px: f64 = 1.0 => number("sigma", "px", 0.05..=20.0),

@@ -1,7 +1,5 @@
 //! Robust losses: the influence of large residuals.
 
-use serde::{Deserialize, Serialize};
-
 use crate::describe::choice;
 
 /// A loss `ρ(r²)` on the squared length of a residual, about `r²` for small residuals.
@@ -9,8 +7,7 @@ use crate::describe::choice;
 /// Minimising `Σ ρ(rᵢ²)` is, step by step, weighted least squares with the weights
 /// `w(r²) = dρ/d(r²)` (Huber, *Robust Statistics*, 1981; Zhang, *Parameter Estimation
 /// Techniques*, Image and Vision Computing 1997, table 1). The scales are in the unit of `r`.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Loss {
     /// `r²`: least squares, every residual counts in full.
     Squared,
@@ -21,8 +18,7 @@ pub enum Loss {
 }
 
 /// The shape of a [`Loss`], without its scale.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LossShape {
     /// [`Loss::Squared`].
     Squared,

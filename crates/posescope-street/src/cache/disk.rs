@@ -8,8 +8,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::SystemTime;
 use std::{fs, io};
 
-use posescope_core::files::{user_cache_folder, write_whole};
+use posescope_core::files::write_whole;
 use xxhash_rust::xxh3::{xxh3_64, xxh3_64_with_seed};
+
+use super::user_folder::user_cache_folder;
 
 /// Only files with this extension are ever read, counted or removed, so that a folder named by
 /// mistake loses nothing.

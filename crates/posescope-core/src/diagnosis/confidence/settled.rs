@@ -5,10 +5,7 @@ use crate::diagnosis::Evidence;
 use crate::estimator::Outcome;
 use crate::geometry::{Pose, PoseError};
 use crate::grid::Phase;
-
-/// Refined poses no farther apart are at one place.
-const SAME_M: f64 = 0.3;
-const SAME_DEG: f64 = 1.0;
+use crate::scale::Scale;
 
 /// A pose this far from the answer speaks against it \[m\].
 const ELSEWHERE_M: f64 = 1.0;
@@ -71,9 +68,9 @@ impl FeaturesSay {
     }
 }
 
+/// Confidences are of scenes at the paper's scale.
 fn is_same(a: &Pose, b: &Pose) -> bool {
-    let apart = PoseError::between(a, b);
-    apart.translation_m <= SAME_M && apart.rotation_deg <= SAME_DEG
+    Scale::PAPER.is_same_pose(a, b)
 }
 
 #[cfg(test)]

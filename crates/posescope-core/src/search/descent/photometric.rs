@@ -8,6 +8,7 @@ use basin::{
 };
 
 use super::{Step, View};
+use crate::stats::upper_median;
 
 /// Median absolute deviation to standard deviation, for Gaussian noise.
 const TO_DEVIATION: f64 = 1.4826;
@@ -36,8 +37,7 @@ impl<'a> Differences<'a> {
             .zip(&view.values)
             .filter_map(|(seen, value)| Some((seen.as_ref()?.0 - value).abs()))
             .collect();
-        sizes.sort_unstable_by(f64::total_cmp);
-        let median = sizes.get(sizes.len() / 2).copied().unwrap_or(0.0);
+        let median = upper_median(&mut sizes);
         // Of equal photos nothing differs; a grey value is what a photo resolves.
         let deviation = (TO_DEVIATION * median).max(1.0);
         let differences = Self { view, out_of_view: deviation };
