@@ -269,3 +269,70 @@ pub(crate) fn verified(geometry: &Geometry) -> String {
 fn cost(cost: Option<f64>) -> String {
     cost.map_or("none".to_owned(), |cost| format!("{cost:.4}"))
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::event::Kind;
+    use crate::fusion::Fusion;
+    use crate::history::History;
+    use crate::localize::{LocalizeError, LocalizeObserver, Localizer, Request};
+    use crate::params::Params;
+    use crate::retrieval::ReferenceRanking;
+    use crate::scene;
+    use crate::trace::{Cancelled, Record, Sink};
+    use crate::{Method, estimator};
+
+    /// What is too frequent for a sentence, or has a place of its own in every log.
+    const SILENT: &[Kind] = &[Kind::StageStarted, Kind::StageEnded, Kind::PoseScored];
+
+    #[derive(Default)]
+    struct Kept(History);
+
+    impl Sink for Kept {
+        fn accept(&mut self, record: &Record) -> Result<(), Cancelled> {
+            self.0.accept(record)
+        }
+    }
+
+    impl LocalizeObserver for Kept {}
+
+    #[test]
+    fn every_event_has_a_sentence_or_is_named_as_silent() {
+        let scene = scene::open("street", None).expect("the built-in street");
+        let mut descent = Params::default();
+        descent.set("pm.search", "descent").expect("a search");
+        let mut kept = Kept::default();
+        let all: Vec<Method> = estimator::methods().collect();
+        for (params, methods) in [(Params::default(), &all[..]), (descent, &[Method::PM])] {
+            let localizer = Localizer::new(scene.as_ref(), scene.as_ref(), &params, 0);
+            let request = Request {
+                radius_m: 5.0,
+                references: vec![1, 2].into(),
+                fusions: vec![Fusion::default()],
+                setting: None,
+            };
+            localizer
+                .localize(0, 0, &[request], methods, &mut kept, |_, _| Ok::<(), LocalizeError>(()))
+                .expect("nobody stops it");
+        }
+        let mut events: Vec<&Event> = kept.0.events().collect();
+        let ranking = ReferenceRanking {
+            criterion: Criterion::Words,
+            candidates: 0,
+            chosen: 0,
+            frames: Vec::new(),
+        };
+        let ranked = ReferencesRanked { ranking: Arc::new(ranking), photos: Vec::new().into() };
+        let ranked = Event::from(ranked);
+        events.push(&ranked);
+        for &kind in Kind::ALL {
+            let of_kind = events.iter().filter(|event| event.kind() == kind);
+            let is_told = of_kind.clone().any(|event| sentence(event).is_some());
+            assert!(of_kind.count() > 0, "no {kind:?} was emitted");
+            assert_ne!(is_told, SILENT.contains(&kind), "{kind:?}");
+        }
+    }
+}

@@ -85,8 +85,10 @@ fn method(is_named: bool, methods: &[Method]) -> Result<Method, CliError> {
 }
 
 fn no_cost(method: Method) -> CliError {
+    let names: Vec<&str> = cost::ALL.iter().map(|cost| cost.name).collect();
     CliError::Usage(format!(
-        "--surface: {method} has no cost on a grid; use --method pm, mi or nid"
+        "--surface: {method} has no cost on a grid; use --method {}",
+        names.join(" or ")
     ))
 }
 

@@ -127,6 +127,31 @@ fn pictures(kept: &Kept, result: &QueryResult) -> Vec<(&'static str, ProofPictur
     drawn.collect()
 }
 
+/// Recordings, reports and the window keep [`KINDS`] alone.
+#[test]
+fn every_proof_is_drawn_from_the_events_that_are_kept_as_from_all() {
+    for name in ["fb", "mi", "fb2", "robust"] {
+        let (mut kept, result) = neighbours(name.parse().expect("a method"));
+        let titles = |kept: &Kept| {
+            let drawn = pictures(kept, &result).into_iter();
+            let titles = drawn.map(|(code, picture)| {
+                (code, picture.panels().map(|panel| panel.title.clone()).collect::<Vec<_>>())
+            });
+            titles.collect::<Vec<_>>()
+        };
+        let from_all = titles(&kept);
+        let records = kept.history.records().iter().cloned();
+        let is_stage =
+            |record: &Record| [Kind::StageStarted, Kind::StageEnded].contains(&record.event.kind());
+        let mut few = History::default();
+        records
+            .filter(|record| is_stage(record) || KINDS.contains(record.event.kind()))
+            .for_each(|record| few.push(record));
+        kept.history = few;
+        assert_eq!(titles(&kept), from_all, "{name}");
+    }
+}
+
 /// Where nothing was matched, both photos show what was found in them.
 #[test]
 fn keypoints_without_matches_have_a_picture() {

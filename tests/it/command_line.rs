@@ -44,7 +44,7 @@ fn usage_errors_have_exit_code_2_and_name_the_next_step() {
     let table = "
         --query 5 --set fb.ratoi=0.7 | did you mean `fb.ratio`
         --query 5 --set fb.ratio=7 | 0.1 … 1
-        --query 5 --method xx | fb, pm, mi, hy, fb2, mi6, nid or robust
+        --query 5 --method xx | `xx` is no method; fb, pm, mi, hy, 
         --query 5 --reference best:1 | random:K, nearest:K
         --query 5 --radius -1 | a positive number
         --query 5 --radius=1,2 | takes one value here

@@ -5,6 +5,7 @@ use egui::accesskit::Role;
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
 use posescope::app::{App, Setup};
+use posescope::estimator;
 use posescope::method::Method;
 use posescope::session::{Part, RunMode};
 
@@ -81,11 +82,10 @@ fn the_canvas_has_the_room_and_the_toolbar_is_one_line_at_every_size() {
 }
 
 #[test]
-fn eight_methods_and_three_references_have_their_places() {
-    let names = ["fb", "pm", "mi", "hy", "mi6", "fb2", "robust", "nid"];
+fn all_methods_and_three_references_have_their_places() {
+    let methods: Vec<Method> = estimator::methods().collect();
     let mut setup = setup();
-    setup.task.protocol.methods =
-        names.map(|name| name.parse::<Method>().expect("a method")).to_vec();
+    setup.task.protocol.methods.clone_from(&methods);
     setup.chosen = vec![0, 2].into();
     let mut window = window(SIZES[0].0, setup);
     for (size, _) in SIZES {
@@ -93,8 +93,8 @@ fn eight_methods_and_three_references_have_their_places() {
         window.run_steps(3);
         let whole = Rect::from_min_size(egui::Pos2::ZERO, size.into());
         let mut cells: Vec<Rect> = Vec::new();
-        for name in names {
-            let label = name.to_uppercase();
+        for method in &methods {
+            let label = method.name().to_uppercase();
             let label = format!("{label}: ");
             let mut found = window.query_all_by_label_contains(&label);
             let cell = found.next().unwrap_or_else(|| panic!("{label} at {size:?}"));

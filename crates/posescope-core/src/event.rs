@@ -169,6 +169,12 @@ macro_rules! events {
         #[non_exhaustive]
         pub enum Kind { $($name),+ }
 
+        impl Kind {
+            /// Every kind.
+            #[doc(hidden)]
+            pub const ALL: &[Self] = &[$(Self::$name),+];
+        }
+
         impl Event {
             /// The kind of this event.
             pub fn kind(&self) -> Kind {

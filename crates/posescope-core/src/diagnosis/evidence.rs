@@ -61,52 +61,46 @@ impl Evidence {
     }
 }
 
-impl Sink for Evidence {
-    fn wanted(&self) -> KindSet {
-        KindSet::of(&[
-            Kind::FeaturesDetected,
-            Kind::MatchesDecided,
-            Kind::DepthsLifted,
-            Kind::MatchesGuided,
-            Kind::PoseRefined,
-            Kind::ConsensusJudged,
-            Kind::FeaturesClassified,
-            Kind::PhaseSearched,
-            Kind::MinimumAssessed,
-            Kind::StartsRefined,
-            Kind::CandidatesJudged,
-        ])
-    }
+/// The events that are kept, and where: what the sink wants is what it keeps.
+macro_rules! kept {
+    ($evidence:ident: $($event:ident($payload:ident) => $keep:expr),+ $(,)?) => {
+        impl Sink for Evidence {
+            fn wanted(&self) -> KindSet {
+                KindSet::of(&[$(Kind::$event),+])
+            }
 
-    fn accept(&mut self, record: &Record) -> Result<(), Cancelled> {
-        match &record.event {
-            Event::FeaturesDetected(detected) => {
-                let features = Some(Arc::clone(&detected.features));
-                match detected.side {
-                    Side::Query => self.query = features,
-                    Side::Reference => self.reference = features,
+            fn accept(&mut self, record: &Record) -> Result<(), Cancelled> {
+                let $evidence = self;
+                match &record.event {
+                    $(Event::$event($payload) => $keep,)+
+                    _ => {}
                 }
+                Ok(())
             }
-            Event::MatchesDecided(matches) => {
-                self.decisions = Some(Arc::clone(&matches.decisions));
-            }
-            Event::DepthsLifted(depths) => self.lifted = Some(Arc::clone(&depths.matches)),
-            Event::MatchesGuided(guided) => self.rematched = Some(Arc::clone(&guided.matches)),
-            Event::PoseRefined(refined) => self.refined = Some(refined.clone()),
-            Event::ConsensusJudged(judged) => self.judged = Some(judged.clone()),
-            Event::FeaturesClassified(classified) => {
-                self.states = Some(Arc::clone(&classified.states));
-            }
-            Event::PhaseSearched(searched) => self.surfaces.push(Arc::clone(&searched.surface)),
-            Event::MinimumAssessed(minimum) => self.minimum = Some(*minimum),
-            Event::StartsRefined(starts) if starts.freedoms == Freedoms::Six => {
-                self.settled = Some(Arc::clone(&starts.refinements));
-            }
-            Event::CandidatesJudged(judged) => {
-                self.candidates = Some(Arc::clone(&judged.candidates));
-            }
-            _ => {}
         }
-        Ok(())
-    }
+    };
 }
+
+kept!(evidence:
+    FeaturesDetected(detected) => {
+        let features = Some(Arc::clone(&detected.features));
+        match detected.side {
+            Side::Query => evidence.query = features,
+            Side::Reference => evidence.reference = features,
+        }
+    },
+    MatchesDecided(matches) => evidence.decisions = Some(Arc::clone(&matches.decisions)),
+    DepthsLifted(depths) => evidence.lifted = Some(Arc::clone(&depths.matches)),
+    MatchesGuided(guided) => evidence.rematched = Some(Arc::clone(&guided.matches)),
+    PoseRefined(refined) => evidence.refined = Some(refined.clone()),
+    ConsensusJudged(judged) => evidence.judged = Some(judged.clone()),
+    FeaturesClassified(classified) => evidence.states = Some(Arc::clone(&classified.states)),
+    PhaseSearched(searched) => evidence.surfaces.push(Arc::clone(&searched.surface)),
+    MinimumAssessed(minimum) => evidence.minimum = Some(*minimum),
+    StartsRefined(starts) => {
+        if starts.freedoms == Freedoms::Six {
+            evidence.settled = Some(Arc::clone(&starts.refinements));
+        }
+    },
+    CandidatesJudged(judged) => evidence.candidates = Some(Arc::clone(&judged.candidates)),
+);
