@@ -23,8 +23,8 @@ use crate::search::compass::compass_search;
 use crate::search::moved;
 use crate::stats::mean_and_squares;
 
-/// The method whose cost judges the poses of other systems: it bears the greatest changes of appearance.
-pub(super) const JUDGE: Method = Method::MI;
+/// The method by whose cost the poses of other systems are compared: it bears the greatest changes of appearance.
+pub(super) const COST_OF_GIVEN: Method = Method::MI;
 
 /// Coarse minima beside the result from which the cost is descended, to see whether a better search
 /// would have found the truth or only another wrong place.
@@ -100,19 +100,19 @@ pub(super) struct FinishedSearch<'a> {
     pub(super) result_cost: Option<f64>,
     /// Pixels that a pose must cover.
     pub(super) least_covered: u32,
-    /// The method whose cost judges another system's pose.
-    pub(super) judge: Option<Method>,
+    /// The method by whose cost another system's pose is compared.
+    pub(super) compared_by: Option<Method>,
     near_truth: OnceLock<Option<PoseCost>>,
     rivals: OnceLock<Option<Rivals>>,
     /// What was shuffled already: several rules ask for the same poses.
     against_chance: Mutex<Vec<(Offset, Option<AgainstChance>)>>,
 }
 
-/// The estimator whose cost is compared at the result and the truth: that of the method, or of [`JUDGE`].
+/// The estimator whose cost is compared at the result and the truth: that of the method, or of [`COST_OF_GIVEN`].
 pub(super) fn estimator_of(subject: &Subject<'_>, family: Family) -> Option<Box<dyn Estimator>> {
     let method = match family {
         Family::Grid => confidence::responsible(subject.method, subject.outcome),
-        Family::Given => JUDGE,
+        Family::Given => COST_OF_GIVEN,
         Family::Features | Family::Guided | Family::MultiStart | Family::Descent => return None,
     };
     Some(estimator::find(method)?.make(subject.params))
@@ -138,7 +138,7 @@ impl<'a> FinishedSearch<'a> {
             result,
             result_cost,
             least_covered,
-            judge: is_given.then_some(JUDGE),
+            compared_by: is_given.then_some(COST_OF_GIVEN),
             near_truth: OnceLock::new(),
             rivals: OnceLock::new(),
             against_chance: Mutex::default(),

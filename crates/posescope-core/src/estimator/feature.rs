@@ -74,7 +74,7 @@ impl Estimator for FeatureBased {
     }
 }
 
-/// What FB makes of a problem, and the pose that it judged.
+/// What FB makes of a problem, and the pose that it accepted or refused.
 pub(super) struct Proposal {
     /// The answer.
     pub(super) outcome: Outcome,
@@ -223,7 +223,7 @@ impl FeatureBased {
         *counts = states.counts(reference.keypoints.len());
         *agreed = Some(best.pose.inverse());
         trace.stage(Stage::Accept, |trace| {
-            self.judged(&best.pose.inverse(), &beyond, problem, trace)
+            self.accepted(&best.pose.inverse(), &beyond, problem, trace)
         })
     }
 

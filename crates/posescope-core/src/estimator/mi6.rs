@@ -44,7 +44,7 @@ pub(super) fn shown() -> &'static cost::CostEntry {
 }
 
 /// Why no graphics card takes what the judge scores.
-pub(super) const JUDGED: &str = "compares more than grey values";
+pub(super) const SEVERAL_CHANNELS: &str = "compares more than grey values";
 
 /// The search in six freedoms.
 pub struct Mi6 {
@@ -98,7 +98,7 @@ impl Mi6 {
 
 impl Estimator for Mi6 {
     fn estimate(&self, problem: &Problem, trace: &mut Trace<'_>) -> Result<Outcome, Cancelled> {
-        leave_out(METHOD, JUDGED);
+        leave_out(METHOD, SEVERAL_CHANNELS);
         let found = trace.stage(Stage::Estimator(METHOD), |trace| {
             self.search(problem, &self.level(problem, 1), trace)
         });

@@ -13,7 +13,7 @@ use std::sync::Arc;
 pub use params::RobustParams;
 
 use super::feature::Proposal;
-use super::mi6::{self, JUDGED, shown};
+use super::mi6::{self, SEVERAL_CHANNELS, shown};
 use super::multi_start::Found;
 use super::{
     CostSummary, Entry, Estimator, Failure, Family, FeatureBased, Halt, Mi6, Outcome, fb2,
@@ -77,7 +77,7 @@ impl Robust {
         trace.stage(Stage::Judge, |trace| {
             let Found { refined, summary, spread } = match found {
                 Ok(found) => found,
-                Err(failure) => return unjudged(problem, proposals, failure, trace),
+                Err(failure) => return without_search(problem, proposals, failure, trace),
             };
             let mut candidates: Vec<JudgedPose> = refined
                 .iter()
@@ -140,7 +140,7 @@ impl Robust {
 }
 
 /// Where nothing can be searched, the features' accepted pose stands as it is.
-fn unjudged(
+fn without_search(
     problem: &Problem,
     proposals: &[(Method, Proposal)],
     failure: Failure,
@@ -181,7 +181,7 @@ fn why(candidates: &[JudgedPose]) -> String {
 
 impl Estimator for Robust {
     fn estimate(&self, problem: &Problem, trace: &mut Trace<'_>) -> Result<Outcome, Cancelled> {
-        leave_out(METHOD, JUDGED);
+        leave_out(METHOD, SEVERAL_CHANNELS);
         trace.stage(Stage::Estimator(METHOD), |trace| {
             let proposals = [
                 (Method::FB, self.feature.propose(problem, trace)?),

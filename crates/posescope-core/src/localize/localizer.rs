@@ -1,9 +1,9 @@
 //! Localises queries: against each reference alone, then fused if asked. Single queries, experiments and
 //! the window all go this way.
 
+mod assess;
 mod explain;
 mod fuse;
-mod judge;
 mod work;
 
 use std::collections::BTreeMap;
@@ -263,7 +263,8 @@ impl<'a> Localizer<'a> {
                         if request.fusions.is_empty() { vec![None] } else { fusions.collect() };
                     for fusion in lines {
                         let result = self.of_pose(work, method, fusion, Err(&failure));
-                        let result = self.with_ranking_judged(result, request, work.truth.as_ref());
+                        let result =
+                            self.with_ranking_assessed(result, request, work.truth.as_ref());
                         emit(result, StageTimes::default(), request.clone())?;
                     }
                     continue;
@@ -274,7 +275,8 @@ impl<'a> Localizer<'a> {
                         (request.fusions.is_empty(), work.candidate(problem, method))
                     {
                         let result = candidate.result.clone();
-                        let result = self.with_ranking_judged(result, request, work.truth.as_ref());
+                        let result =
+                            self.with_ranking_assessed(result, request, work.truth.as_ref());
                         let asked = work.asked_alone(problem);
                         emit(result, candidate.times.clone(), asked)?;
                     }
@@ -395,12 +397,12 @@ impl<'a> Localizer<'a> {
                 // A fallback has the verdicts of the method that it fell back to.
                 let verdicts = outcome.fell_back.then(|| direct.result.diagnosis.clone());
                 let estimated = Estimated { outcome, evidence, times, verdicts };
-                self.judged(work, problem, method, estimated)
+                self.assessed(work, problem, method, estimated)
             }
             None => self.estimate(work, problem, method, observer)?,
         };
         let mut reported =
-            self.with_ranking_judged(candidate.result.clone(), request, work.truth.as_ref());
+            self.with_ranking_assessed(candidate.result.clone(), request, work.truth.as_ref());
         reported.put_into_words_of(self.params.scale.unit());
         observer.end_method(&reported, &candidate.times);
         let of_method = work.candidates.entry(method).or_default();
@@ -432,7 +434,7 @@ impl<'a> Localizer<'a> {
         };
         let estimated =
             Estimated { outcome, evidence, times: timings.into_times(), verdicts: None };
-        Ok(self.judged(work, problem, method, estimated))
+        Ok(self.assessed(work, problem, method, estimated))
     }
 
     /// What a method answers. A hybrid falls back where the pose of its first method is refused for a low

@@ -48,7 +48,7 @@ impl AcceptanceRule {
 /// The verdict of [`inliers_beyond_chance`].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Acceptance {
-    /// The inliers judged.
+    /// The inliers that were counted.
     pub inliers: usize,
     /// Logarithm to base ten of the number of false alarms: of the poses with as many inliers
     /// that false matches alone are expected to give.
@@ -87,7 +87,7 @@ pub fn inliers_beyond_chance(
     area_px: f64,
 ) -> Acceptance {
     let chance = (PI * threshold_px * threshold_px / area_px).min(1.0);
-    judged(inliers, correspondences, correspondences, chance)
+    accepted(inliers, correspondences, correspondences, chance)
 }
 
 /// As [`inliers_beyond_chance`], of places in the query instead of correspondences, so that none that
@@ -117,12 +117,12 @@ pub fn places_beyond_chance(
         })
         .sum();
     let chance = any / places.count().max(1) as f64;
-    judged(places.of_some(inliers), places.count(), places.of.len(), chance)
+    accepted(places.of_some(inliers), places.count(), places.of.len(), chance)
 }
 
 /// The verdict on the inliers among `count` that agree with a pose by chance each by itself, where samples are
 /// drawn from `tested` correspondences.
-fn judged(inliers: usize, count: usize, tested: usize, chance: f64) -> Acceptance {
+fn accepted(inliers: usize, count: usize, tested: usize, chance: f64) -> Acceptance {
     // log₁₀ (4 C(tested, 3) · P[B(n − 3, p) ≥ k − 3]).
     let log10_nfa = |k: usize| {
         let tests = (MAX_SOLUTIONS as f64).ln() + ln_binomial(tested, SAMPLE);

@@ -36,7 +36,7 @@ fn test(case: &Case<'_>) -> Option<Diagnosis> {
 /// At another system's pose, next to nothing of the reference's cloud is in view.
 fn out_of_view(search: &FinishedSearch<'_>) -> Diagnosis {
     RULE.found(&OutOfView {
-        judge: search.judge.map(|method| method.name()),
+        judge: search.compared_by.map(|method| method.name()),
         covered: search.covered(&search.result),
         covered_at_reference: search.covered(&Default::default()),
     })
@@ -59,7 +59,7 @@ fn too_few_pixels(search: &FinishedSearch<'_>) -> Option<Diagnosis> {
     let gain_at_result = search.gain(&rivals.winner.offset)?;
     (gain_at_result + MORE_GAIN < gain_at_truth).then(|| {
         RULE.found(&TooFewPixels {
-            judge: search.judge.map(|method| method.name()),
+            judge: search.compared_by.map(|method| method.name()),
             covered_at_result: at_result,
             covered_at_truth: at_truth,
             gain_at_result,

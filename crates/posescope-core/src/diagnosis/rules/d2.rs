@@ -22,7 +22,7 @@ fn test(case: &Case<'_>) -> Option<Diagnosis> {
 
 /// Tried last of all causes, it holds wherever none of the others ended the list.
 fn by_grid(search: &FinishedSearch<'_>) -> Option<Diagnosis> {
-    let judge = search.judge.map(|method| method.name());
+    let judge = search.compared_by.map(|method| method.name());
     let cost_at_result = search.result_cost?;
     let Some(rivals) = search.rivals() else {
         // Where the truth is out of a search's reach, its own cost still says which of both is preferred.

@@ -100,7 +100,11 @@ fn by_given(search: &FinishedSearch<'_>) -> Option<Diagnosis> {
         Some(rivals) => rivals.is_missed.then_some(rivals.near.cost)?,
         None => search.cost_at_truth().filter(|cost| *cost < cost_at_result)?,
     };
-    Some(RULE.found(&CheaperTruth { judge: search.judge?.name(), cost_near_truth, cost_at_result }))
+    Some(RULE.found(&CheaperTruth {
+        judge: search.compared_by?.name(),
+        cost_near_truth,
+        cost_at_result,
+    }))
 }
 
 evidence!(CheaperTruth { judge: &'static str, cost_near_truth: f64, cost_at_result: f64 } => {

@@ -19,7 +19,7 @@ fn test(case: &Case<'_>) -> Option<Diagnosis> {
     let rivals = search.rivals().filter(|rivals| rivals.is_changed)?;
     let against = search.against_chance(&rivals.near.offset)?;
     Some(RULE.found(&Changed {
-        judge: search.judge.map(|method| method.name()),
+        judge: search.compared_by.map(|method| method.name()),
         cost_near_truth: rivals.near.cost,
         chance_level: against.mean,
         chance_deviation: against.deviation,

@@ -43,7 +43,7 @@ fn found(
     won: Option<(f64, f64)>,
 ) -> Diagnosis {
     RULE.found(&Frozen {
-        judge: search.judge.map(|method| method.name()),
+        judge: search.compared_by.map(|method| method.name()),
         height_m: -search.truth.translation.y,
         frozen_error,
         cost_in_six_freedoms: won.map(|(best, _)| best),

@@ -128,7 +128,7 @@ impl FeatureBased {
     ///
     /// # Errors
     /// [`Failure::ChanceConsensus`], [`Failure::OutsideRadius`], or a run that was cancelled.
-    pub(in crate::estimator) fn judged(
+    pub(in crate::estimator) fn accepted(
         &self,
         reference_from_query: &Pose,
         &BeyondChance { acceptance, tested, counted }: &BeyondChance,

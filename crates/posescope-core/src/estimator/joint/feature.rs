@@ -80,7 +80,7 @@ impl FeatureBased {
             .unwrap_or_default();
         let nearest = references[most].problem;
         let reference_from_query = between(nearest, lead) * consensus.pose.inverse();
-        let pose = self.judged(&reference_from_query, &beyond, nearest, &mut Trace::off())?;
+        let pose = self.accepted(&reference_from_query, &beyond, nearest, &mut Trace::off())?;
         Ok((pose, supports))
     }
 }

@@ -110,7 +110,7 @@ impl Localizer<'_> {
             ),
             ..self.of_pose(work, method, Some(fusion), pose.as_ref())
         };
-        let mut result = self.with_ranking_judged(result, request, truth);
+        let mut result = self.with_ranking_assessed(result, request, truth);
         result.put_into_words_of(self.params.scale.unit());
         observer.end_fusion(&result);
         let own = own.into_times();

@@ -10,7 +10,7 @@ use crate::localize::{Agreement, QueryResult, References, StageTimes};
 use crate::method::Method;
 use crate::problem::{Problem, Query};
 
-/// What an estimator answered, before it is judged.
+/// What an estimator answered, before it is assessed.
 pub(super) struct Estimated {
     /// The answer.
     pub(super) outcome: Outcome,
@@ -30,7 +30,7 @@ pub(super) struct MethodOutcome {
     pub(super) outcome: Outcome,
     /// The events of the estimator.
     pub(super) evidence: Evidence,
-    /// The outcome measured and judged.
+    /// The outcome measured and assessed.
     pub(super) result: QueryResult,
     /// How long its stages took.
     pub(super) times: StageTimes,

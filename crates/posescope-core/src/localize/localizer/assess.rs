@@ -1,4 +1,4 @@
-//! Judging what a method answered: is its pose accepted, and what is wrong with it?
+//! Assessing what a method answered: is its pose accepted, and what is wrong with it?
 
 use super::work::{Estimated, MethodOutcome, QueryWork};
 use super::{Localizer, Request};
@@ -10,7 +10,7 @@ use crate::scene::Scene;
 
 impl Localizer<'_> {
     /// A result that is not right because retrieval found another place says so first.
-    pub(super) fn with_ranking_judged(
+    pub(super) fn with_ranking_assessed(
         &self,
         mut result: QueryResult,
         request: &Request,
@@ -27,7 +27,7 @@ impl Localizer<'_> {
     }
 
     /// Refuses a pose of too low a confidence, and assesses the result.
-    pub(super) fn judged(
+    pub(super) fn assessed(
         &self,
         work: &QueryWork<'_>,
         problem: usize,
