@@ -311,7 +311,7 @@ mod tests {
             let request = Request {
                 radius_m: 5.0,
                 references: vec![1, 2].into(),
-                fusions: vec![Fusion::default()],
+                fusions: Fusion::all().take(1).collect(),
                 setting: None,
             };
             localizer

@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use posescope::diagnosis::{Family, RULES};
+use posescope::estimator;
 use posescope::params::Params;
-use posescope::{cost, estimator};
 use pulldown_cmark::{Event, Parser, Tag, TagEnd};
 
 fn documents() -> Vec<PathBuf> {

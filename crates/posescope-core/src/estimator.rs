@@ -251,7 +251,7 @@ impl Entry {
             key.strip_prefix(*group).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
         };
         let mut parts = self.told_by().into_iter().filter(|part| *part != self.method);
-        of_search.iter().chain(&self.groups).any(|group| is_of(group))
+        of_search.iter().chain(&self.groups).any(is_of)
             || parts.any(|part| entry(part).reads(params, key))
     }
 
