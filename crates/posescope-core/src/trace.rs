@@ -20,6 +20,7 @@
 //! in a run without a sink. A sink may block, which pauses the run, or return [`Cancelled`], which `?`
 //! carries out of the estimator. Listening never changes the answer.
 
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use arrayvec::ArrayVec;
@@ -42,7 +43,8 @@ pub type OpenMethods = ArrayVec<Method, MAX_METHODS>;
 #[derive(Clone, Debug, serde::Serialize)]
 #[non_exhaustive]
 pub struct Record {
-    /// Position among the events of the run, from 0. Events that no sink wants count too.
+    /// Position among the events of the run, from 0. Events that no sink wants count too, except those that a run emits
+    /// only if a sink wants them: what an earlier run has computed already, and pictures beside the search.
     pub index: u64,
     /// How many stages are open around the event; a stage's own start and end count it.
     pub depth: usize,
@@ -166,7 +168,8 @@ impl<'a> Trace<'a> {
         }
     }
 
-    /// Runs `body` as a named part of the estimator, which an observer can step over and out of.
+    /// Runs `body` as a named part of the estimator, which an observer can step over and out of. A panic in `body` ends the
+    /// stage and goes on.
     ///
     /// # Errors
     /// The errors of `body`, and [`Cancelled`].
@@ -175,23 +178,26 @@ impl<'a> Trace<'a> {
         stage: Stage,
         body: impl FnOnce(&mut Self) -> Result<T, X>,
     ) -> Result<T, X> {
-        let mut around = 0;
-        if let Some(observer) = &mut self.observer {
-            observer.attend_if_asked()?;
-            around = observer.methods.len();
-            observer.open_stage(stage);
-            // A sink that cancels at the start of a stage has still seen it begin, so it sees it end.
-            if let Err(cancelled) = observer.deliver(StageStarted { stage }.into()) {
-                let _ = observer.end_stage(stage, false, around);
-                return Err(cancelled.into());
-            }
+        let Some(observer) = &mut self.observer else {
+            return body(self);
+        };
+        observer.attend_if_asked()?;
+        let around = observer.methods.len();
+        observer.open_stage(stage);
+        // A sink that cancels at the start of a stage has still seen it begin, so it sees it end.
+        if let Err(cancelled) = observer.deliver(StageStarted { stage }.into()) {
+            let _ = observer.end_stage(stage, false, around);
+            return Err(cancelled.into());
         }
-        let outcome = body(self);
-        if let Some(observer) = &mut self.observer {
-            let delivered = observer.end_stage(stage, outcome.is_ok(), around);
-            if outcome.is_ok() {
-                delivered?;
-            }
+        let outcome = catch_unwind(AssertUnwindSafe(|| body(self)));
+        let succeeded = matches!(outcome, Ok(Ok(_)));
+        let delivered = match &mut self.observer {
+            Some(observer) => observer.end_stage(stage, succeeded, around),
+            None => Ok(()),
+        };
+        let outcome = outcome.unwrap_or_else(|panic| resume_unwind(panic));
+        if succeeded {
+            delivered?;
         }
         outcome
     }
@@ -220,13 +226,13 @@ impl<'a> Trace<'a> {
                 reused: false,
             }),
         };
-        let outcome = body(&mut inner);
+        let outcome = catch_unwind(AssertUnwindSafe(|| body(&mut inner)));
         if let Some(inner) = inner.observer {
             observer.next = inner.next;
         }
         // The sink may have been attended to meanwhile.
         observer.wanted = observer.sink.wanted();
-        outcome
+        outcome.unwrap_or_else(|panic| resume_unwind(panic))
     }
 }
 
@@ -290,17 +296,22 @@ impl Observer<'_> {
     /// estimators that are open around it.
     fn end_stage(&mut self, stage: Stage, succeeded: bool, around: usize) -> Result<(), Cancelled> {
         let ended = StageEnded { stage, succeeded, reused: std::mem::take(&mut self.reused) };
-        let delivered = self.deliver(ended.into());
+        let record = self.next_record(ended.into());
+        // First, because a sink may panic.
         self.depth -= 1;
         self.methods.truncate(around);
-        delivered
+        self.sink.accept(&record)
     }
 
     fn deliver(&mut self, event: Event) -> Result<(), Cancelled> {
-        let record =
-            Record { index: self.next, depth: self.depth, methods: self.methods.clone(), event };
-        self.next += 1;
+        let record = self.next_record(event);
         self.sink.accept(&record)
+    }
+
+    fn next_record(&mut self, event: Event) -> Record {
+        let (index, methods) = (self.next, self.methods.clone());
+        self.next += 1;
+        Record { index, depth: self.depth, methods, event }
     }
 }
 
@@ -385,6 +396,34 @@ mod tests {
             }
             assert_eq!(open, [], "stopped at {stop_at}");
         }
+    }
+
+    #[test]
+    fn a_panic_ends_its_stages_and_leaves_the_trace_as_it_was() {
+        let panicking = |trace: &mut Trace<'_>| -> Result<(), Cancelled> {
+            trace.stage(Stage::Estimator(Method::FB), |trace| {
+                trace.stage(Stage::DepthLift, |_| panic!("of the estimator"))
+            })
+        };
+        let mut sink = RecordingSink::wanting(KindSet::ALL);
+        let mut second = RecordingSink::wanting(KindSet::ALL);
+        let mut trace = Trace::to(&mut sink);
+        let panic = catch_unwind(AssertUnwindSafe(|| trace.heard_by(&mut second, panicking)));
+        let words = panic.expect_err("it panicked").downcast::<&str>().expect("a text");
+        assert_eq!(*words, "of the estimator");
+        two_stages(&mut trace).expect("not cancelled");
+        for sink in [&sink, &second] {
+            let ended = sink.records.iter().filter_map(|record| match &record.event {
+                Event::StageEnded(ended) => Some((ended.stage, ended.succeeded)),
+                _ => None,
+            });
+            let failed = [(Stage::DepthLift, false), (Stage::Estimator(Method::FB), false)];
+            assert_eq!(ended.take(2).collect::<Vec<_>>(), failed);
+        }
+        let places = sink.records.iter().map(|r| (r.index, r.depth, r.methods.len()));
+        let (panicked, after): (Vec<_>, Vec<_>) = places.partition(|place| place.0 < 4);
+        assert_eq!(panicked, [(0, 1, 1), (1, 2, 1), (2, 2, 1), (3, 1, 1)]);
+        assert_eq!(after, [(4, 1, 0), (5, 1, 0), (6, 2, 0), (7, 2, 0), (8, 1, 0)]);
     }
 
     #[test]
