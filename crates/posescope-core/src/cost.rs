@@ -24,7 +24,9 @@ pub use information_distance::InformationDistance;
 pub use joint_histogram::{Entropies, JointHistogram};
 pub use mutual_information::MutualInformation;
 pub use photometric::Photometric;
-pub use statistic::{CostOfPairs, Explanation, ExplanationKind, PhotometricWeights, Statistic};
+pub use statistic::{
+    CostOfPairs, Explanation, ExplanationKind, PhotometricWeights, Power, Statistic,
+};
 
 #[doc(hidden)]
 pub use entry::{CostEntry, CostSetting, CostSettings, RegisteredCost, SearchRule, Similarity};

@@ -51,8 +51,9 @@ impl ProjectedCloudIndex {
                 in_view.then_some(([pixel.x, pixel.y], f64::from(point.z)))
             })
             .unzip();
-        // The tree refuses only an empty set of points, which then has no depth anywhere.
-        let tree = ImmutableKdTree::new_from_slice(&pixels).ok().filter(|_| !pixels.is_empty());
+        let tree = (!pixels.is_empty()).then(|| {
+            ImmutableKdTree::new_from_slice(&pixels).expect("fewer points than an index can number")
+        });
         Self { tree, depths }
     }
 

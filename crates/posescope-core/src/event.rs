@@ -115,7 +115,7 @@ pub trait DebugEvent: Into<Event> + Sized {
     fn from_event(event: &Event) -> Option<&Self>;
 }
 
-/// A set of event kinds.
+/// A set of event kinds: one bit each.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct KindSet(u32);
 
@@ -174,6 +174,9 @@ macro_rules! events {
             #[doc(hidden)]
             pub const ALL: &[Self] = &[$(Self::$name),+];
         }
+
+        const _: () =
+            assert!(Kind::ALL.len() <= u32::BITS as usize, "a KindSet has a bit for each kind");
 
         impl Event {
             /// The kind of this event.

@@ -131,18 +131,21 @@ fn smoothed_in_bands(image: &GrayImage, sigma: f64, bands: usize) -> FloatImage 
 
 /// The grey value between pixels by cubic convolution (Catmull-Rom, a = −0.5), clamped to 0 … 255.
 ///
-/// Beyond the border the outermost pixel is repeated. This is the paper's interpolation f of
-/// appendix B, "generation of synthetic views".
+/// Beyond the border the outermost pixel is repeated; an image without pixels is black. This is the paper's
+/// interpolation f of appendix B, "generation of synthetic views".
 pub fn cubic_interpolated(image: &GrayImage, x: f32, y: f32) -> f32 {
+    if image.is_empty() {
+        return 0.0;
+    }
     let (left, top) = (x.floor(), y.floor());
     let weights_x = catmull_rom_weights(x - left);
     let weights_y = catmull_rom_weights(y - top);
     let (last_x, last_y) = (image.width() as i32 - 1, image.height() as i32 - 1);
     let mut value = 0.0;
     for (row, weight_y) in weights_y.iter().enumerate() {
-        let v = (top as i32 - 1 + row as i32).clamp(0, last_y) as u32;
+        let v = (top as i32).saturating_add(row as i32 - 1).clamp(0, last_y) as u32;
         for (column, weight_x) in weights_x.iter().enumerate() {
-            let u = (left as i32 - 1 + column as i32).clamp(0, last_x) as u32;
+            let u = (left as i32).saturating_add(column as i32 - 1).clamp(0, last_x) as u32;
             value += weight_x * weight_y * f32::from(image.get_pixel(u, v).0[0]);
         }
     }
@@ -205,6 +208,17 @@ mod tests {
         assert_eq!(cubic_interpolated(&ramp, 4.0, 3.0), 55.0);
         let between = cubic_interpolated(&ramp, 4.25, 3.5);
         assert!((between - (42.5 + 17.5)).abs() < 1e-4, "{between}");
+    }
+
+    #[test]
+    fn far_beyond_the_border_the_outermost_pixel_is_repeated_and_no_image_is_black() {
+        let image = GrayImage::from_fn(3, 2, |x, y| Luma([(10 * x + 100 * y) as u8]));
+        for (x, y, expected) in [(-3e9, -3e9, 0.0), (3e9, 3e9, 120.0), (3e9, -3e9, 20.0)] {
+            assert_eq!(cubic_interpolated(&image, x, y), expected, "{x} {y}");
+        }
+        for (width, height) in [(0, 0), (0, 2), (3, 0)] {
+            assert_eq!(cubic_interpolated(&GrayImage::new(width, height), 1.0, 1.0), 0.0);
+        }
     }
 
     proptest! {

@@ -51,6 +51,7 @@ pub(super) fn weights(painter: &Painter<'_>, weights: &PhotometricWeights) -> In
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cost::Power;
     use crate::render::{SplattedPixel, SyntheticView};
 
     fn view(count: u32) -> SyntheticView {
@@ -77,7 +78,7 @@ mod tests {
     fn a_pixel_that_counts_is_white_and_one_that_is_ignored_grey() {
         let shown = weights(
             &Painter::new(&view(2)),
-            &PhotometricWeights { power: 1, threshold: 9.0, counted: vec![true, false] },
+            &PhotometricWeights { power: Power::One, threshold: 9.0, counted: vec![true, false] },
         );
         let colors = shown.indices.iter().map(|&index| shown.palette[usize::from(index)]);
         assert_eq!(colors.collect::<Vec<_>>(), [[255; 3], [90; 3]]);

@@ -19,6 +19,9 @@ pub struct JointHistogram {
 
 impl JointHistogram {
     /// Counts the pairs; values fall into `bins` equal intervals of 0 … 255, 255 into the last one.
+    ///
+    /// # Panics
+    /// When `bins` is 0.
     pub fn of(pairs: &[IntensityPair], bins: usize) -> Self {
         let mut counts = vec![0; bins * bins];
         for pair in pairs {

@@ -2,6 +2,8 @@
 
 use fearless_simd::{Level, Simd, SimdBase as _, SimdFloat as _, dispatch, f32x8, i32x8};
 
+use super::Power;
+
 /// Number and sum of the errors up to their median.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LesserHalf {
@@ -69,7 +71,7 @@ impl LesserHalfFinder {
     /// The mean of the numbers ≥ 0 up to their lower median; `None` of nothing.
     pub fn mean(&mut self, values: &[f32]) -> Option<f64> {
         let found = self.find(values).map(|(counted, sum)| sum / f64::from(counted));
-        found.or_else(|| mean_of_lesser_half(values, 1))
+        found.or_else(|| mean_of_lesser_half(values, Power::One))
     }
 
     /// How many of some numbers ≥ 0 are no greater than their lower median, and the sum of these, each
@@ -211,7 +213,7 @@ pub(super) fn lower_median(values: &[f32]) -> Option<f32> {
 ///
 /// Errors are rounded so that all sums are exact. Those that are squared again are not, so the sum depends on the
 /// order of the errors; it is made of eight, each of every eighth error, so that no addition waits for the last.
-pub(super) fn mean_of_lesser_half(errors: &[f32], power: usize) -> Option<f64> {
+pub(super) fn mean_of_lesser_half(errors: &[f32], power: Power) -> Option<f64> {
     const SUMS: usize = 8;
     let threshold = lower_median(errors)?;
     let mut sums = [0.0_f64; SUMS];
@@ -220,7 +222,10 @@ pub(super) fn mean_of_lesser_half(errors: &[f32], power: usize) -> Option<f64> {
         for (&error, sum) in some.iter().zip(&mut sums) {
             let counts = error <= threshold;
             let error = f64::from(if counts { error } else { 0.0 });
-            *sum += if power == 2 { error * error } else { LesserHalf::rounded(error) };
+            *sum += match power {
+                Power::One => LesserHalf::rounded(error),
+                Power::Two => error * error,
+            };
             counted += u32::from(counts);
         }
     }
@@ -262,7 +267,7 @@ mod tests {
                 }
                 let mean = Some(expected.1 / f64::from(expected.0));
                 prop_assert_eq!(finder.mean(&values), mean);
-                prop_assert_eq!(mean_of_lesser_half(&values, 1), mean);
+                prop_assert_eq!(mean_of_lesser_half(&values, Power::One), mean);
             }
         }
     }

@@ -1,6 +1,6 @@
 //! The robust photometric error of PM (paper, appendix B, "direct photometric matching").
 
-use super::{Cost, CostEntry, Statistic};
+use super::{Cost, CostEntry, Power, Statistic};
 use crate::describe::parameters;
 use crate::image::{FloatImage, GrayImage, gaussian_smoothed};
 use crate::memo::{Key, key};
@@ -36,7 +36,8 @@ impl Cost for Photometric {
     }
 
     fn statistic(&self) -> Statistic<'_> {
-        Statistic::LesserHalf { power: self.power }
+        let power = if self.power == 2 { Power::Two } else { Power::One };
+        Statistic::LesserHalf { power }
     }
 }
 

@@ -11,7 +11,7 @@ use super::{Entropies, IntensityPair, JointHistogram};
 pub enum Statistic<'a> {
     /// The joint histogram of both images.
     Histogram {
-        /// Bins per axis, as in [`JointHistogram::of`].
+        /// Bins per axis, as in [`JointHistogram::of`]. Without bins there is no cost.
         bins: usize,
         /// The cost of the entropies of the counts; `None` where they decide nothing.
         cost: fn(&Entropies) -> Option<f64>,
@@ -19,12 +19,21 @@ pub enum Statistic<'a> {
     /// The errors E = (I_Q − I_S)² up to their lower median: the mean of E^power. E is a number of single
     /// precision, as are the values.
     LesserHalf {
-        /// 1 or 2.
-        power: usize,
+        /// Of the errors.
+        power: Power,
     },
     /// All pairs, in the order of the synthetic view's pixels; `None` where they decide nothing. Such a cost is
     /// the slowest: the threads draw every view the plain way.
     Pairs(CostOfPairs<'a>),
+}
+
+/// The power of the errors E in a mean.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Power {
+    /// E itself.
+    One,
+    /// E².
+    Two,
 }
 
 /// The cost of pairs.
@@ -54,7 +63,7 @@ pub enum ExplanationKind {
 #[derive(Clone, Debug, PartialEq)]
 pub struct PhotometricWeights {
     /// The power of E in the weighted mean.
-    pub power: usize,
+    pub power: Power,
     /// θ, the median of E \[grey values²\].
     pub threshold: f32,
     /// Per pair, whether E ≤ θ.
@@ -70,6 +79,7 @@ impl<'a> Statistic<'a> {
     /// The cost of these pairs; `None` where they decide nothing (no pair, constant image).
     pub fn cost(&self, pairs: &[IntensityPair]) -> Option<f64> {
         match self {
+            Self::Histogram { bins: 0, .. } => None,
             &Self::Histogram { bins, cost } => cost(&JointHistogram::of(pairs, bins).entropies),
             &Self::LesserHalf { power } => mean_of_lesser_half(&errors(pairs), power),
             Self::Pairs(cost) => cost(pairs),
@@ -78,7 +88,7 @@ impl<'a> Statistic<'a> {
 
     /// Whether whole numbers decide the cost, which any processor can count.
     pub fn is_counted(&self) -> bool {
-        matches!(self, Self::Histogram { .. } | Self::LesserHalf { power: 1 })
+        matches!(self, Self::Histogram { bins: 1.., .. } | Self::LesserHalf { power: Power::One })
     }
 
     /// How the cost is explained, if it is.
@@ -93,6 +103,7 @@ impl<'a> Statistic<'a> {
     /// Why the cost of these pairs is what it is; `None` where there is no cost or nothing to show.
     pub fn explain(&self, pairs: &[IntensityPair]) -> Option<Explanation> {
         match *self {
+            Self::Histogram { bins: 0, .. } => None,
             Self::Histogram { bins, cost } => {
                 let histogram = JointHistogram::of(pairs, bins);
                 cost(&histogram.entropies)?;
@@ -111,4 +122,24 @@ impl<'a> Statistic<'a> {
 
 fn errors(pairs: &[IntensityPair]) -> Vec<f32> {
     pairs.iter().map(IntensityPair::squared_difference).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_histogram_without_bins_gives_no_cost() {
+        let pairs = [(0.0, 0.0), (255.0, 255.0)]
+            .map(|(query, synthetic)| IntensityPair { query, synthetic });
+        let of_bins = |bins| Statistic::Histogram { bins, cost: |of| Some(of.joint) };
+        let none = of_bins(0);
+        assert_eq!(
+            (none.cost(&pairs), none.explain(&pairs), none.is_counted()),
+            (None, None, false)
+        );
+        let two = of_bins(2);
+        assert_eq!(two.cost(&pairs), Some(2.0_f64.ln()));
+        assert!(two.explain(&pairs).is_some() && two.is_counted());
+    }
 }

@@ -66,7 +66,8 @@ impl Judge {
     /// where all are, there is no cost.
     ///
     /// Of many poses that cover few pixels, some look informed by chance. So what they say counts less, by the fourth
-    /// root of the share of the points that are seen.
+    /// root of the pixels that are covered for each point. Costs of splats of different size cannot be compared:
+    /// where a point covers several pixels, there may be more pixels than points.
     fn cost_of(&self, pairs: &[Pair<Bins>], counts: &mut Vec<u32>) -> Option<f64> {
         let JudgeParams { bins, channels, corrected, .. } = self.params;
         let (mut sum, mut is_any) = (0.0, false);
@@ -80,9 +81,9 @@ impl Judge {
             is_any |= cost.is_some();
             sum += cost.unwrap_or(1.0);
         }
-        let seen = pairs.len() as f64 / self.reference.values.len() as f64;
+        let pixels_per_point = pairs.len() as f64 / self.reference.values.len() as f64;
         let informed = 1.0 - sum / channels.count() as f64;
-        is_any.then(|| 1.0 - informed * seen.sqrt().sqrt())
+        is_any.then(|| 1.0 - informed * pixels_per_point.sqrt().sqrt())
     }
 }
 

@@ -12,7 +12,7 @@ use super::{
 };
 use crate::camera::Intrinsics;
 use crate::cost::{
-    BinPair, Cost, Entropies, Explanation, IntensityPair, LesserHalfFinder, MAX_BYTE_BINS,
+    BinPair, Cost, Entropies, Explanation, IntensityPair, LesserHalfFinder, MAX_BYTE_BINS, Power,
     Statistic, byte_bin, count_pairs, shuffled,
 };
 use crate::geometry::Pose;
@@ -140,11 +140,11 @@ impl<'a> Scorer<'a> {
             let is_large = !ZBuffer::<u8>::can_draw(&self.intrinsics, self.splat_px);
             match self.statistic {
                 _ if is_large => Threads::Plain,
-                Statistic::LesserHalf { power: 1 } => Threads::LesserHalf {
+                Statistic::LesserHalf { power: Power::One } => Threads::LesserHalf {
                     points: ShownPoints { positions: positions(), values: values.collect() },
                     pool: Pool::default(),
                 },
-                Statistic::Histogram { bins, cost } if bins <= MAX_BYTE_BINS => {
+                Statistic::Histogram { bins: bins @ 1..=MAX_BYTE_BINS, cost } => {
                     let bin = |value: f32| byte_bin(value, bins);
                     let values = values.map(bin).collect();
                     Threads::Histogram {

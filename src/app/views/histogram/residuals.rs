@@ -5,7 +5,7 @@ use egui_plot::{Bar, BarChart, HoverPosition, LineStyle, Plot, VLine};
 
 use crate::app::theme;
 use crate::app::views::legend::{name_picture, swatch};
-use crate::cost::{IntensityPair, PhotometricWeights};
+use crate::cost::{IntensityPair, PhotometricWeights, Power};
 use crate::method::Method;
 use crate::render::Comparison;
 
@@ -56,12 +56,10 @@ pub(super) fn ui(ui: &mut Ui, method: Method, shown: &Comparison, weights: &Phot
         "The median difference is {median:.2} grey values (dashed). Pixels that differ more are ignored"
     ));
     if let Some(cost) = shown.score.cost {
-        let power = weights.power;
-        let mean = match power {
-            1 => "mean square of those that count",
-            _ => "mean fourth power of those that count",
+        let (mean, throughout) = match weights.power {
+            Power::One => ("mean square of those that count", cost.sqrt()),
+            Power::Two => ("mean fourth power of those that count", cost.sqrt().sqrt()),
         };
-        let throughout = cost.powf(0.5 / power as f64);
         ui.label(format!(
             "cost = {mean} = {cost:.4}, as if all differed by {throughout:.2} grey values"
         ));
@@ -105,7 +103,7 @@ mod tests {
             synthetic: (-difference).max(0.0),
         });
         let weights = PhotometricWeights {
-            power: 1,
+            power: Power::One,
             threshold: 16.0,
             counted: vec![false, true, true, true, true, false],
         };

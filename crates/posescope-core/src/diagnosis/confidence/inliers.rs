@@ -3,6 +3,7 @@
 use super::appearance::{self, Look};
 use super::{PoseConfidence, Signals};
 use crate::diagnosis::Subject;
+use crate::estimator::Family;
 use crate::features::FeatureState;
 use crate::solver::{Correspondence, pose_covariance};
 use crate::stats::median;
@@ -32,8 +33,11 @@ pub(super) fn signals(subject: &Subject<'_>, look: Look) -> Option<(Signals, Pos
     let intrinsics = &problem.query.intrinsics;
     let (width, height) = (f64::from(intrinsics.width), f64::from(intrinsics.height));
     let spread = root_mean_square_distance(&inliers) / width.hypot(height);
-    let threshold = params.fb.mlesac.inlier_threshold_px;
-    let median_residual_px = median(&mut residuals).unwrap_or(threshold);
+    let mlesac = match Family::of(subject.method, params) {
+        Some(Family::Guided) => params.fb2.mlesac,
+        _ => params.fb.mlesac,
+    };
+    let median_residual_px = median(&mut residuals).unwrap_or(mlesac.inlier_threshold_px);
     // A residual is of two axes; the median of a Rayleigh distribution is 1.177 σ. A perfect fit of
     // few points is no proof of perfect pixels.
     let sigma_px = (median_residual_px / 1.177).max(0.3);
