@@ -11,6 +11,7 @@
 //! | `places` | which correspondences are independent? | those at different places of the query |
 
 mod acceptance;
+mod cells;
 mod consensus;
 mod likelihood;
 mod local;

@@ -198,7 +198,7 @@ impl FeatureBased {
         // Acceptance uses the first matching only. Guided matches agree with the pose by construction and would
         // accept half of all poses between unrelated streets.
         let camera = &problem.query.intrinsics;
-        let mut beyond =
+        let beyond =
             self.beyond_chance(&correspondences, &consensus.inliers, camera, f64::NEG_INFINITY);
         let mut best = Posed {
             pose: consensus.pose,
@@ -209,10 +209,7 @@ impl FeatureBased {
         };
         let threshold_px = self.params.mlesac.inlier_threshold_px;
         if let (Some(guide), Some(all)) = (&self.guide, all) {
-            let (last, is_better) = guide.match_again(problem, detected, &all, best, trace)?;
-            if is_better {
-                beyond.tested = last.pairings.len();
-            }
+            let last = guide.match_again(problem, detected, &all, best, trace)?;
             let residuals_px = residuals(&correspondences, camera, &last.pose);
             states.after_pose(&free, &residuals_px, threshold_px);
             trace.emit(|| MatchesGuided { matches: last_matches(&free, &last.pairings, &all) })?;
@@ -236,7 +233,10 @@ impl FeatureBased {
         let (camera, params) = (&problem.query.intrinsics, &self.params.mlesac);
         let seed = problem.random_seed(self.purpose);
         let solve = |trace: &mut Trace<'_>| {
-            let tell = |trial: &Trial| trace.emit(|| HypothesisTried { trial: *trial });
+            let tell = |trial: Option<&Trial>| match trial {
+                Some(trial) => trace.emit(|| HypothesisTried { trial: *trial }),
+                None => trace.checkpoint(),
+            };
             let found = mlesac(correspondences, camera, params, seed, tell);
             separate_failure(found.map_err(|error| Self::halt(error, correspondences.len())))
         };

@@ -8,6 +8,7 @@ use std::f64::consts::{LN_10, PI};
 use nalgebra::Point2;
 use serde::{Deserialize, Serialize};
 
+use super::cells::Cells;
 use super::params::{NEEDED, SAMPLE};
 use super::places::Places;
 use crate::describe::choice;
@@ -129,7 +130,10 @@ fn accepted(inliers: usize, count: usize, tested: usize, chance: f64) -> Accepta
         let others = count.saturating_sub(SAMPLE);
         (tests + ln_tail(k.saturating_sub(SAMPLE), others, chance)) / LN_10
     };
-    let needed = (NEEDED..=count).find(|&k| log10_nfa(k) <= LOG10_EPSILON);
+    // The more inliers, the fewer false alarms.
+    let numbers: Vec<usize> = (NEEDED..=count).collect();
+    let too_few = numbers.partition_point(|&k| log10_nfa(k) > LOG10_EPSILON);
+    let needed = numbers.get(too_few).copied();
     Acceptance { inliers, log10_nfa: log10_nfa(inliers), needed }
 }
 
@@ -139,17 +143,16 @@ fn accepted(inliers: usize, count: usize, tested: usize, chance: f64) -> Accepta
 /// With the density `f` of the pixels it is `1 / ∫ f²`, estimated from the share of pairs that are
 /// neighbours. Keypoints gather on texture; two patches of it on top of each other bring more
 /// false matches in line than an even spread would. One pair more is counted than found, because
-/// a few pixels cannot show that they are spread out. Takes time quadratic in the number of
-/// pixels, about a millisecond for a thousand.
+/// a few pixels cannot show that they are spread out.
 pub fn effective_area_px(pixels: &[Point2<f64>], image_area_px: f64) -> f64 {
     let squared_radius = NEIGHBOURHOOD_PX * NEIGHBOURHOOD_PX;
-    let neighbours: usize = pixels
-        .iter()
-        .enumerate()
-        .map(|(i, a)| {
-            pixels[..i].iter().filter(|&b| (a - b).norm_squared() < squared_radius).count()
-        })
-        .sum();
+    let mut cells = Cells::new(NEIGHBOURHOOD_PX);
+    let mut neighbours = 0;
+    for (number, pixel) in pixels.iter().enumerate() {
+        let distance = |&other: &usize| (pixel - pixels[other]).norm_squared();
+        neighbours += cells.around(pixel).filter(|other| distance(other) < squared_radius).count();
+        cells.insert(pixel, number);
+    }
     let pairs = pixels.len() * pixels.len().saturating_sub(1) / 2;
     let share = (neighbours + 1) as f64 / pairs.max(1) as f64;
     (PI * squared_radius / share).min(image_area_px)
@@ -253,6 +256,28 @@ mod tests {
     }
 
     proptest! {
+        #[test]
+        fn the_neighbours_are_those_of_all_pairs(
+            pixels in prop::collection::vec((-90.0_f64..300.0, -90.0_f64..300.0), 2..200),
+        ) {
+            let pixels: Vec<_> = pixels.into_iter().map(|(x, y)| Point2::new(x, y)).collect();
+            let pairs = (0..pixels.len()).flat_map(|i| (0..i).map(move |j| (i, j)));
+            let is_near = |&(i, j): &(usize, usize)| (pixels[i] - pixels[j]).norm() < NEIGHBOURHOOD_PX;
+            let share = (pairs.clone().filter(is_near).count() + 1) as f64 / pairs.count() as f64;
+            let expected = PI * NEIGHBOURHOOD_PX * NEIGHBOURHOOD_PX / share;
+            let area = effective_area_px(&pixels, f64::INFINITY);
+            prop_assert!((area / expected - 1.0).abs() < 1e-12, "{area} {expected}");
+        }
+
+        #[test]
+        fn what_is_needed_is_the_first_number_that_chance_does_not_explain(
+            n in 4_usize..300, area in 10.0..1e6,
+        ) {
+            let nfa = |k| inliers_beyond_chance(k, n, 3.0, area).log10_nfa;
+            let first = (NEEDED..=n).find(|&k| nfa(k) <= LOG10_EPSILON);
+            prop_assert_eq!(inliers_beyond_chance(0, n, 3.0, area).needed, first);
+        }
+
         #[test]
         fn an_inlier_more_is_never_less_surprising(
             n in 4_usize..2000, k in 0_usize..2000, area in 10.0..1e7,

@@ -20,16 +20,16 @@ pub(super) struct LocalOptimum {
 }
 
 /// Refines a hypothesis on its inliers, and again on the inliers of the refined pose, for as long
-/// as the likelihood of all correspondences rises.
-pub(super) fn locally_optimized(
+/// as the likelihood of all correspondences rises. Calls `look` before each.
+pub(super) fn locally_optimized<E>(
     hypothesis: Hypothesis,
-    correspondences: &[Correspondence],
-    intrinsics: &Intrinsics,
-    params: &MlesacParams,
+    (correspondences, intrinsics, params): (&[Correspondence], &Intrinsics, &MlesacParams),
     likelihood: &mut Likelihood,
-) -> LocalOptimum {
+    mut look: impl FnMut() -> Result<(), E>,
+) -> Result<LocalOptimum, E> {
     let mut optimum = LocalOptimum { hypothesis, refinement: None };
     for _ in 0..MAX_ROUNDS {
+        look()?;
         let Hypothesis { pose, score: old } = optimum.hypothesis;
         let residuals_px = residuals(correspondences, intrinsics, &pose);
         let agreeing: Vec<_> = inliers(&residuals_px, params.inlier_threshold_px)
@@ -44,7 +44,7 @@ pub(super) fn locally_optimized(
             break;
         }
     }
-    optimum
+    Ok(optimum)
 }
 
 /// Reprojection error of every correspondence; infinite behind the camera \[px\].

@@ -32,8 +32,8 @@ use crate::solver::{Correspondence, MAX_SOLUTIONS, p3p};
 /// them chooses, because at 90 % false matches the fourth is false nine times out of ten.
 /// [`MlesacParams::fourth`] does as the paper.
 ///
-/// The outcome is a function of the input and the seed. The observer hears every trial, in order,
-/// and ends the run with an error.
+/// The outcome is a function of the input and the seed. The observer hears every trial, in order, and `None` before each
+/// refinement within one, which takes long where many agree. It ends the run with an error.
 ///
 /// # Errors
 /// [`MlesacError`]: too few correspondences, no pose with at least [`NEEDED`] inliers, or the
@@ -43,7 +43,7 @@ pub fn mlesac<C>(
     intrinsics: &Intrinsics,
     params: &MlesacParams,
     seed: u64,
-    mut observe: impl FnMut(&Trial) -> Result<(), C>,
+    mut observe: impl FnMut(Option<&Trial>) -> Result<(), C>,
 ) -> Result<Consensus, MlesacError<C>> {
     let found = correspondences.len();
     if found < NEEDED {
@@ -75,7 +75,9 @@ pub fn mlesac<C>(
         let improved = hypothesis.filter(|new| new.score.log_likelihood > old);
         if let Some(hypothesis) = improved {
             let optimum = if params.local {
-                locally_optimized(hypothesis, correspondences, intrinsics, params, &mut likelihood)
+                let look = || observe(None).map_err(MlesacError::Cancelled);
+                let input = (correspondences, intrinsics, params);
+                locally_optimized(hypothesis, input, &mut likelihood, look)?
             } else {
                 LocalOptimum { hypothesis, refinement: None }
             };
@@ -84,14 +86,14 @@ pub fn mlesac<C>(
             trials_needed = wanted.max(params.min_trials).min(params.max_trials);
             best = Some(optimum);
         }
-        observe(&Trial {
+        observe(Some(&Trial {
             index: trials,
             sample,
             hypothesis,
             is_best: improved.is_some(),
             best: best.map(|best| best.hypothesis),
             trials_needed,
-        })
+        }))
         .map_err(MlesacError::Cancelled)?;
         trials += 1;
     }
@@ -210,7 +212,7 @@ mod tests {
         let mut trials = Vec::new();
         let params = MlesacParams::default();
         let outcome = mlesac(correspondences, &KITTI, &params, seed, |trial| {
-            trials.push(*trial);
+            trials.extend(trial.copied());
             Ok(())
         });
         (outcome, trials)
@@ -300,8 +302,31 @@ mod tests {
     fn the_observer_can_stop_at_any_trial() {
         for stop in [0, 1, 50] {
             let outcome = mlesac(&scene(50, 25), &KITTI, &MlesacParams::default(), 1, |trial| {
-                if trial.index < stop { Ok(()) } else { Err(trial.index) }
+                trial.filter(|trial| trial.index >= stop).map_or(Ok(()), |trial| Err(trial.index))
             });
+            assert_eq!(outcome, Err(MlesacError::Cancelled(stop)));
+        }
+    }
+
+    #[test]
+    fn the_observer_is_asked_before_each_refinement_of_many_matches() {
+        let (mut asked, mut bests) = (0, 0);
+        let params = MlesacParams::default();
+        let scene = scene(10_000, 3000);
+        let run = |stop_at: Option<usize>, asked: &mut usize, bests: &mut usize| {
+            mlesac(&scene, &KITTI, &params, 1, |trial| {
+                match trial {
+                    Some(trial) => *bests += usize::from(trial.is_best),
+                    None => *asked += 1,
+                }
+                if stop_at == Some(*asked) { Err(*asked) } else { Ok(()) }
+            })
+        };
+        run(None, &mut asked, &mut bests).expect("a consensus");
+        // The likelihood rises once at least, and then no more.
+        assert!(asked >= 2 * bests && bests > 0, "{asked} {bests}");
+        for stop in 1..=asked {
+            let outcome = run(Some(stop), &mut 0, &mut 0);
             assert_eq!(outcome, Err(MlesacError::Cancelled(stop)));
         }
     }

@@ -2,6 +2,8 @@
 
 use nalgebra::Point2;
 
+use super::cells::Cells;
+
 /// What is counted where a consensus is held against chance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
@@ -48,12 +50,14 @@ pub struct Places {
 
 impl Places {
     /// A pixel belongs to the first place before it that is within `reach_px`, and else is a place of its
-    /// own. Time is quadratic in their number: a millisecond for a thousand.
+    /// own.
     pub fn of(pixels: impl IntoIterator<Item = Point2<f64>>, reach_px: f64) -> Self {
         let mut places = Self { of: Vec::new(), pixels: Vec::new(), sizes: Vec::new() };
+        let mut cells = Cells::new(reach_px);
         for pixel in pixels {
-            let is_here = |known: &Point2<f64>| (known - pixel).norm() <= reach_px;
-            let place = places.pixels.iter().position(is_here).unwrap_or_else(|| {
+            let is_here = |&place: &usize| (places.pixels[place] - pixel).norm() <= reach_px;
+            let place = cells.around(&pixel).filter(is_here).min().unwrap_or_else(|| {
+                cells.insert(&pixel, places.pixels.len());
                 places.pixels.push(pixel);
                 places.sizes.push(0);
                 places.sizes.len() - 1
@@ -82,6 +86,28 @@ impl Places {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn a_pixel_belongs_to_the_first_place_within_reach(
+            pixels in prop::collection::vec((-30_i32..60, -30_i32..60), 0..120),
+            reach_px in prop_oneof![Just(0.0), Just(3.0), 0.0..20.0_f64],
+        ) {
+            let pixel = |(x, y)| Point2::new(0.5 * f64::from(x), 0.5 * f64::from(y));
+            let pixels: Vec<_> = pixels.into_iter().map(pixel).collect();
+            let places = Places::of(pixels.iter().copied(), reach_px);
+            let mut firsts: Vec<Point2<f64>> = Vec::new();
+            for (pixel, place) in pixels.iter().zip(&places.of) {
+                let known = firsts.iter().position(|first| (first - pixel).norm() <= reach_px);
+                prop_assert_eq!(*place, known.unwrap_or(firsts.len()));
+                if known.is_none() {
+                    firsts.push(*pixel);
+                }
+            }
+            prop_assert_eq!(&places.pixels, &firsts);
+        }
+    }
 
     #[test]
     fn near_pixels_are_one_place_and_a_chain_of_them_is_not() {

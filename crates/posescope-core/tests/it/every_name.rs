@@ -8,7 +8,8 @@ use std::sync::Arc;
 
 use posescope_core::cost::{
     CostOfPairs, Entropies, Explanation, ExplanationKind, InformationDistance, IntensityPair,
-    JointHistogram, Key, MutualInformation, Pair, Photometric, PhotometricWeights, Statistic, key,
+    JointHistogram, Key, MutualInformation, Pair, Photometric, PhotometricWeights, Power,
+    Statistic, key,
 };
 use posescope_core::event::{
     BranchTaken, CandidatesJudged, CloudColored, ColoredCloud, ColoredPoint, ColoringCounts,
@@ -132,7 +133,9 @@ fn words(event: &Event) -> String {
 
 fn explained(explanation: Option<&Explanation>) -> String {
     match explanation {
-        Some(Explanation::Weights(PhotometricWeights { threshold, .. })) => format!("{threshold}"),
+        Some(Explanation::Weights(PhotometricWeights { power: Power::One, threshold, .. })) => {
+            format!("{threshold}")
+        }
         Some(Explanation::JointHistogram(JointHistogram { entropies, .. })) => {
             format!("{:.3}", entropies.mutual_information())
         }
@@ -336,7 +339,7 @@ fn a_pose_is_solved_for_refined_and_accepted() {
     assert!((1..=MAX_SOLUTIONS).contains(&solutions.len()));
 
     let params = MlesacParams::default();
-    let go_on = |_: &Trial| Ok::<_, Infallible>(());
+    let go_on = |_: Option<&Trial>| Ok::<_, Infallible>(());
     let few = mlesac(&all[..2], &camera, &params, 0, go_on);
     assert!(matches!(few, Err(MlesacError::TooFewCorrespondences { needed: NEEDED, .. })));
     let consensus: Consensus = mlesac(&all, &camera, &params, 0, go_on).expect("all agree");

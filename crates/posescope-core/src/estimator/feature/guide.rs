@@ -34,7 +34,7 @@ pub(in crate::estimator) struct Guide {
 
 impl Guide {
     /// Matches again where the pose says, and refines it on what agrees, as long as more agree. `lifted` has the
-    /// depth of each reference feature. Says whether the pose is another.
+    /// depth of each reference feature.
     pub(super) fn match_again(
         &self,
         problem: &Problem,
@@ -42,8 +42,8 @@ impl Guide {
         lifted: &[LiftedMatch],
         first: Posed,
         trace: &mut Trace<'_>,
-    ) -> Result<(Posed, bool), Halt> {
-        let (mut best, mut is_better) = (first, false);
+    ) -> Result<Posed, Halt> {
+        let mut best = first;
         let rounds = if self.params.guided { GUIDED_ROUNDS } else { 0 };
         for _ in 0..rounds {
             let better = trace.stage(Stage::MatchGuided, |trace| {
@@ -60,9 +60,9 @@ impl Guide {
                 Ok::<_, Halt>(better)
             })?;
             let Some(better) = better else { break };
-            (best, is_better) = (better, true);
+            best = better;
         }
-        Ok((best, is_better))
+        Ok(best)
     }
 
     /// Matches where the pose of an earlier matching says that features must be.
@@ -108,6 +108,7 @@ impl Guide {
         let mut residuals_px = residuals(&correspondences, camera, &pose);
         // From the window inwards, so that a first pose that is a few pixels off is pulled in.
         for reach in [0.5 * self.params.window_px, threshold, threshold] {
+            trace.checkpoint()?;
             let agreeing: Vec<_> = correspondences
                 .iter()
                 .zip(&residuals_px)

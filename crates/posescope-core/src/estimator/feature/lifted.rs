@@ -33,7 +33,10 @@ impl FeatureBased {
     ) -> Result<Lifted, Cancelled> {
         let cloud = projected_cloud(tuple, self.params.visible.then_some(&self.render));
         trace.emit(|| ProjectedCloud { points: tuple.cloud.len(), in_view: cloud.len() })?;
-        let all = self.guide.as_ref().map(|_| self.all_lifted(tuple, reference, &cloud));
+        let all = match self.guide {
+            Some(_) => Some(self.all_lifted(tuple, reference, &cloud, trace)?),
+            None => None,
+        };
         let mut lifted = Vec::with_capacity(matches.len());
         for matches in matches.chunks(LIFTED_AT_A_TIME) {
             trace.checkpoint()?;
@@ -51,15 +54,21 @@ impl FeatureBased {
         tuple: &ReferenceTuple,
         reference: &Features,
         cloud: &ProjectedCloudIndex,
-    ) -> Arc<Vec<LiftedMatch>> {
+        trace: &mut Trace<'_>,
+    ) -> Result<Arc<Vec<LiftedMatch>>, Cancelled> {
         let FeatureParams { visible, depth_radius_px, depth, depth_spread, .. } = self.params;
         let bytes = |lifted: &Vec<LiftedMatch>| size_of_val(lifted.as_slice());
         let depth = (visible, &self.render, depth_radius_px, depth, depth_spread);
-        let lifted = tuple.memo.recall((&self.detector, depth), bytes, || {
-            let lift = |number| self.lifted_at(number, reference, cloud, tuple);
+        let lifted = tuple.memo.try_recall((&self.detector, depth), bytes, || {
+            let lift = |number: usize| {
+                if number.is_multiple_of(LIFTED_AT_A_TIME) {
+                    trace.checkpoint()?;
+                }
+                Ok(self.lifted_at(number, reference, cloud, tuple))
+            };
             (0..reference.keypoints.len()).map(lift).collect()
-        });
-        lifted.value
+        })?;
+        Ok(lifted.value)
     }
 
     fn lifted_at(
