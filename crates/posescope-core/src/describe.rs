@@ -57,6 +57,8 @@ pub enum Place<'a> {
     Number(&'a mut f64, RangeInclusive<f64>),
     /// A whole number.
     Count(&'a mut usize, RangeInclusive<usize>),
+    /// An odd number.
+    Odd(&'a mut usize, RangeInclusive<usize>),
     /// A switch.
     Flag(&'a mut bool),
     /// One of a few names.
@@ -74,6 +76,7 @@ impl Field<'_> {
         let (value, domain) = match &self.place {
             Place::Number(value, range) => (Value::Number(**value), Domain::Number(range.clone())),
             Place::Count(value, range) => (Value::Count(**value), Domain::Count(range.clone())),
+            Place::Odd(value, range) => (Value::Count(**value), Domain::Odd(range.clone())),
             Place::Flag(value) => (Value::Flag(**value), Domain::Flag),
             Place::Choice(choice) => {
                 let names = choice.names();
@@ -99,6 +102,7 @@ impl Field<'_> {
         match self.place {
             Place::Number(value, range) => *value = parsed(text).filter(|v| range.contains(v))?,
             Place::Count(value, range) => *value = parsed(text).filter(|v| range.contains(v))?,
+            Place::Odd(value, range) => *value = parsed(text).filter(|v| is_odd_in(&range, *v))?,
             Place::Flag(value) => *value = parsed(text)?,
             Place::Choice(choice) => {
                 choice.choose(choice.names().iter().position(|name| *name == text)?);
@@ -106,6 +110,10 @@ impl Field<'_> {
         }
         Some(())
     }
+}
+
+fn is_odd_in(range: &RangeInclusive<usize>, value: usize) -> bool {
+    range.contains(&value) && value % 2 == 1
 }
 
 fn parsed<T: FromStr>(text: &str) -> Option<T> {
@@ -145,10 +153,24 @@ pub enum Domain {
     Number(RangeInclusive<f64>),
     /// Whole numbers from … to.
     Count(RangeInclusive<usize>),
+    /// Odd numbers from … to.
+    Odd(RangeInclusive<usize>),
     /// `true` or `false`.
     Flag,
     /// One of these names.
     Choice(&'static [&'static str]),
+}
+
+impl Domain {
+    /// Whether a value is one of these. Flags and choices have no other.
+    pub(crate) fn accepts(&self, value: Value) -> bool {
+        match (self, value) {
+            (Self::Number(range), Value::Number(value)) => range.contains(&value),
+            (Self::Count(range), Value::Count(value)) => range.contains(&value),
+            (Self::Odd(range), Value::Count(value)) => is_odd_in(range, value),
+            _ => true,
+        }
+    }
 }
 
 impl fmt::Display for Domain {
@@ -156,6 +178,7 @@ impl fmt::Display for Domain {
         match self {
             Self::Number(range) => write!(f, "{} … {}", range.start(), range.end()),
             Self::Count(range) => write!(f, "{} … {}", range.start(), range.end()),
+            Self::Odd(range) => write!(f, "odd numbers {} … {}", range.start(), range.end()),
             Self::Flag => f.write_str("true | false"),
             Self::Choice(names) => f.write_str(&names.join(" | ")),
         }
@@ -243,6 +266,8 @@ pub fn set(
 ///         pub reach_m: f64 = 2.5 => number("reach", "m", 0.1..=50.0),
 ///         /// How often to look.
 ///         pub rounds: usize = 1 => count("rounds", "", 1..=10),
+///         /// Side of the window.
+///         pub window_px: usize = 3 => odd("window", "px", 1..=9),
 ///         /// Whether to look back.
 ///         pub back: bool = false => flag("back"),
 ///         /// Where to begin.
@@ -295,6 +320,9 @@ macro_rules! parameters {
 
     (@doc number $arguments:tt) => { $crate::describe::parameters!(@range $arguments) };
     (@doc count $arguments:tt) => { $crate::describe::parameters!(@range $arguments) };
+    (@doc odd $arguments:tt) => {
+        concat!($crate::describe::parameters!(@range $arguments), ", odd")
+    };
     (@doc $kind:ident $arguments:tt) => { "" };
     (@range ($key:literal, "", $range:expr)) => {
         concat!("\n`", stringify!($range), "`")
@@ -315,6 +343,7 @@ macro_rules! parameters {
     }};
     (@place number $place:expr, $range:expr) => { $crate::describe::Place::Number($place, $range) };
     (@place count $place:expr, $range:expr) => { $crate::describe::Place::Count($place, $range) };
+    (@place odd $place:expr, $range:expr) => { $crate::describe::Place::Odd($place, $range) };
     (@place flag $place:expr) => { $crate::describe::Place::Flag($place) };
     (@place choice $place:expr) => { $crate::describe::Place::Choice($place) };
 }
@@ -374,6 +403,8 @@ mod tests {
             inner: Inner = Inner::default() => group(),
             /// Which side.
             side: Side = Side::Right => choice("side"),
+            /// How wide.
+            window_px: usize = 3 => odd("window", "px", 1..=9),
         }
     }
 
@@ -391,11 +422,16 @@ mod tests {
             "on [] Whether at all: true in true | false",
             "rounds [] A number of times, at most: 3 in 1 … 10",
             "side [] Which side: right in left | right",
+            "window [px] How wide: 3 in odd numbers 1 … 9",
         ];
         assert_eq!(shown, expected);
         assert_eq!(set(&mut all, "side", "left"), Some(Ok(())));
         assert_eq!(set(&mut all, "rounds", "11"), Some(Err(Domain::Count(1..=10))));
+        assert_eq!(set(&mut all, "window", "5"), Some(Ok(())));
+        for wrong in ["4", "11", "-1"] {
+            assert_eq!(set(&mut all, "window", wrong), Some(Err(Domain::Odd(1..=9))));
+        }
         assert_eq!(set(&mut all, "turns", "1"), None);
-        assert_eq!((all.side, all.inner.rounds), (Side::Left, 3));
+        assert_eq!((all.side, all.inner.rounds, all.window_px), (Side::Left, 3, 5));
     }
 }

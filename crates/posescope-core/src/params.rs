@@ -160,6 +160,26 @@ impl Params {
         }
     }
 
+    /// Whether every parameter has a value that it accepts. A field that is written to is not checked before.
+    ///
+    /// # Errors
+    /// [`ParamError::BadValue`] of the first that has none.
+    pub fn check(&self) -> Result<(), ParamError> {
+        let mut outcome = Ok(());
+        self.clone().visit_groups(|group, params| {
+            for row in list(params) {
+                if outcome.is_ok() && !row.domain.accepts(row.value) {
+                    outcome = Err(ParamError::BadValue {
+                        key: format!("{group}.{}", row.key),
+                        expected: row.domain.to_string(),
+                        given: row.value.to_string(),
+                    });
+                }
+            }
+        });
+        outcome
+    }
+
     /// Sets parameters from a configuration: TOML with one table per group.
     ///
     /// # Errors
@@ -265,6 +285,26 @@ mod tests {
         keys.sort();
         keys.dedup();
         assert_eq!(keys.len(), rows.len());
+    }
+
+    #[test]
+    fn a_field_outside_its_range_is_named() {
+        assert_eq!(Params::default().check(), Ok(()));
+        assert_eq!(Params::at_scale(Scale::of_depth(1.8, true)).check(), Ok(()));
+        let checked = |change: fn(&mut Params)| {
+            let mut params = Params::default();
+            change(&mut params);
+            params.check().expect_err("out of range").to_string()
+        };
+        assert_eq!(checked(|params| params.grid.rounds = 0), "`grid.rounds` takes 1 … 10, not `0`");
+        assert_eq!(
+            checked(|params| params.render.splat_px = 2),
+            "`render.splat_px` takes odd numbers 1 … 15, not `2`"
+        );
+        assert_eq!(
+            checked(|params| params.fb.ratio = f64::NAN),
+            "`fb.ratio` takes 0.1 … 1, not `NaN`"
+        );
     }
 
     #[test]

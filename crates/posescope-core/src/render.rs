@@ -29,18 +29,18 @@ parameters! {
     /// How the cloud is coloured and splatted.
     #[derive(Clone, Debug, PartialEq)]
     pub struct RenderParams {
-        /// Side of the square that a point covers in the synthetic view, odd.
+        /// Side of the square that a point covers in the synthetic view.
         ///
         /// One pixel is the default: over 40 real pairs 10 m apart it served the photometric cost
         /// best (30 of 30 within 2 m, 28 for 3 px) and mutual information equally.
-        pub splat_px: usize = 1 => count("splat_px", "px", 1..=15),
+        pub splat_px: usize = 1 => odd("splat_px", "px", 1..=15),
         /// Whether points that the reference camera cannot see are left uncoloured.
         pub visibility: bool = true => flag("visibility"),
         /// A point counts as hidden when a surface nearer by more than this share of its depth lies
         /// before it.
         pub visibility_margin: f64 = 0.10 => number("visibility_margin", "", 0.0..=1.0),
-        /// Side of the window in which a nearer surface hides a point, odd.
-        pub visibility_window_px: usize = 5 => count("visibility_window_px", "px", 1..=31),
+        /// Side of the window in which a nearer surface hides a point.
+        pub visibility_window_px: usize = 5 => odd("visibility_window_px", "px", 1..=31),
     }
 }
 

@@ -138,6 +138,11 @@ fn edited(
                     let range = *range.start() as f64..=*range.end() as f64;
                     number(ui, label, *value as f64, range, (0, &suffix))
                 }
+                (Value::Count(value), Domain::Odd(range)) => {
+                    let range = *range.start() as f64..=*range.end() as f64;
+                    let edited = number(ui, label, *value as f64, range, (0, &suffix))?;
+                    edited.parse().ok().map(|edited: usize| (edited | 1).to_string())
+                }
                 (Value::Flag(value), _) => {
                     let mut value = *value;
                     let response = ui.checkbox(&mut value, "").labelled_by(label);

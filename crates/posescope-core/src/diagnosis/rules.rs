@@ -86,6 +86,7 @@ verdicts! {
     F1 in f1,
     F2 in f2,
     E1 in e1,
+    E2 in e2,
     D9 in d9,
     D5 in d5,
     H1 in h1,
@@ -245,6 +246,7 @@ impl Code {
             Failure::NoReferenceSucceeded { failure, .. } => Self::of(failure),
             Failure::NotJoint { .. } => Self::F2,
             Failure::NotAnswered { .. } => Self::E1,
+            Failure::UnknownMethod { .. } | Failure::Parameter(_) => Self::E2,
             Failure::LowConfidence { .. } => Self::L1,
             Failure::Internal { .. } => Self::X9,
         }

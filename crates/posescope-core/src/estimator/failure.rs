@@ -1,9 +1,12 @@
 //! Why a query could not be localised.
 
+use super::methods;
 use crate::cost::SearchRule;
 use crate::grid::LatticeTooLarge;
 use crate::method::Method;
+use crate::params::ParamError;
 use crate::robust::Counted;
+use crate::text::similar;
 
 /// A typed reason with its evidence. In statistics it counts as an infinite error.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -66,13 +69,13 @@ pub enum Failure {
     },
     /// The pose is farther from the reference than the query can be.
     #[error(
-        "The pose is too far from the reference: {distance_m:.1} m, where {radius_m:.1} m is allowed."
+        "The pose is too far from the reference: {distance_m:.2} m, where {allowed_m:.2} m is allowed."
     )]
     OutsideRadius {
         /// Distance of the pose from the reference \[m\].
         distance_m: f64,
-        /// The problem's uncertainty radius \[m\].
-        radius_m: f64,
+        /// The greatest distance that is allowed: what the problem believes, and the slack of the method \[m\].
+        allowed_m: f64,
     },
     /// The reference camera sees no point of its cloud.
     #[error("The reference camera sees none of the {points} points of its cloud.")]
@@ -167,6 +170,17 @@ pub enum Failure {
         /// How it searches, if it would have a joint pose with another search.
         search: Option<SearchRule>,
     },
+    /// No estimator has this name.
+    #[error("There is no method `{method}`{}.", perhaps(*.nearest))]
+    UnknownMethod {
+        /// The name.
+        method: Method,
+        /// The method whose name is most like it, if one is.
+        nearest: Option<Method>,
+    },
+    /// A parameter has a value outside its range.
+    #[error("A parameter is not possible: {0}.")]
+    Parameter(#[from] ParamError),
     /// Another system has no answer here.
     #[error("There is nothing to judge: {answers} has no {missing}.")]
     NotAnswered {
@@ -191,6 +205,19 @@ pub enum Failure {
         /// What it said.
         message: String,
     },
+}
+
+impl Failure {
+    /// That no estimator is called so.
+    pub(crate) fn unknown(method: Method) -> Self {
+        let names = methods().map(Method::name);
+        let nearest = similar(method.name(), names).map(Method::named);
+        Self::UnknownMethod { method, nearest }
+    }
+}
+
+fn perhaps(nearest: Option<Method>) -> String {
+    nearest.map(|nearest| format!(" (did you mean `{nearest}`?)")).unwrap_or_default()
 }
 
 /// Rounded down, so that a limit that was missed never reads as reached.

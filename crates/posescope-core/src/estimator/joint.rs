@@ -42,7 +42,7 @@ type JointPose = (Pose, Vec<Option<Support>>);
 
 /// The pose that several references give together, and what each has to do with it, in their order.
 ///
-/// A method or a search that takes one reference at a time, or a method in no registry, fails with [`Failure::NotJoint`].
+/// A method or a search that takes one reference at a time fails with [`Failure::NotJoint`].
 ///
 /// # Errors
 /// Only [`Cancelled`].
@@ -80,7 +80,7 @@ fn agree(
     references: &[JointReference<'_>],
     trace: &mut Trace<'_>,
 ) -> Result<JointPose, Halt> {
-    let entry = find(method).ok_or(Failure::NotJoint { method, search: None })?;
+    let entry = find(method).ok_or_else(|| Failure::unknown(method))?;
     if let Some(HybridParts { first, second }) = entry.hybrid {
         let agreed = separate_failure(agree(first, params, references, trace))?;
         let Err(failure) = &agreed else {

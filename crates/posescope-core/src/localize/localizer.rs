@@ -446,7 +446,8 @@ impl<'a> Localizer<'a> {
         trace: &mut Trace<'_>,
     ) -> Result<Outcome, Cancelled> {
         let parts = estimator::find(method).and_then(|entry| entry.hybrid());
-        let (Some(parts), Some(_)) = (parts, self.least_probability) else {
+        let sound = self.params.check();
+        let (Some(parts), Some(_), Ok(())) = (parts, self.least_probability, sound) else {
             return estimate_traced(problem, method, self.params, trace);
         };
         let ask_first = |first: &dyn Estimator, trace: &mut Trace<'_>| {

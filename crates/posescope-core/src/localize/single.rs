@@ -15,8 +15,8 @@ use crate::trace::{Cancelled, Trace};
 /// Localises the query of a problem. A query without a pose is an outcome too, which says why.
 ///
 /// The answer depends on the problem, the method and the parameters, never on the number of threads.
-/// A method that this crate does not have gives a [`Failure::Internal`]. To run your own estimator or
-/// cost, call [`localize_by`].
+/// A method that this crate does not have gives a [`Failure::UnknownMethod`], and a parameter outside its range a
+/// [`Failure::Parameter`]. To run your own estimator or cost, call [`localize_by`].
 pub fn localize(problem: &Problem, method: Method, params: &Params) -> Outcome {
     localize_traced(problem, method, params, &mut Trace::off())
         .unwrap_or_else(|Cancelled| unreachable!("a trace that is off cancels nothing"))
@@ -54,11 +54,12 @@ pub(super) fn estimate_traced(
     params: &Params,
     trace: &mut Trace<'_>,
 ) -> Result<Outcome, Cancelled> {
-    match estimator::find(method) {
-        Some(entry) => localize_by(entry.make(params).as_ref(), problem, trace),
-        None => Ok(Outcome::failed(Failure::Internal {
-            message: format!("the method {method} is in no registry"),
-        })),
+    let Some(entry) = estimator::find(method) else {
+        return Ok(Outcome::failed(Failure::unknown(method)));
+    };
+    match params.check() {
+        Ok(()) => localize_by(entry.make(params).as_ref(), problem, trace),
+        Err(error) => Ok(Outcome::failed(error.into())),
     }
 }
 
@@ -77,8 +78,7 @@ pub fn localize_by(
 }
 
 /// Localises one query against several references at once. Returns the share of each in the pose too. A
-/// method that takes one at a time, or is in no registry, fails with [`Failure::NotJoint`]; a panic is a
-/// [`Failure::Internal`].
+/// method that takes one at a time fails with [`Failure::NotJoint`]; a panic is a [`Failure::Internal`].
 ///
 /// # Errors
 /// [`Cancelled`] when a sink asks the run to stop.
@@ -88,6 +88,9 @@ pub(super) fn localize_jointly(
     params: &Params,
     trace: &mut Trace<'_>,
 ) -> Result<(Result<Pose, Failure>, Vec<Share>), Cancelled> {
+    if let Err(error) = params.check() {
+        return Ok((Err(error.into()), Vec::new()));
+    }
     caught(|| estimate_jointly(method, params, references, trace))
         .unwrap_or_else(|failure| Ok((Err(failure), Vec::new())))
 }

@@ -38,6 +38,8 @@ fn a_consensus_outside_the_uncertainty_radius_is_refused_unless_the_bare_rule_is
     let refused = outcome(Method::FB, &near, &Params::default()).pose;
     let failure = refused.expect_err("it is twice as far as it may be");
     assert!(matches!(failure, Failure::OutsideRadius { .. }), "{failure}");
+    // A tenth beyond the radius is allowed.
+    assert!(failure.to_string().ends_with("m, where 0.55 m is allowed."), "{failure}");
     assert_eq!(Code::of(&failure), Code::R9);
     for accepting in ["fb.accept=paper", "fb.radius_slack=2"] {
         let pose = outcome(Method::FB, &near, &with(&[accepting])).pose;

@@ -1,13 +1,11 @@
-//! What a user of the library sees: its public names, threads of one's own, and an end at any time.
+//! What a user of the library sees: its public names, threads of one's own, and what is refused.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
-use std::sync::LazyLock;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
-use std::time::{Duration, Instant};
 use std::{env, fs};
 
+use posescope_core::diagnosis::Code;
 use posescope_core::event::KindSet;
 use posescope_core::{
     Cancelled, Method, Params, Record, Sink, Trace, localize, localize_traced, methods, rayon,
@@ -105,56 +103,22 @@ fn each_call_can_have_threads_of_its_own() {
     }
 }
 
-/// The processor time of this thread, which other programs do not lengthen; the clock's time where the
-/// system does not say.
-fn processor_time() -> Duration {
-    static START: LazyLock<Instant> = LazyLock::new(Instant::now);
-    let stat = fs::read_to_string("/proc/thread-self/schedstat").ok();
-    let nanoseconds = stat.and_then(|stat| stat.split_whitespace().next()?.parse().ok());
-    nanoseconds.map_or_else(|| START.elapsed(), Duration::from_nanos)
-}
-
-/// Notes the longest time between two looks at the flag, which it keeps up.
-struct Looks<'a> {
-    flag: &'a AtomicBool,
-    last: Duration,
-    longest: Duration,
-}
-
-impl Sink for Looks<'_> {
-    fn wanted(&self) -> KindSet {
-        KindSet::NONE
-    }
-
-    fn accept(&mut self, _: &Record) -> Result<(), Cancelled> {
-        Ok(())
-    }
-
-    fn attend(&mut self) -> Result<(), Cancelled> {
-        self.flag.store(true, Ordering::Release);
-        let now = processor_time();
-        self.longest = self.longest.max(now - self.last);
-        self.last = now;
-        Ok(())
-    }
-}
-
 #[test]
-#[ignore = "measures processor time, which other programs on the same core lengthen"]
-fn a_run_looks_at_the_flag_at_least_every_50_ms() {
-    let problem = solvable();
-    let params = Params::default();
-    // All work is done by the thread whose time is taken.
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a pool");
+fn what_is_asked_for_wrongly_is_no_bug() {
+    let (problem, mut params) = (solvable(), Params::default());
+    let refused = |method, params: &Params| {
+        let failure = localize(&problem, method, params).pose.expect_err("refused");
+        assert_eq!(Code::of(&failure).name(), "E2");
+        failure.to_string()
+    };
+    let words = "There is no method `robst` (did you mean `robust`?).";
+    assert_eq!(refused(Method::named("robst"), &params), words);
+    assert_eq!(refused(Method::named("xyz"), &params), "There is no method `xyz`.");
+    params.grid.rounds = 0;
+    let words = "A parameter is not possible: `grid.rounds` takes 1 … 10, not `0`.";
     for method in methods() {
-        let longest = pool.install(|| {
-            let flag = AtomicBool::new(true);
-            let last = processor_time();
-            let mut looks = Looks { flag: &flag, last, longest: Duration::ZERO };
-            let mut trace = Trace::watched(&mut looks, Some(&flag));
-            localize_traced(&problem, method, &params, &mut trace).expect("nobody cancels");
-            looks.longest.max(processor_time() - looks.last)
-        });
-        assert!(longest <= Duration::from_millis(50), "{method}: {longest:?}");
+        assert_eq!(refused(method, &params), words);
     }
+    params.grid.rounds = 10;
+    assert!(localize(&problem, Method::FB, &params).pose.is_ok());
 }

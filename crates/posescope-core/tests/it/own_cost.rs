@@ -96,6 +96,6 @@ fn a_panic_in_a_cost_is_an_outcome() {
 #[test]
 fn a_method_that_nobody_registered_is_an_outcome() {
     let outcome = localize(&solvable(), Method::named("mine"), &Params::default());
-    let message = "the method mine is in no registry".to_owned();
-    assert_eq!(outcome.pose, Err(Failure::Internal { message }));
+    let (method, nearest) = (Method::named("mine"), Some(Method::MI));
+    assert_eq!(outcome.pose, Err(Failure::UnknownMethod { method, nearest }));
 }

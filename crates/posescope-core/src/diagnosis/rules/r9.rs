@@ -15,32 +15,33 @@ pub(super) const RULE: Rule = Rule {
 /// A pose was refused for its distance from the reference, or the right one would have been.
 fn test(case: &Case<'_>) -> Option<Diagnosis> {
     case.matches()?;
-    if let Some(Failure::OutsideRadius { distance_m, radius_m }) =
+    if let Some(Failure::OutsideRadius { distance_m, allowed_m }) =
         case.subject.outcome.pose.as_ref().err()
     {
         return Some(RULE.found(&Outside {
             distance_m: *distance_m,
-            radius_m: *radius_m,
+            allowed_m: *allowed_m,
             error: Some(case.consensus_error()?),
         }));
     }
     let distance_m = (case.subject.reference_from_truth()?.translation.vector).norm();
-    let radius_m = case.subject.problem.believed_within_m();
-    let is_outside = distance_m > radius_m * (1.0 + case.matching().radius_slack);
-    is_outside.then(|| RULE.found(&Outside { distance_m, radius_m, error: None }))
+    let slack = case.matching().radius_slack;
+    let allowed_m = case.subject.problem.believed_within_m() * (1.0 + slack);
+    let is_outside = distance_m > allowed_m;
+    is_outside.then(|| RULE.found(&Outside { distance_m, allowed_m, error: None }))
 }
 
 // Of the pose that was found, or without an error of the truth.
-evidence!(Outside { distance_m: f64, radius_m: f64, error: Option<PoseError> } => {
-    let (distance, radius) = (metres(*distance_m), metres(*radius_m));
+evidence!(Outside { distance_m: f64, allowed_m: f64, error: Option<PoseError> } => {
+    let (distance, allowed) = (metres(*distance_m), metres(*allowed_m));
     match error {
         Some(error) => format!(
-            "The pose was refused for its distance: {distance} from the reference, {radius} allowed. \
+            "The pose was refused for its distance: {distance} from the reference, {allowed} allowed. \
              The refused pose is {} off.",
             metres(error.translation_m)
         ),
         None => format!(
-            "The truth is outside the prior: {distance} from the reference, {radius} allowed."
+            "The truth is outside the prior: {distance} from the reference, {allowed} allowed."
         ),
     }
 });

@@ -136,15 +136,15 @@ impl FeatureBased {
         trace: &mut Trace<'_>,
     ) -> Result<Pose, Halt> {
         let distance_m = reference_from_query.translation.vector.norm();
-        let radius_m = problem.believed_within_m();
+        let allowed_m = problem.believed_within_m() * (1.0 + self.params.radius_slack);
         // The paper's rule asks for inliers alone.
         let is_bounded = self.params.accept == AcceptanceRule::Consensus;
         let verdict = if !self.accepts(&acceptance) {
             let needed = acceptance.needed.unwrap_or(tested + 1);
             let inliers = acceptance.inliers;
             Err(Failure::ChanceConsensus { inliers, tested, needed, counted })
-        } else if is_bounded && distance_m > radius_m * (1.0 + self.params.radius_slack) {
-            Err(Failure::OutsideRadius { distance_m, radius_m })
+        } else if is_bounded && distance_m > allowed_m {
+            Err(Failure::OutsideRadius { distance_m, allowed_m })
         } else {
             Ok(())
         };
