@@ -59,7 +59,7 @@ impl<'a> Case<'a> {
         estimator::find(self.subject.method)?.hybrid()
     }
 
-    /// What the truth says about the matches; `None` where nothing was matched.
+    /// What the truth says about the features and their matches; `None` where no features were sought.
     pub(super) fn matches(&self) -> Option<&TrueMatches> {
         let matches = || TrueMatches::of(self.subject, &self.matching());
         self.matches.get_or_init(matches).as_ref()

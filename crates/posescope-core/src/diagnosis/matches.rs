@@ -109,7 +109,7 @@ pub(super) struct TrueMatches {
 }
 
 impl TrueMatches {
-    /// `None` where the method did not reach matching, or the truth is unknown.
+    /// `None` where the method sought no features, or the truth is unknown.
     pub(super) fn of(subject: &Subject<'_>, matching: &Matching<'_>) -> Option<Self> {
         let evidence = subject.evidence;
         let (query, reference) = (evidence.query.as_ref()?, evidence.reference.as_ref()?);
@@ -208,7 +208,7 @@ impl TrueMatches {
     /// Whether so many unique matches lie on their epipolar lines without the right depth that they cannot
     /// all be false. Streets look alike, and false matches of a drive lie near epipolar lines too.
     pub(super) fn many_without_depth(&self) -> bool {
-        4 * (self.wrong_depth + self.no_depth) >= self.all_unique
+        self.all_unique > 0 && 4 * (self.wrong_depth + self.no_depth) >= self.all_unique
     }
 
     /// True matches that a better cloud would have kept. Where the cloud gives depths as clouds do, those

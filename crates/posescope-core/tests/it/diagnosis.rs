@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use posescope_core::diagnosis::Code;
 use posescope_core::diagnosis::{Diagnosis, Evidence, Subject, Tolerance, diagnose};
-use posescope_core::event::KindSet;
+use posescope_core::event::{JudgedPose, KindSet};
 use posescope_core::geometry::Pose;
 use posescope_core::localize::{
     LocalizeError, LocalizeObserver, Localizer, NoObserver, QueryResult, Request, StageTimes,
@@ -197,7 +197,8 @@ fn a_truth_beyond_the_prior_is_said_of_a_pose_that_was_accepted_elsewhere() {
     let beyond = found(at(3.4));
     let outside = beyond.iter().find(|finding| finding.code == Code::R9);
     let outside = outside.expect("R9");
-    assert!(outside.text.contains("3.40 m from the reference"), "{}", outside.text);
+    let words = "The truth is outside the prior: 3.40 m from the reference, 3.30 m allowed.";
+    assert_eq!(outside.text, words);
     let within = found(at(3.2));
     assert!(primary(&within).is_some(), "wrong all the same");
     assert!(!codes(&within).contains(&Code::R9), "{within:?}");
@@ -288,15 +289,23 @@ fn a_judge_that_passes_over_what_is_right_answers_for_it() {
     let mut outcome =
         localize_traced(&problem, robust, &params, &mut trace).expect("nobody cancels");
     let candidates = evidence.candidates.clone().expect("several poses");
-    let mut taken = candidates[0].clone();
+    let mut taken = candidates.iter().find(|one| !one.from_features).expect("of mi6").clone();
     taken.refined.pose *= Pose::translation(3.0, 0.0, 0.0);
     outcome.pose = Ok(problem.world_from_query(&taken.refined.pose));
-    let all = [taken].into_iter().chain(candidates.iter().cloned());
-    evidence.candidates = Some(all.collect());
     let truth = truth(&problem);
-    let subject = Subject::new(&problem, robust, &params, &outcome, &evidence);
-    let found = diagnose(&subject.against(Some(&truth), Tolerance::default()));
+    let mut found_of = |is_there: fn(&JudgedPose) -> bool| {
+        let others = candidates.iter().filter(|one| is_there(one)).cloned();
+        evidence.candidates = Some([taken.clone()].into_iter().chain(others).collect());
+        let subject = Subject::new(&problem, robust, &params, &outcome, &evidence);
+        diagnose(&subject.against(Some(&truth), Tolerance::default()))
+    };
+    let found = found_of(|_| true);
     assert_eq!(primary(&found), Some(Code::H1), "{found:?}");
+    // Between two minima of one method, its cost or its search decided.
+    let found = found_of(|one| !one.from_features);
+    assert!(!codes(&found).contains(&Code::H1), "{found:?}");
+    let is_of_the_search = |code: &Code| [Code::D2, Code::D3].contains(code);
+    assert!(codes(&found).iter().any(is_of_the_search), "{found:?}");
 }
 
 #[test]
@@ -312,6 +321,18 @@ fn the_true_matches_only_become_fewer_on_their_way() {
     let matches = ["nearest", "ratio", "unique"].map(count);
     assert!(matches.is_sorted_by(|a, b| a >= b), "{funnel}");
     assert!(matches[0] > 20 && matches[2] < 8, "{funnel}");
+}
+
+#[test]
+fn nothing_is_said_of_matches_that_were_never_sought() {
+    let problem = solvable();
+    let params = with(&["surf.threshold=1000000"]);
+    let found = verdicts(&problem, Method::FB, &params, Some(&truth(&problem)));
+    assert_eq!(codes(&found), [Code::R2], "{found:?}");
+    // Where the ratio test leaves none, that is said, and nothing of their depths.
+    let found = verdicts(&problem, Method::FB, &with(&["fb.ratio=0.1"]), Some(&truth(&problem)));
+    assert_eq!(primary(&found), Some(Code::R3), "{found:?}");
+    assert!(!codes(&found).contains(&Code::R4), "{found:?}");
 }
 
 #[test]

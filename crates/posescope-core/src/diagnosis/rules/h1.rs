@@ -41,7 +41,8 @@ evidence!(Kept { hybrid: Method, kept: Method, not_asked: Method, error: PoseErr
     hybrid.label(), metres(error.translation_m)
 );
 
-/// A candidate was right, and another one was taken.
+/// A method had a right candidate, and that of another one was taken. Where both are of one method, its search or its cost
+/// failed, which other rules say.
 fn passed_over(case: &Case<'_>) -> Option<Diagnosis> {
     case.subject.evidence.settled.as_ref()?;
     let truth = case.subject.reference_from_truth()?;
@@ -49,7 +50,8 @@ fn passed_over(case: &Case<'_>) -> Option<Diagnosis> {
     let (taken, others) = candidates.split_first()?;
     let error = |pose: &Pose| PoseError::between(&truth, pose);
     let is_right = |pose: &Pose| case.subject.tolerance.contains(&error(pose));
-    let right = others.iter().find(|other| is_right(&other.refined.pose))?;
+    let mut of_others = others.iter().filter(|other| other.method != taken.method);
+    let right = of_others.find(|other| is_right(&other.refined.pose))?;
     Some(RULE.found(&PassedOver {
         kept: taken.method,
         cost_kept: taken.refined.cost,

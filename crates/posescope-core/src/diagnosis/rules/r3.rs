@@ -18,6 +18,8 @@ pub(super) const RULE: Rule = Rule {
 };
 
 fn test(case: &Case<'_>) -> Option<Diagnosis> {
+    // Where nothing was matched, R2 or the failure says why.
+    case.subject.evidence.decisions.as_ref()?;
     let matches = case.matches()?;
     let funnel = matches.funnel;
     let without_depth = if matches.many_without_depth() {
