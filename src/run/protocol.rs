@@ -125,11 +125,12 @@ pub struct Protocol {
     )]
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub estimates: Vec<EstimatesFile>,
-    /// The methods; mi6, fb2, robust and nid are not from the paper [default: fb,pm,mi,hy]
+    /// The methods.
     #[cfg_attr(
         feature = "cli",
         arg(
             long = "method",
+            help = about_methods(),
             help_heading = "Methods",
             value_name = "fb,pm,mi,hy",
             value_delimiter = ',',
@@ -140,7 +141,7 @@ pub struct Protocol {
     pub methods: Vec<Method>,
     /// Fuse several references to one pose: maxf, avg, wavg, r-wavg or joint
     ///
-    /// joint uses all references in one estimate (fb, pm, mi, nid, hy); the others combine the poses of the single
+    /// joint uses all references in one estimate, where the method can; the others combine the poses of the single
     /// references. Without this option, each reference gives its own pose; `eval` fuses several by r-wavg.
     #[cfg_attr(
         feature = "cli",
@@ -284,6 +285,18 @@ pub enum ProtocolError {
         "--reference takes either frames, or one of random:K, nearest:K, matches:K and retrieve:K"
     )]
     References,
+}
+
+/// The help of `--method`, which names the methods that are not from the paper.
+#[cfg(feature = "cli")]
+fn about_methods() -> String {
+    let others = estimator::methods().filter(|method| !Method::PAPER.contains(method));
+    let others: Vec<&str> = others.map(Method::name).collect();
+    let (last, first) = others.split_last().map_or(("", &[][..]), |(last, first)| (*last, first));
+    format!(
+        "The methods; {} and {last} are not from the paper [default: fb,pm,mi,hy]",
+        first.join(", ")
+    )
 }
 
 impl Protocol {
