@@ -134,8 +134,11 @@ fn reads(method: &str, key: &str) -> bool {
         let groups = ["surf.", "fb.", "retrieval.", "index."];
         return groups.iter().any(|group| key.starts_with(group));
     }
-    let method = method.parse().expect("a method");
-    estimator::entry(method).reads(&Params::default(), key)
+    let entry = estimator::entry(method.parse().expect("a method"));
+    // Tables of a cost have its descent too.
+    let mut descent = Params::default();
+    let _ = descent.set(&format!("{method}.search"), "descent");
+    [Params::default(), descent].iter().any(|params| entry.reads(params, key))
 }
 
 /// A number that changes with the defaults that these methods read.
