@@ -195,7 +195,7 @@ pub fn kind(result: &QueryResult) -> Proof {
 pub(crate) fn problem_of<'a>(result: &QueryResult, problems: &'a [Problem]) -> Option<&'a Problem> {
     let named =
         result.diagnosis.first().and_then(|found| found.evidence.get("reference")?.as_str());
-    let is_named = |problem: &&Problem| named == Some(problem.reference.name.as_str());
+    let is_named = |problem: &&Problem| named == Some(problem.reference().name());
     problems.iter().find(is_named).or(problems.first())
 }
 

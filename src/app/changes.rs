@@ -412,7 +412,7 @@ impl AppState {
             Some(problem.world_from_query(&best.reference_from_camera()))
         };
         match target {
-            NamedPose::Start => Some(problem.reference.world_from_camera),
+            NamedPose::Start => Some(*problem.reference().world_from_camera()),
             NamedPose::Coarse => minimum(Phase::PositionCoarse),
             NamedPose::Fine => minimum(Phase::PositionFine),
             NamedPose::Estimate => {

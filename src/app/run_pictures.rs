@@ -180,7 +180,7 @@ fn picture_of(question: &Drawn) -> DynamicImage {
     let dots = |colors: Vec<Option<palette::Rgb>>| {
         let keypoints = question.keypoints.as_ref();
         let keypoints = keypoints.map_or(&[][..], |event| &event.features.keypoints);
-        dotted(&picture::photo(&problem.query.photo), keypoints, &colors)
+        dotted(&picture::photo(problem.query().photo()), keypoints, &colors)
     };
     match &question.event {
         Event::FeaturesDetected(event) => {
@@ -219,11 +219,11 @@ fn picture_of(question: &Drawn) -> DynamicImage {
         Event::ReferencesRanked(event) => {
             let first = event.photos.iter().flatten().next();
             first.map_or_else(
-                || picture::photo(&problem.reference.photo),
+                || picture::photo(problem.reference().photo()),
                 |photo| picture::photo(photo),
             )
         }
-        _ => picture::photo(&problem.query.photo),
+        _ => picture::photo(problem.query().photo()),
     }
 }
 

@@ -292,7 +292,7 @@ impl DenseMap {
         let mut grid = params.grid.clone();
         grid.coarse_step_m = params.surface.step_m;
         grid.yaw_step_deg = params.surface.yaw_step_deg;
-        let radius_m = problem.uncertainty_radius_m;
+        let radius_m = problem.uncertainty_radius_m();
         let surface = DenseSurface::new(radius_m, &grid, ask.least_covered);
         Self { ask, surface, took: Duration::ZERO }
     }

@@ -53,8 +53,8 @@ impl MatchExport {
                 };
                 let written = write_matches(
                     &self.folder,
-                    (&problem.query.name, query),
-                    (&problem.reference.name, reference),
+                    (problem.query().name(), query),
+                    (problem.reference().name(), reference),
                     &decided.decisions,
                 );
                 match written {

@@ -101,7 +101,8 @@ impl Sink for CliObserver {
         match &record.event {
             Event::StageStarted(started) => {
                 self.stages.push(started.stage.name());
-                let names = problem.map(|problem| (&problem.query.name, &problem.reference.name));
+                let names =
+                    problem.map(|problem| (problem.query().name(), problem.reference().name()));
                 let task = names.map(|(query, reference)| format!("{query} ← {reference}"));
                 let path = self.stages.join(" › ");
                 self.bar.set_message(format!("{} {path}", task.unwrap_or_default()));

@@ -175,11 +175,11 @@ impl Plan<'_> {
             let query = of.query(*query)?;
             for &reference in &references.frames {
                 let reference = from.query(reference)?;
-                if reference.photo.gray == query.photo.gray {
+                if reference.photo().gray == query.photo().gray {
                     log::warn!(
                         "{} is the same photo as the reference {}: the result says nothing; name another --reference",
-                        query.name,
-                        reference.name
+                        query.name(),
+                        reference.name()
                     );
                 }
             }

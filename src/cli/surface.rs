@@ -39,9 +39,9 @@ pub fn surface(args: &RunArgs, out: &Path, terminal: &Terminal) -> Result<(), Cl
         ));
     };
     let reference = references.reference(references.find(reference)?)?;
-    let mut problem = Problem::new(queried.query(query)?, reference, task.radius_m())
-        .map_err(|error| CliError::Usage(error.to_string()))?;
-    problem.seed = task.protocol.seed;
+    let problem = Problem::new(queried.query(query)?, reference, task.radius_m())
+        .map_err(|error| CliError::Usage(error.to_string()))?
+        .with_seed(task.protocol.seed);
     let mut grid = task.params.grid.clone();
     grid.coarse_step_m = task.params.surface.step_m;
     grid.yaw_step_deg = task.params.surface.yaw_step_deg;

@@ -37,7 +37,7 @@ pub(super) fn cost_map(case: &ProofCase<'_>, overlay: MapOverlay) -> Option<Proo
     let result = seen("result", case.pose());
     let truth = seen("truth", case.truth.copied());
     let mut beside: Vec<Panel> = Vec::new();
-    let query = &case.problem.query.photo.gray;
+    let query = &case.problem.query().photo().gray;
     match (overlay, &truth, &result) {
         (MapOverlay::Preference, Some(truth), Some(result)) => {
             let parts = picture::preference(query, &result.comparison, &truth.comparison);
@@ -48,12 +48,12 @@ pub(super) fn cost_map(case: &ProofCase<'_>, overlay: MapOverlay) -> Option<Proo
         _ => {}
     }
     if beside.is_empty() {
-        beside.push(Panel::photo("Query", &case.problem.query.photo));
+        beside.push(Panel::photo("Query", case.problem.query().photo()));
     }
     if overlay == MapOverlay::Light {
-        let reference = &case.problem.reference;
-        let title = format!("Reference {}", reference.name);
-        beside.push(Panel::photo(title, &reference.photo));
+        let reference = case.problem.reference();
+        let title = format!("Reference {}", reference.name());
+        beside.push(Panel::photo(title, reference.photo()));
     }
     for seen in result.iter().chain(&truth) {
         beside.push(view_panel(query, seen));
@@ -84,7 +84,7 @@ pub(super) fn freed_views(case: &ProofCase<'_>) -> Option<ProofPicture> {
     let estimator = estimator::find(method)?.make(case.params);
     let reference_from_truth = case.problem.reference_from_query(truth);
     let on_plane = Offset::of(&reference_from_truth).reference_from_camera();
-    let query = &case.problem.query.photo.gray;
+    let query = &case.problem.query().photo().gray;
     let seen = |label, pose: Pose| Seen::at(case, estimator.as_ref(), label, pose);
     let frozen = seen(
         "true place, with the reference's height, pitch and roll",
@@ -161,7 +161,7 @@ fn map(
             }
         }
         MapOverlay::Reach | MapOverlay::Rim => {
-            let radius_m = case.problem.uncertainty_radius_m;
+            let radius_m = case.problem.uncertainty_radius_m();
             let around = (0..=72).map(|step| {
                 let angle = f64::from(step) * std::f64::consts::TAU / 72.0;
                 let offset = Offset {

@@ -57,7 +57,7 @@ struct Matches<'a> {
 
 impl<'a> Matches<'a> {
     fn of(case: &ProofCase<'a>) -> Option<Self> {
-        let camera = &case.problem.query.intrinsics;
+        let camera = case.problem.query().intrinsics();
         let inlier_px = case.params.fb.mlesac.inlier_threshold_px;
         let progress = FeatureProgress::of(case.records, Some(camera), inlier_px);
         // Of a photo without keypoints the states are known, but nothing was matched.
@@ -113,13 +113,14 @@ pub(super) fn matches(case: &ProofCase<'_>) -> Option<ProofPicture> {
     let Some(matches) = Matches::of(case) else {
         return keypoints(case);
     };
-    let (canvas, top) = picture::stacked(&case.problem.query.photo, &case.problem.reference.photo);
+    let (canvas, top) =
+        picture::stacked(case.problem.query().photo(), case.problem.reference().photo());
     let title = if case.truth.is_some() {
         "green: true matches, orange: false inliers"
     } else {
         "the inliers"
     };
-    let title = format!("Query above reference {}; {title}", case.problem.reference.name);
+    let title = format!("Query above reference {}; {title}", case.problem.reference().name());
     let mut panel = Panel::new(title, canvas.into_rgb8());
     let kinds: [LineKind; 4] = [
         (FAINT, 0.5, |one| one.point.is_some() && !one.is_inlier() && one.is_true != Some(true)),
@@ -141,7 +142,8 @@ pub(super) fn matches(case: &ProofCase<'_>) -> Option<ProofPicture> {
 
 /// Both photos with their keypoints, where nothing was matched.
 fn keypoints(case: &ProofCase<'_>) -> Option<ProofPicture> {
-    let (canvas, top) = picture::stacked(&case.problem.query.photo, &case.problem.reference.photo);
+    let (canvas, top) =
+        picture::stacked(case.problem.query().photo(), case.problem.reference().photo());
     let mut panel = Panel::new("", canvas.into_rgb8());
     let mut counts = [None; 2];
     for event in case.all::<FeaturesDetected>() {
@@ -219,12 +221,12 @@ pub(super) fn depth_patches(case: &ProofCase<'_>) -> Option<ProofPicture> {
         Some(_) => "false (orange)",
         None => "with a depth (orange)",
     };
-    let reference = &case.problem.reference;
+    let reference = case.problem.reference();
     let mut large = Panel::new(
         format!(
             "Depths of the cloud. Matches: {with_depth} {judged}, {missing} without a depth (white)"
         ),
-        cloud_picture(&reference.photo, [&reference.intrinsics; 2], case, &Pose::identity()).0,
+        cloud_picture(reference.photo(), [reference.intrinsics(); 2], case, &Pose::identity()).0,
     );
     for one in &doubtful {
         let color = match one.point {
@@ -251,9 +253,9 @@ struct ScanPixels(Vec<Point2<f64>>);
 
 impl ScanPixels {
     fn of(case: &ProofCase<'_>) -> Self {
-        let reference = &case.problem.reference;
-        let camera = &reference.intrinsics;
-        let points = reference.cloud.points.iter();
+        let reference = case.problem.reference();
+        let camera = reference.intrinsics();
+        let points = reference.cloud().points.iter();
         let seen = points.filter_map(|point| camera.project(&point.cast::<f64>()));
         Self(seen.filter(|pixel| camera.contains(pixel)).collect())
     }
@@ -295,7 +297,7 @@ fn depth_patch(photo: &RgbImage, one: &Matched<'_>, title: String) -> Panel {
 pub(super) fn inlier_spread(case: &ProofCase<'_>) -> Option<ProofPicture> {
     let matches = Matches::of(case)?;
     let title = format!("The {} inliers in the query", matches.inliers().count());
-    let mut large = Panel::photo(title, &case.problem.query.photo);
+    let mut large = Panel::photo(title, case.problem.query().photo());
     for one in matches.inliers() {
         large.mark(Thing::Dot(palette::TRUTH), place(one.query), "");
     }
@@ -307,7 +309,7 @@ pub(super) fn inlier_spread(case: &ProofCase<'_>) -> Option<ProofPicture> {
 pub(super) fn rival_inliers(case: &ProofCase<'_>) -> Option<ProofPicture> {
     let matches = Matches::of(case)?;
     let panel = |title: String, ones: &mut dyn Iterator<Item = &Matched<'_>>| {
-        let mut panel = Panel::photo(title, &case.problem.query.photo);
+        let mut panel = Panel::photo(title, case.problem.query().photo());
         for one in ones {
             let color = if one.is_true == Some(true) { palette::TRUTH } else { palette::ESTIMATE };
             panel.mark(Thing::Dot(color), place(one.query), "");
@@ -330,12 +332,12 @@ pub(super) fn cloud_on_photo(case: &ProofCase<'_>) -> Option<ProofPicture> {
     if let Some(cameras) = cloud_by_two_cameras(case) {
         return Some(cameras);
     }
-    let (query, of_reference) = (&case.problem.query, &case.problem.reference.intrinsics);
+    let (query, of_reference) = (case.problem.query(), case.problem.reference().intrinsics());
     let large = reference_cloud(case);
     let on_query = |what: &str, query_from_reference: &Pose| {
         let (picture, points) = cloud_picture(
-            &query.photo,
-            [&query.intrinsics, of_reference],
+            query.photo(),
+            [query.intrinsics(), of_reference],
             case,
             query_from_reference,
         );
@@ -357,19 +359,19 @@ pub(super) fn cloud_on_photo(case: &ProofCase<'_>) -> Option<ProofPicture> {
 /// The cloud on the reference's own photo. Its edges lie on those of the photo. If they do not, the cloud or its place
 /// is wrong, no method can work, and all other verdicts follow from that.
 pub(super) fn reference_cloud(case: &ProofCase<'_>) -> Panel {
-    let reference = &case.problem.reference;
+    let reference = case.problem.reference();
     let (photo, points) =
-        cloud_picture(&reference.photo, [&reference.intrinsics; 2], case, &Pose::identity());
-    Panel::new(format!("Cloud on reference {}: {points} points", reference.name), photo)
+        cloud_picture(reference.photo(), [reference.intrinsics(); 2], case, &Pose::identity());
+    Panel::new(format!("Cloud on reference {}: {points} points", reference.name()), photo)
 }
 
 /// Where the verdict names another camera, of the query or of both photos: the cloud on the query's photo, seen from the
 /// truth as stated and as named.
 fn cloud_by_two_cameras(case: &ProofCase<'_>) -> Option<ProofPicture> {
-    let query = &case.problem.query;
+    let query = case.problem.query();
     let evidence = &case.result.diagnosis.first()?.evidence;
     let camera: Intrinsics = serde_json::from_value(evidence.get("camera")?.clone()).ok()?;
-    let stated = [query.intrinsics, case.problem.reference.intrinsics];
+    let stated = [query.intrinsics(), case.problem.reference().intrinsics()].map(|camera| *camera);
     let is_of_both = evidence.get("right_depth_otherwise").is_some();
     let named = [camera, if is_of_both { camera } else { stated[1] }];
     let query_from_reference = case.query_from_reference()?;
@@ -377,7 +379,7 @@ fn cloud_by_two_cameras(case: &ProofCase<'_>) -> Option<ProofPicture> {
         let Intrinsics { fx, cx, cy, .. } = camera;
         let title = format!("{what}: {fx:.0} px, centre ({cx:.0}, {cy:.0})");
         let cameras = [&camera, &of_reference];
-        Panel::new(title, cloud_picture(&query.photo, cameras, case, &query_from_reference).0)
+        Panel::new(title, cloud_picture(query.photo(), cameras, case, &query_from_reference).0)
     };
     Some(ProofPicture {
         large: seen_by("The cloud on the query at the truth, by the stated camera", stated),
@@ -418,8 +420,8 @@ fn cloud_picture(
     for pixel in canvas.pixels_mut() {
         pixel.0 = pixel.0.map(|value| value / 2);
     }
-    let reference = &case.problem.reference;
-    let points = reference.cloud.points.iter().map(|point| point.cast::<f64>());
+    let reference = case.problem.reference();
+    let points = reference.cloud().points.iter().map(|point| point.cast::<f64>());
     let shown = points.filter(|point| {
         let pixel = of_reference.project(point);
         pixel.is_some_and(|pixel| of_reference.contains(&pixel))

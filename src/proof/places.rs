@@ -147,7 +147,7 @@ pub(super) fn pose_map(case: &ProofCase<'_>) -> ProofPicture {
     if is_alone {
         map.circle([0.0; 2], radius_m);
     }
-    let name = format!("reference {}", problem.reference.name);
+    let name = format!("reference {}", problem.reference().name());
     for (share, pose) in &each {
         let label = format!("{} alone, weight {:.2}", share.reference, share.weight);
         map.camera(Thing::Dot(palette::UNDECIDED), pose, &label);
@@ -157,8 +157,11 @@ pub(super) fn pose_map(case: &ProofCase<'_>) -> ProofPicture {
         large: map.panel,
         below: None,
         beside: vec![
-            Panel::photo("Query", &problem.query.photo),
-            Panel::photo(format!("Reference {}", problem.reference.name), &problem.reference.photo),
+            Panel::photo("Query", problem.query().photo()),
+            Panel::photo(
+                format!("Reference {}", problem.reference().name()),
+                problem.reference().photo(),
+            ),
         ],
     }
 }
@@ -195,7 +198,7 @@ pub(super) fn ranking(case: &ProofCase<'_>) -> Option<ProofPicture> {
         let is_taken = if rank < ranking.chosen { ", taken" } else { "" };
         let title = format!("{}. {}{away}{is_taken}", rank + 1, frame.name);
         let mut panel = Panel::photo(title, photo);
-        if away_m.is_some_and(|away_m| away_m <= case.problem.uncertainty_radius_m) {
+        if away_m.is_some_and(|away_m| away_m <= case.problem.uncertainty_radius_m()) {
             let (width, height) = (panel.picture.width() as f32, panel.picture.height() as f32);
             let corners = [[0.0, 0.0], [width, 0.0], [width, height], [0.0, height], [0.0, 0.0]];
             panel.line(palette::TRUTH, 6.0, corners);
@@ -204,7 +207,7 @@ pub(super) fn ranking(case: &ProofCase<'_>) -> Option<ProofPicture> {
     }
     beside.extend(narrowed(case, ranking));
     Some(ProofPicture {
-        large: Panel::photo("Query", &case.problem.query.photo),
+        large: Panel::photo("Query", case.problem.query().photo()),
         below: None,
         beside,
     })
@@ -214,7 +217,7 @@ pub(super) fn ranking(case: &ProofCase<'_>) -> Option<ProofPicture> {
 /// first of the ranked frames. `None` where there is no prior, or no position.
 fn narrowed(case: &ProofCase<'_>, ranking: &ReferenceRanking) -> Option<Panel> {
     let problem = case.problem;
-    let [prior_m, radius_m] = [problem.prior_m?, problem.uncertainty_radius_m];
+    let [prior_m, radius_m] = [problem.prior_m()?, problem.uncertainty_radius_m()];
     let truth = problem.reference_from_query(case.truth?);
     let frames = ranking.pictured().iter().take(RANKED);
     let poses = frames.map(|frame| Some(problem.reference_from_query(&frame.world_from_camera?)));

@@ -327,7 +327,7 @@ fn a_scan_behind_the_reference_camera_is_not_drawn_into_the_query() {
 #[test]
 fn a_suspect_camera_is_drawn_beside_the_better_one() {
     let (kept, mut result) = neighbours(Method::FB);
-    let stated = kept.problems[0].query.intrinsics;
+    let stated = *kept.problems[0].query().intrinsics();
     let other = crate::camera::Intrinsics { fx: 0.8 * stated.fx, fy: 0.8 * stated.fy, ..stated };
     result.diagnosis = vec![crate::diagnosis::Diagnosis {
         code: crate::diagnosis::Code::X1,
@@ -381,7 +381,7 @@ fn the_reference_that_a_verdict_names_is_shown() {
             text: String::new(),
             evidence,
         }];
-        super::problem_of(&result, &problems).map(|problem| problem.reference.name.clone())
+        super::problem_of(&result, &problems).map(|problem| problem.reference().name().to_owned())
     };
     assert_eq!(shown(serde_json::json!({ "reference": "000002" })).as_deref(), Some("000002"));
     assert_eq!(shown(serde_json::json!({ "reference": "other" })).as_deref(), Some("000001"));
@@ -439,7 +439,7 @@ fn the_map_of_a_ranking_is_true_to_scale_and_needs_a_prior() {
     };
     assert!(told(&kept).is_empty(), "without a prior nothing is narrowed down");
 
-    kept.problems[0].prior_m = Some(40.0);
+    kept.problems[0] = kept.problems[0].clone().with_prior(Some(40.0)).expect("a prior");
     let beside = told(&kept);
     let map = &beside[0];
     let at = |label: &str| {

@@ -45,9 +45,9 @@ pub fn write_event(
 ) -> io::Result<()> {
     let line = Line {
         scenes,
-        query: &problem.query.name,
-        reference: &problem.reference.name,
-        radius_m: problem.uncertainty_radius_m,
+        query: problem.query().name(),
+        reference: problem.reference().name(),
+        radius_m: problem.uncertainty_radius_m(),
         method,
         record,
     };

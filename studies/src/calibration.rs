@@ -218,11 +218,11 @@ fn at(drives: &[Traversal; 5], place: usize, seed: u64) -> Result<Vec<Trial>, Fa
     let (query, truth, reference) = &sides[0];
     // Every other place of queries that do not show it is for fitting.
     let kind = if place.is_multiple_of(2) { UNKNOWABLE } else { "unknowable, set aside" };
-    let color = query.photo.color.as_ref().ok_or("a photo in colour expected")?;
+    let color = query.photo().color.as_ref().ok_or("a photo in colour expected")?;
     let elsewhere = Traversal::new(WORLD_SEED + 1, Condition::Overcast, Size::Full);
     let of_another_town = elsewhere.image(7 * place % elsewhere.frame_count());
     for photo in [image::imageops::flip_horizontal(color), of_another_town] {
-        let query = Query::new("unknowable", Photo::from_color(photo), query.intrinsics)?;
+        let query = Query::new("unknowable", Photo::from_color(photo), *query.intrinsics())?;
         trials.push(trial(&Arc::new(query), reference, None, [kind; 2]));
     }
     let is_other_street = |frame: &usize| {

@@ -163,8 +163,7 @@ impl Plan {
         truth: Pose,
     ) -> Result<Case, Failure> {
         let (query, reference) = (queries.query(query)?, references.reference(reference)?);
-        let mut problem = Problem::new(query, reference, self.radius_m)?;
-        problem.seed = self.seed;
+        let problem = Problem::new(query, reference, self.radius_m)?.with_seed(self.seed);
         Ok(Case { rows, problem, truth })
     }
 }

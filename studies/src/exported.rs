@@ -2,7 +2,6 @@
 
 use std::fs;
 use std::path::Path;
-use std::sync::Arc;
 use std::time::Instant;
 
 use image::GrayImage;
@@ -24,10 +23,8 @@ pub struct Answer {
 
 /// The same problem, of which nothing has been computed yet.
 pub fn forgetful(problem: &Problem) -> Problem {
-    let mut problem = problem.clone();
-    problem.query = Arc::new(problem.query.as_ref().clone());
-    problem.reference = Arc::new(problem.reference.as_ref().clone());
-    problem
+    let (query, reference) = (problem.query().as_ref(), problem.reference().as_ref());
+    problem.clone().with_query(query.clone()).with_reference(reference.clone())
 }
 
 /// Writes a case into a folder within this one: both photos (`*.u8`), the points that the reference camera sees
@@ -38,9 +35,9 @@ pub fn write(
     case: &Case,
     answers: impl Iterator<Item = Answer>,
 ) -> Result<(), Failure> {
-    let Problem { query, reference, .. } = &case.problem;
+    let (query, reference) = (case.problem.query(), case.problem.reference());
     let row = case.rows.first().map_or("", String::as_str);
-    let name = format!("{row} {} {}", query.name, reference.name);
+    let name = format!("{row} {} {}", query.name(), reference.name());
     let name = name.replace(|letter: char| !letter.is_alphanumeric(), "_");
     let folder = folder.join(name);
     fs::create_dir_all(&folder)?;
@@ -48,7 +45,7 @@ pub fn write(
         fs::write(folder.join(name), values.flat_map(f32::to_le_bytes).collect::<Vec<u8>>())
     };
     let mut seconds = Vec::new();
-    for (side, photo) in [("query", &query.photo.gray), ("reference", &reference.photo.gray)] {
+    for (side, photo) in [("query", &query.photo().gray), ("reference", &reference.photo().gray)] {
         fs::write(folder.join(format!("{side}.u8")), photo.as_raw())?;
         let (numbers, took_s) = sift_numbers(photo);
         floats(&format!("{side}_sift.f32"), &mut numbers.into_iter())?;
@@ -65,8 +62,8 @@ pub fn write(
     });
     let about = json!({
         "row": row,
-        "query": camera(&query.intrinsics),
-        "reference": camera(&reference.intrinsics),
+        "query": camera(query.intrinsics()),
+        "reference": camera(reference.intrinsics()),
         "reference_from_query": matrix(truth.to_homogeneous()),
         "sift_seconds": seconds,
         "answers": answers.collect::<Vec<Value>>(),

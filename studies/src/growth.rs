@@ -36,7 +36,7 @@ pub fn run(options: &Options) -> Result<(), Failure> {
     rayon::ThreadPoolBuilder::new().num_threads(1).build_global()?;
     let rounds = options.rounds;
     let (query, cloud) = seen_by(registered_cost("pm").as_ref());
-    let camera = &PAIR.query.intrinsics;
+    let camera = PAIR.query().intrinsics();
     // A hypothesis of PM and one of MI [µs].
     let of_both = |points: &[ColoredPoint], query: &Arc<FloatImage>, camera: &Intrinsics| {
         let costs = ["pm", "mi"].map(registered_cost);
@@ -102,7 +102,7 @@ fn scaled(intrinsics: &Intrinsics, scale: f64) -> Intrinsics {
 /// The photos are enlarged twice and made grainy, and nearly everything counts as a feature, so that there are
 /// enough.
 fn by_keypoints(rounds: usize) {
-    let photos = [&PAIR.query.photo.gray, &PAIR.reference.photo.gray].map(enlarged);
+    let photos = [&PAIR.query().photo().gray, &PAIR.reference().photo().gray].map(enlarged);
     let params = |max_keypoints| {
         let mut params = SurfParams::default();
         params.threshold = 1.0;

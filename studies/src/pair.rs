@@ -46,10 +46,10 @@ pub fn registered_cost(name: &str) -> Box<dyn Cost> {
 
 /// The query of the pair and the cloud of its reference, as a cost looks at them.
 pub fn seen_by(cost: &dyn Cost) -> (Arc<FloatImage>, Arc<ColoredCloud>) {
-    let (query, reference) = (&PAIR.query, &PAIR.reference);
+    let (query, reference) = (PAIR.query(), PAIR.reference());
     let visible = reference.visible_cloud(&Params::default().render);
-    let cloud = visible.colored_by(cost.reference_channel(&reference.photo.gray));
-    (Arc::new(cost.query_channel(&query.photo.gray)), Arc::new(cloud))
+    let cloud = visible.colored_by(cost.reference_channel(&reference.photo().gray));
+    (Arc::new(cost.query_channel(&query.photo().gray)), Arc::new(cloud))
 }
 
 /// The cameras of the coarse search in a disc of 10 m.

@@ -55,15 +55,16 @@ fn export(folder: &Path) -> Result<(), Failure> {
     let doubles = |name: &str, values: &mut dyn Iterator<Item = f64>| {
         write(&format!("{name}.f64"), values.flat_map(f64::to_le_bytes).collect())
     };
-    for (name, photo) in [("query", &PAIR.query.photo), ("reference", &PAIR.reference.photo)] {
+    for (name, photo) in [("query", PAIR.query().photo()), ("reference", PAIR.reference().photo())]
+    {
         write(&format!("{name}.u8"), photo.gray.as_raw().clone())?;
         let descriptors = surf(&photo.gray, &turning()).descriptors;
         let numbers = descriptors.as_flattened().iter().copied();
         floats(&format!("{name}_descriptors"), &mut { numbers })?;
     }
-    let (warped, to_warped) = warped(&PAIR.reference.photo.gray);
+    let (warped, to_warped) = warped(&PAIR.reference().photo().gray);
     write("warped.u8", warped.as_raw().clone())?;
-    for (name, photo) in [("reference", &PAIR.reference.photo.gray), ("warped", &warped)] {
+    for (name, photo) in [("reference", &PAIR.reference().photo().gray), ("warped", &warped)] {
         let found = sift(photo, &turning_sift());
         let both = found.keypoints.iter().zip(&found.descriptors);
         let numbers = both.flat_map(|(at, of)| [at.x, at.y].into_iter().chain(of.iter().copied()));
@@ -86,11 +87,11 @@ fn export(folder: &Path) -> Result<(), Failure> {
         });
         doubles(&name, &mut { numbers })?;
     }
-    let intrinsics = &PAIR.query.intrinsics;
+    let intrinsics = PAIR.query().intrinsics();
     let params = MlesacParams::default();
     let meta = json!({
-        "query": PAIR.query.name,
-        "reference": PAIR.reference.name,
+        "query": PAIR.query().name(),
+        "reference": PAIR.reference().name(),
         "width": intrinsics.width,
         "height": intrinsics.height,
         "camera": [intrinsics.fx, intrinsics.fy, intrinsics.cx, intrinsics.cy],

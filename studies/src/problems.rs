@@ -44,7 +44,7 @@ impl Outliers {
 
     /// Some correspondences, and the pose `camera_from_world` that made them.
     pub fn draw(self, seed: u64) -> (Vec<Correspondence>, Pose) {
-        let intrinsics = &PAIR.query.intrinsics;
+        let intrinsics = PAIR.query().intrinsics();
         let mut rng = Pcg64::seed_from_u64(seed);
         let camera_from_world = random_pose(&mut rng);
         let correspondences = (0..self.correspondences).map(|i| {
@@ -63,7 +63,7 @@ impl Outliers {
 
 fn random_point(rng: &mut Pcg64) -> Point3<f64> {
     let pixel = Point2::new(rng.random_range(0.0..1240.0), rng.random_range(0.0..375.0));
-    PAIR.query.intrinsics.unproject(&pixel, rng.random_range(5.0..50.0))
+    PAIR.query().intrinsics().unproject(&pixel, rng.random_range(5.0..50.0))
 }
 
 fn random_pose(rng: &mut Pcg64) -> Pose {

@@ -175,7 +175,7 @@ fn pairs(
         };
         let query_frame = scene.query(query)?;
         let photo = scene.photo(reference)?;
-        let [q, r] = [&query_frame.photo.gray, &photo.gray]
+        let [q, r] = [&query_frame.photo().gray, &photo.gray]
             .map(|gray| surf(gray, &SurfParams::default()).descriptors);
         let Ok(matches) = best_matches(&q, &r, MAX_RATIO, || Ok::<_, Infallible>(()));
         let kept = matches.iter().flatten();

@@ -45,7 +45,7 @@ pub type Work<'a> = dyn FnMut() -> Value + 'a;
 /// Stages are `surf`, `surf_upright`, `sift`, `sift_upright`, `match`, `p3p`, `pose_PERCENT_MATCHES`, `COST_SPLAT` with a cost of
 /// the direct methods or `both`, and the methods themselves.
 pub fn with_stage<R>(name: &str, measure: impl FnOnce(usize, &mut Work<'_>) -> R) -> Option<R> {
-    let (query, reference) = (&PAIR.query.photo.gray, &PAIR.reference.photo.gray);
+    let (query, reference) = (&PAIR.query().photo().gray, &PAIR.reference().photo().gray);
     if let Some((_, case)) = Outliers::cases().find(|(case, _)| case == name) {
         return Some(robust_pose(case, measure));
     }
@@ -107,7 +107,7 @@ fn hypotheses<R>(
 ) -> R {
     let cost = registered_cost(name);
     let (query, cloud) = seen_by(cost.as_ref());
-    let intrinsics = &PAIR.query.intrinsics;
+    let intrinsics = PAIR.query().intrinsics();
     let scorer = Scorer::new(cloud, query, intrinsics, splat_px, cost.as_ref());
     let poses = poses_of_a_disc();
     scorer.score(&poses[..1]);
@@ -131,7 +131,7 @@ fn both_costs<R>(splat_px: usize, measure: impl FnOnce(usize, &mut Work<'_>) -> 
     let of_query: Vec<_> = query.iter().copied().map(both).collect();
     let values = Values { query: &of_query, points: &of_points };
     let points = PointArrays::new(cloud.points.iter().map(|point| point.position));
-    let mut canvas = ZBuffer::new(&PAIR.query.intrinsics, splat_px);
+    let mut canvas = ZBuffer::new(PAIR.query().intrinsics(), splat_px);
     let keep = |query: (f32, u8), synthetic: (f32, u8)| {
         let pair = IntensityPair { query: query.0, synthetic: synthetic.0 };
         (pair.squared_difference(), BinPair { query: query.1, synthetic: synthetic.1 })
@@ -162,7 +162,7 @@ fn robust_pose<R>(case: Outliers, measure: impl FnOnce(usize, &mut Work<'_>) -> 
     let centre = |pose: &Pose| pose.inverse().translation.vector;
     measure(drawn.len(), &mut || {
         let distances = drawn.iter().map(|(correspondences, truth)| {
-            let intrinsics = &PAIR.query.intrinsics;
+            let intrinsics = PAIR.query().intrinsics();
             let found = mlesac(correspondences, intrinsics, &params, 0, |_| Ok::<_, ()>(()));
             found.map_or(f64::INFINITY, |found| (centre(&found.pose) - centre(truth)).norm())
         });

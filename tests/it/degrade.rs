@@ -101,8 +101,8 @@ fn a_slider_degrades_the_photo_runs_again_and_is_kept_in_the_session() {
     let loaded = state.run().loaded.as_deref().expect("it ran");
     let mut negative = taken.clone();
     imageops::invert(&mut negative);
-    assert_eq!(loaded.problems[0].query.photo.gray, negative);
-    assert_ne!(loaded.problems[0].reference.photo.gray, negative);
+    assert_eq!(loaded.problems[0].query().photo().gray, negative);
+    assert_ne!(loaded.problems[0].reference().photo().gray, negative);
     assert!(state.setup.command_line().contains(" --degrade invert"));
     assert!(state.setup.title().contains("(invert)"));
 

@@ -93,7 +93,7 @@ fn the_real_pair_is_ten_metres_apart_and_its_cloud_lies_in_the_image() {
     let at = |frame| scene.pose(frame).expect("is known").translation.vector;
     assert!(((at(query) - at(reference)).norm() - 10.2).abs() < 0.05);
     let tuple = scene.reference(reference).expect("is complete");
-    let index = posescope::depth::ProjectedCloudIndex::new(&tuple.cloud, &tuple.intrinsics);
+    let index = posescope::depth::ProjectedCloudIndex::new(tuple.cloud(), tuple.intrinsics());
     assert!((15_000..25_000).contains(&index.len()), "{}", index.len());
 }
 

@@ -82,7 +82,7 @@ fn fb_recovers_the_pair_in_both_directions_for_nearly_every_seed() {
         let mut errors: Vec<PoseError> = (0..100)
             .map(|seed| {
                 let consensus =
-                    mlesac(&correspondences, &problem.query.intrinsics, &params, seed, |_| {
+                    mlesac(&correspondences, problem.query().intrinsics(), &params, seed, |_| {
                         Ok::<_, ()>(())
                     })
                     .expect("there is a consensus");

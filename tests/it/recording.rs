@@ -52,7 +52,7 @@ fn identity_of(params: &Params) -> Identity {
 
 /// Runs methods on one query, as the command line does.
 fn run(recorder: &mut Recorder, methods: &[Method], params: &Params) {
-    let truth = solvable().reference.world_from_camera * Pose::translation(0.0, 0.0, 1.0);
+    let truth = solvable().reference().world_from_camera() * Pose::translation(0.0, 0.0, 1.0);
     run_against(&truth, recorder, &mut History::default(), methods, params);
 }
 
@@ -342,7 +342,7 @@ fn a_proof_of_robust_is_made_from_all_that_it_ran_inside() {
     let robust: Method = "robust".parse().expect("is registered");
     let (params, problem, mut history) = (Params::default(), solvable(), History::default());
     // This pose is false, so the right estimate is judged wrong.
-    let truth = problem.reference.world_from_camera * Pose::translation(-2.0, 0.0, 3.0);
+    let truth = problem.reference().world_from_camera() * Pose::translation(-2.0, 0.0, 3.0);
     let mut recorder = open(&path, &[robust]);
     let result = run_against(&truth, &mut recorder, &mut history, &[robust], &params);
     recorder.close().expect("a whole recording");
@@ -574,7 +574,8 @@ fn a_fusion_is_recorded_with_weights_and_candidates() {
 
 /// Twelve frames, of which the third has no photo.
 fn ranking_of_twelve() -> ReferencesRanked {
-    let photo = &solvable().reference.photo;
+    let problem = solvable();
+    let photo = problem.reference().photo();
     let reference = |frame: usize| RankedReference {
         name: format!("{frame:06}"),
         world_from_camera: Some(Pose::translation(0.0, 0.0, frame as f64)),

@@ -1,6 +1,7 @@
 //! The street in every layout, read back: the same frames, within what each layout can hold.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use image::RgbImage;
 use nalgebra::{Matrix3, Point3, Rotation3, Translation3, UnitQuaternion};
@@ -9,7 +10,7 @@ use posescope::geometry::{Pose, PoseError};
 use posescope::localize::localize;
 use posescope::method::Method;
 use posescope::params::Params;
-use posescope::problem::Problem;
+use posescope::problem::{Problem, ReferenceTuple};
 use posescope::scene::layout::{Drive, LAYOUTS, Layout, Shot};
 use posescope::scene::street::{Size, Street};
 use posescope::scene::{self, Scene};
@@ -196,8 +197,7 @@ fn expect_a_pose(layout: &Layout, disk: &dyn Scene) {
 fn middle_error(problem: &Problem, truth: &Pose) -> (f64, f64) {
     const SEEDS: u64 = 5;
     let errors = (0..SEEDS).map(|seed| {
-        let mut problem = problem.clone();
-        problem.seed = seed;
+        let problem = problem.clone().with_seed(seed);
         let outcome = localize(&problem, Method::FB, &Params::default());
         outcome.pose.map(|pose| PoseError::between(truth, &pose)).ok()
     });
@@ -237,10 +237,11 @@ fn what_is_lost_on_the_way_through_robotcar_is_known_part_by_part() {
         let (scene, frames) = pick(photos);
         let [of_reference, query] = frames.map(|frame| scene.query(frame).expect("is complete"));
         let (scene, frames) = pick(cloud);
-        let mut reference = (*scene.reference(frames[0]).expect("is complete")).clone();
-        reference.photo = of_reference.photo.clone();
-        reference.world_from_camera = street.pose(WRITTEN[0]).expect("is known");
-        let problem = Problem::new(query, reference, 15.0).expect("a radius");
+        let tuple = scene.reference(frames[0]).expect("is complete");
+        let photo = Arc::clone(of_reference.photo());
+        let (pose, cloud) = (street.pose(WRITTEN[0]).expect("is known"), tuple.cloud().clone());
+        let reference = ReferenceTuple::new(tuple.name(), photo, *tuple.intrinsics(), pose, cloud);
+        let problem = Problem::new(query, reference.expect("fits"), 15.0).expect("a radius");
         middle_error(&problem, &street.pose(WRITTEN[1]).expect("is known"))
     };
     let found = [(false, false), (false, true), (true, false), (true, true)]

@@ -114,7 +114,7 @@ fn every_format_yields_frames_that_fit_together() {
             assert_eq!(scene.find(&frames[frame]).expect("is there"), frame);
             let camera = scene.intrinsics(frame);
             let query = scene.query(frame).unwrap_or_else(|error| panic!("{error}"));
-            assert_eq!(query.photo.dimensions(), (camera.width, camera.height));
+            assert_eq!(query.photo().dimensions(), (camera.width, camera.height));
             assert!(camera.fx > 0.0 && camera.fy > 0.0, "{name}");
             if scene.pose(frame).is_some() && scene.has_cloud(frame) {
                 let tuple = scene.reference(frame).unwrap_or_else(|error| panic!("{error}"));
@@ -122,7 +122,7 @@ fn every_format_yields_frames_that_fit_together() {
                     let pixel = camera.project(&point.cast());
                     pixel.is_some_and(|pixel| camera.contains(&pixel))
                 };
-                assert!(tuple.cloud.points.iter().any(|point| in_view(&point)), "{name}");
+                assert!(tuple.cloud().points.iter().any(|point| in_view(&point)), "{name}");
                 references += 1;
             } else {
                 assert!(scene.reference(frame).is_err(), "{name}");

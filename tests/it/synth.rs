@@ -42,10 +42,11 @@ fn estimates_from_disk_are_those_from_memory() {
     let disk = round_trips::written(&LAYOUTS[0], &street, folder.path());
     let [reference, query] = round_trips::WRITTEN;
     let problem = in_memory(&street, query, reference);
-    let mut from_disk = problem.clone();
-    from_disk.query = disk.query(1).expect("is complete");
-    from_disk.reference = disk.reference(0).expect("is complete");
-    assert_eq!(from_disk.query.photo.color, problem.query.photo.color);
+    let from_disk = problem
+        .clone()
+        .with_query(disk.query(1).expect("is complete"))
+        .with_reference(disk.reference(0).expect("is complete"));
+    assert_eq!(from_disk.query().photo().color, problem.query().photo().color);
     assert_eq!(disk.time_s(1), Some(7.2));
     for method in Method::PAPER {
         let estimate = |problem: &Problem| {

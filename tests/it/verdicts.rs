@@ -138,9 +138,7 @@ fn a_focal_length_that_is_wrong_for_both_photos_is_named() {
             cy: of_centre * stated.cy,
             ..stated
         };
-        let mut query = (*street.query(30).expect("a photo")).clone();
-        let mut reference = (*street.reference(23).expect("a cloud")).clone();
-        (query.intrinsics, reference.intrinsics) = (camera, camera);
+        let (query, reference) = stated_as(street.as_ref(), [30, 23], camera, &Pose::identity());
         let found = said_of(query, reference, &truth);
         let named = found.first().unwrap_or_else(|| panic!("{scale}: no verdict"));
         assert!(named.text.starts_with("The camera of both photos is suspect"), "{found:?}");
@@ -149,6 +147,21 @@ fn a_focal_length_that_is_wrong_for_both_photos_is_named() {
         assert!((camera.fx / stated.fx - 1.0).abs() < 0.06, "{scale}: {camera:?}");
         assert!((camera.cx / stated.cx - 1.0).abs() < 0.04, "{scale}: {camera:?}");
     }
+}
+
+/// A query and a reference of the street with another camera, the reference turned.
+fn stated_as(
+    street: &dyn Scene,
+    [query, reference]: [usize; 2],
+    camera: Intrinsics,
+    turn: &Pose,
+) -> (Query, ReferenceTuple) {
+    let query = street.query(query).expect("a photo");
+    let tuple = street.reference(reference).expect("a cloud");
+    let [of_query, of_tuple] = [query.photo(), tuple.photo()].map(Arc::clone);
+    let (pose, cloud) = (tuple.world_from_camera() * turn, tuple.cloud().clone());
+    let reference = ReferenceTuple::new(tuple.name(), of_tuple, camera, pose, cloud);
+    (Query::new(query.name(), of_query, camera).expect("fits"), reference.expect("fits"))
 }
 
 /// What FB's verdicts are of a query with these words for its truth.
@@ -173,10 +186,7 @@ fn queries_give_the_same_hint_of_a_camera_and_the_same_reading_of_poses() {
         let truth = street.pose(frame).expect("is known");
         let stated = street.intrinsics(frame);
         let of = |camera: Intrinsics, turn: &Pose| {
-            let mut query = (*street.query(frame).expect("a photo")).clone();
-            let mut reference = (*street.reference(frame - 8).expect("a cloud")).clone();
-            (query.intrinsics, reference.intrinsics) = (camera, camera);
-            reference.world_from_camera *= turn;
+            let (query, reference) = stated_as(street.as_ref(), [frame, frame - 8], camera, turn);
             let found = said_of(query, reference, &(truth * turn));
             let place = found.iter().position(|one| one.code == Code::X1)?;
             let hint = found[place].clone();

@@ -450,7 +450,7 @@ fn a_restored_session_takes_no_frame_of_another_scene_for_its_own() {
     let photo = scene::open(scene, None).and_then(|scene| scene.photo(1));
     let loaded = app(&window).run().loaded.clone();
     let problem = &loaded.expect("it ran").problems[0];
-    assert_eq!(problem.query.photo.gray, photo.expect("readable").gray);
+    assert_eq!(problem.query().photo().gray, photo.expect("readable").gray);
 }
 
 #[test]

@@ -41,6 +41,12 @@ pub enum InputError {
         /// The frame's name.
         frame: String,
     },
+    /// The query cannot be believed at such a distance from the reference.
+    #[error("the prior is {prior_m} m; a finite number above 0 is needed")]
+    Prior {
+        /// The prior \[m\].
+        prior_m: f64,
+    },
     /// The query cannot be at such a distance from the reference.
     #[error("the uncertainty radius is {radius_m} m; a finite number above 0 is needed")]
     Radius {

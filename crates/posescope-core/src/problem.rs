@@ -18,12 +18,9 @@ use crate::render::{RenderParams, VisibleCloud};
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct Query {
-    /// The frame's name in its scene.
-    pub name: String,
-    /// The photo I_Q.
-    pub photo: Arc<Photo>,
-    /// The query camera.
-    pub intrinsics: Intrinsics,
+    pub(crate) name: String,
+    pub(crate) photo: Arc<Photo>,
+    pub(crate) intrinsics: Intrinsics,
     /// What estimators computed of this frame.
     pub(crate) memo: Memo,
 }
@@ -57,6 +54,21 @@ impl Query {
         Self { memo: Memo::new(), ..self }
     }
 
+    /// The frame's name in its scene.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// The photo I_Q.
+    pub fn photo(&self) -> &Arc<Photo> {
+        &self.photo
+    }
+
+    /// The query camera.
+    pub fn intrinsics(&self) -> &Intrinsics {
+        &self.intrinsics
+    }
+
     /// The SURF features of the photo.
     pub fn features(&self, params: &SurfParams) -> Arc<Features> {
         features_of(&self.photo, &self.memo, params)
@@ -67,16 +79,11 @@ impl Query {
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct ReferenceTuple {
-    /// The frame's name in its scene.
-    pub name: String,
-    /// The photo I_R.
-    pub photo: Arc<Photo>,
-    /// The reference camera.
-    pub intrinsics: Intrinsics,
-    /// Where the reference camera stood.
-    pub world_from_camera: Pose,
-    /// The cloud P_R, in the reference camera's frame.
-    pub cloud: Cloud,
+    pub(crate) name: String,
+    pub(crate) photo: Arc<Photo>,
+    pub(crate) intrinsics: Intrinsics,
+    pub(crate) world_from_camera: Pose,
+    pub(crate) cloud: Cloud,
     /// What estimators computed of this frame.
     pub(crate) memo: Memo,
 }
@@ -106,6 +113,37 @@ impl ReferenceTuple {
     #[must_use]
     pub fn remembering(self) -> Self {
         Self { memo: Memo::new(), ..self }
+    }
+
+    /// The same reference by another name.
+    #[must_use]
+    pub fn with_name(self, name: impl Into<String>) -> Self {
+        Self { name: name.into(), ..self }
+    }
+
+    /// The frame's name in its scene.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// The photo I_R.
+    pub fn photo(&self) -> &Arc<Photo> {
+        &self.photo
+    }
+
+    /// The reference camera.
+    pub fn intrinsics(&self) -> &Intrinsics {
+        &self.intrinsics
+    }
+
+    /// Where the reference camera stood.
+    pub fn world_from_camera(&self) -> &Pose {
+        &self.world_from_camera
+    }
+
+    /// The cloud P_R, in the reference camera's frame.
+    pub fn cloud(&self) -> &Cloud {
+        &self.cloud
     }
 
     /// The SURF features of the photo.
@@ -143,25 +181,22 @@ fn check_camera(name: &str, photo: &Photo, intrinsics: &Intrinsics) -> Result<()
     Ok(())
 }
 
+fn is_length(length_m: f64) -> bool {
+    length_m.is_finite() && length_m > 0.0
+}
+
 /// One query to localise against one reference tuple.
 ///
 /// Several references are several problems that share their query.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct Problem {
-    /// The photo whose pose is sought.
-    pub query: Arc<Query>,
-    /// The photo, pose and cloud that are known.
-    pub reference: Arc<ReferenceTuple>,
-    /// How far from the reference the direct methods search \[m\].
-    pub uncertainty_radius_m: f64,
-    /// Prior on the query's distance from the reference \[m\]. FB rejects poses beyond it. `None`: the search
-    /// radius.
-    pub prior_m: Option<f64>,
-    /// Every random choice of an estimator derives from this.
-    pub seed: u64,
-    /// Matches of another system; without them, features are detected and matched.
-    pub matches: Option<Arc<PairMatches>>,
+    pub(crate) query: Arc<Query>,
+    pub(crate) reference: Arc<ReferenceTuple>,
+    pub(crate) uncertainty_radius_m: f64,
+    pub(crate) prior_m: Option<f64>,
+    pub(crate) seed: u64,
+    pub(crate) matches: Option<Arc<PairMatches>>,
 }
 
 impl Problem {
@@ -174,17 +209,93 @@ impl Problem {
         reference: impl Into<Arc<ReferenceTuple>>,
         uncertainty_radius_m: f64,
     ) -> Result<Self, InputError> {
-        if !(uncertainty_radius_m.is_finite() && uncertainty_radius_m > 0.0) {
-            return Err(InputError::Radius { radius_m: uncertainty_radius_m });
-        }
-        Ok(Self {
+        let problem = Self {
             query: query.into(),
             reference: reference.into(),
             uncertainty_radius_m,
             prior_m: None,
             seed: 0,
             matches: None,
-        })
+        };
+        problem.with_radius(uncertainty_radius_m)
+    }
+
+    /// The same problem with another query.
+    #[must_use]
+    pub fn with_query(self, query: impl Into<Arc<Query>>) -> Self {
+        Self { query: query.into(), ..self }
+    }
+
+    /// The same problem with another reference.
+    #[must_use]
+    pub fn with_reference(self, reference: impl Into<Arc<ReferenceTuple>>) -> Self {
+        Self { reference: reference.into(), ..self }
+    }
+
+    /// The same problem with another [uncertainty radius](Self::uncertainty_radius_m).
+    ///
+    /// # Errors
+    /// [`InputError::Radius`] when it is not a finite number above 0.
+    pub fn with_radius(self, uncertainty_radius_m: f64) -> Result<Self, InputError> {
+        if is_length(uncertainty_radius_m) {
+            Ok(Self { uncertainty_radius_m, ..self })
+        } else {
+            Err(InputError::Radius { radius_m: uncertainty_radius_m })
+        }
+    }
+
+    /// The same problem with another [prior](Self::prior_m).
+    ///
+    /// # Errors
+    /// [`InputError::Prior`] when it is not a finite number above 0.
+    pub fn with_prior(self, prior_m: Option<f64>) -> Result<Self, InputError> {
+        match prior_m {
+            Some(prior_m) if !is_length(prior_m) => Err(InputError::Prior { prior_m }),
+            _ => Ok(Self { prior_m, ..self }),
+        }
+    }
+
+    /// The same problem with another [seed](Self::seed).
+    #[must_use]
+    pub fn with_seed(self, seed: u64) -> Self {
+        Self { seed, ..self }
+    }
+
+    /// The same problem with other [matches](Self::matches).
+    #[must_use]
+    pub fn with_matches(self, matches: Option<Arc<PairMatches>>) -> Self {
+        Self { matches, ..self }
+    }
+
+    /// The photo whose pose is sought.
+    pub fn query(&self) -> &Arc<Query> {
+        &self.query
+    }
+
+    /// The photo, pose and cloud that are known.
+    pub fn reference(&self) -> &Arc<ReferenceTuple> {
+        &self.reference
+    }
+
+    /// How far from the reference the direct methods search \[m\].
+    pub fn uncertainty_radius_m(&self) -> f64 {
+        self.uncertainty_radius_m
+    }
+
+    /// Prior on the query's distance from the reference \[m\]. FB rejects poses beyond it. `None`: the search
+    /// radius.
+    pub fn prior_m(&self) -> Option<f64> {
+        self.prior_m
+    }
+
+    /// Every random choice of an estimator derives from this.
+    pub fn seed(&self) -> u64 {
+        self.seed
+    }
+
+    /// Matches of another system; without them, features are detected and matched.
+    pub fn matches(&self) -> Option<&Arc<PairMatches>> {
+        self.matches.as_ref()
     }
 
     /// The greatest plausible distance of the query from the reference \[m\].
@@ -297,6 +408,16 @@ mod tests {
             let refused = Problem::new(Arc::clone(&query), Arc::clone(&reference), radius);
             assert!(matches!(refused, Err(InputError::Radius { .. })), "{radius}");
         }
-        assert!(Problem::new(query, reference, 3.0).is_ok());
+        let problem = Problem::new(query, reference, 3.0).expect("a problem");
+        for length in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+            let refused = problem.clone().with_radius(length);
+            assert!(matches!(refused, Err(InputError::Radius { .. })), "{length}");
+            let refused = problem.clone().with_prior(Some(length));
+            assert!(matches!(refused, Err(InputError::Prior { .. })), "{length}");
+        }
+        let problem = problem.with_radius(5.0).and_then(|problem| problem.with_prior(Some(9.0)));
+        let problem = problem.expect("a problem").with_seed(7);
+        assert_eq!((problem.uncertainty_radius_m(), problem.believed_within_m()), (5.0, 9.0));
+        assert_eq!(problem.seed(), 7);
     }
 }

@@ -59,19 +59,19 @@ impl Query {
     /// Its name in results.
     #[getter]
     fn name(&self) -> &str {
-        &self.query.name
+        self.query.name()
     }
 
     /// The camera; the centre of its top-left pixel is at (0, 0).
     #[getter]
     fn camera(&self) -> Camera {
-        Camera::of(self.query.intrinsics)
+        Camera::of(*self.query.intrinsics())
     }
 
     /// A copy of the photo: uint8, H × W × 3 where it has colours, else H × W.
     #[getter]
     fn photo<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        arrays::of_photo(py, &self.query.photo)
+        arrays::of_photo(py, self.query.photo())
     }
 
     /// The true `world_from_camera`, 4 × 4, where it is known.
@@ -81,9 +81,9 @@ impl Query {
     }
 
     fn __repr__(&self) -> String {
-        let (width, height) = self.query.photo.dimensions();
+        let (width, height) = self.query.photo().dimensions();
         let truth = if self.truth.is_some() { "known" } else { "unknown" };
-        format!("<Query {}: {width} x {height} px, truth {truth}>", self.query.name)
+        format!("<Query {}: {width} x {height} px, truth {truth}>", self.query.name())
     }
 }
 
@@ -137,37 +137,37 @@ impl Reference {
     /// Its name in results.
     #[getter]
     fn name(&self) -> &str {
-        &self.reference.name
+        self.reference.name()
     }
 
     /// The camera; the centre of its top-left pixel is at (0, 0).
     #[getter]
     fn camera(&self) -> Camera {
-        Camera::of(self.reference.intrinsics)
+        Camera::of(*self.reference.intrinsics())
     }
 
     /// A copy of the photo: uint8, H × W × 3 where it has colours, else H × W.
     #[getter]
     fn photo<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        arrays::of_photo(py, &self.reference.photo)
+        arrays::of_photo(py, self.reference.photo())
     }
 
     /// Its pose `world_from_camera`, 4 × 4 [m].
     #[getter]
     fn world_from_camera<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        arrays::of_pose(py, &self.reference.world_from_camera)
+        arrays::of_pose(py, self.reference.world_from_camera())
     }
 
     /// A copy of the cloud: float32, N × 3 [m], in the camera's frame.
     #[getter]
     fn cloud<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        arrays::of_cloud(py, &self.reference.cloud)
+        arrays::of_cloud(py, self.reference.cloud())
     }
 
     fn __repr__(&self) -> String {
-        let ReferenceTuple { name, photo, cloud, world_from_camera, .. } = self.reference.as_ref();
-        let (width, height) = photo.dimensions();
-        let at = world_from_camera.translation.vector;
+        let (name, cloud) = (self.reference.name(), self.reference.cloud());
+        let (width, height) = self.reference.photo().dimensions();
+        let at = self.reference.world_from_camera().translation.vector;
         format!(
             "<Reference {name}: {width} x {height} px, {} points, at ({:.2}, {:.2}, {:.2}) m>",
             cloud.len(),

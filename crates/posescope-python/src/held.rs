@@ -24,10 +24,10 @@ impl HeldFrame {
     pub fn of_reference(
         reference: &Arc<ReferenceTuple>,
     ) -> Result<Self, posescope_core::InputError> {
-        let ReferenceTuple { name, photo, intrinsics, world_from_camera, .. } = reference.as_ref();
+        let photo = Arc::clone(reference.photo());
         Ok(Self {
-            query: Arc::new(Query::new(name.clone(), Arc::clone(photo), *intrinsics)?),
-            pose: Some(*world_from_camera),
+            query: Arc::new(Query::new(reference.name(), photo, *reference.intrinsics())?),
+            pose: Some(*reference.world_from_camera()),
             reference: Some(Arc::clone(reference)),
         })
     }
@@ -46,7 +46,7 @@ impl Held {
 
     /// A scene of these frames.
     pub fn new(name: &str, frames: Vec<HeldFrame>) -> Self {
-        let names = frames.iter().map(|frame| frame.query.name.clone()).collect();
+        let names = frames.iter().map(|frame| frame.query.name().to_owned()).collect();
         Self { name: name.to_owned(), names, frames }
     }
 }
@@ -61,7 +61,7 @@ impl Scene for Held {
     }
 
     fn intrinsics(&self, frame: usize) -> Intrinsics {
-        self.frames[frame].query.intrinsics
+        *self.frames[frame].query.intrinsics()
     }
 
     fn pose(&self, frame: usize) -> Option<Pose> {
@@ -77,12 +77,12 @@ impl Scene for Held {
     }
 
     fn photo(&self, frame: usize) -> Result<Photo, SceneError> {
-        Ok(Photo::clone(&self.frames[frame].query.photo))
+        Ok(Photo::clone(self.frames[frame].query.photo()))
     }
 
     fn cloud(&self, frame: usize) -> Result<Cloud, SceneError> {
         match &self.frames[frame].reference {
-            Some(reference) => Ok(reference.cloud.clone()),
+            Some(reference) => Ok(reference.cloud().clone()),
             None => Err(SceneError::expected(&self.name, "a cloud expected")),
         }
     }

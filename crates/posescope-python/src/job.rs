@@ -94,13 +94,12 @@ fn named_apart(references: &[&frames::Reference]) -> Result<Vec<HeldFrame>, Inpu
     let mut names: Vec<String> = Vec::new();
     let mut held = Vec::new();
     for one in references {
-        let wanted = &one.reference.name;
+        let wanted = one.reference.name();
         let numbered = (2..).map(|number| format!("{wanted}-{number}"));
-        let mut free = [wanted.clone()].into_iter().chain(numbered);
-        let name = free.find(|name| !names.contains(name)).unwrap_or_else(|| wanted.clone());
+        let mut free = [wanted.to_owned()].into_iter().chain(numbered);
+        let name = free.find(|name| !names.contains(name)).unwrap_or_else(|| wanted.to_owned());
         names.push(name.clone());
-        let mut reference = ReferenceTuple::clone(&one.reference);
-        reference.name = name;
+        let reference = ReferenceTuple::clone(&one.reference).with_name(name);
         held.push(HeldFrame::of_reference(&Arc::new(reference))?);
     }
     Ok(held)

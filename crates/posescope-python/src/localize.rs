@@ -220,7 +220,7 @@ impl Asked<'_> {
     fn foreign(&self, frames: &Frames) -> Foreign {
         let mut foreign = Foreign::default();
         if let Some(pose) = self.estimate {
-            let estimates = [(self.query.query.name.clone(), pose)].into();
+            let estimates = [(self.query.query.name().to_owned(), pose)].into();
             foreign = foreign.with_estimates(self.method, estimates);
         }
         if let Some(matches) = &self.matches {

@@ -188,8 +188,8 @@ mod tests {
         assert!(step.is_some_and(|step| (0.5..1.5).contains(&step)), "{step:?}");
         let scene: &dyn Scene = &street;
         let tuple = scene.reference(100).unwrap_or_else(|error| panic!("{error}"));
-        assert_eq!(tuple.photo.dimensions(), (1241, 376));
-        assert!(tuple.cloud.len() > 50_000);
+        assert_eq!(tuple.photo().dimensions(), (1241, 376));
+        assert!(tuple.cloud().len() > 50_000);
     }
 
     /// A half-size street with nothing in memory and this folder on disk.

@@ -83,7 +83,7 @@ pub(super) fn at<'a>(context: &ViewContext<'a>) -> FeatureProgress<'a> {
 /// The progress of a part up to a cursor.
 pub(super) fn of<'a>(context: &ViewContext<'a>, span: &Span, cursor: usize) -> FeatureProgress<'a> {
     let threshold_px = context.run.params.fb.mlesac.inlier_threshold_px;
-    let camera = context.problem().map(|problem| &problem.query.intrinsics);
+    let camera = context.problem().map(|problem| problem.query().intrinsics());
     FeatureProgress::of(context.run.until(span, cursor), camera, threshold_px)
 }
 

@@ -107,7 +107,7 @@ fn table(ui: &mut Ui, context: &ViewContext<'_>, fused: &[&ReferencesFused]) {
 fn map(ui: &mut Ui, context: &ViewContext<'_>, fused: &[&ReferencesFused], height: f32) {
     let problems = context.run.problems();
     let Some(first) = problems.first() else { return };
-    let camera_from_world = first.reference.world_from_camera.inverse();
+    let camera_from_world = first.reference().world_from_camera().inverse();
     let strong = ui.visuals().strong_text_color();
     let mark = |plot: &mut PlotUi<'_>, name: &str, pose: &Pose, thing: Thing, radius: f32| {
         let color = match thing {
@@ -131,7 +131,7 @@ fn map(ui: &mut Ui, context: &ViewContext<'_>, fused: &[&ReferencesFused], heigh
         .legend(Legend::default())
         .show(ui, |plot| {
             for problem in problems {
-                let pose = &problem.reference.world_from_camera;
+                let pose = problem.reference().world_from_camera();
                 mark(plot, "○ references", pose, Thing::Reference, 5.0);
             }
             for share in present.shares.iter() {

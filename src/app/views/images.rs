@@ -51,7 +51,7 @@ impl View for ImagesView {
         let progress = features::at(context);
         let kinds = features::kinds(&progress);
         let selected = context.options.selected_feature.filter(|&feature| feature < kinds.len());
-        let textures = [&problem.query.photo, &problem.reference.photo]
+        let textures = [problem.query().photo(), problem.reference().photo()]
             .map(|source| photo(ui, context, source));
         let [query, reference] = &textures;
 
@@ -59,8 +59,8 @@ impl View for ImagesView {
         let (photos, chips) = area.split_top_bottom_at_y(area.bottom() - funnel::HEIGHT - GAP);
         let chips = chips.with_min_y(chips.top() + GAP);
         let names = [
-            format!("query photo {}", problem.query.name),
-            format!("reference photo {}", problem.reference.name),
+            format!("query photo {}", problem.query().name()),
+            format!("reference photo {}", problem.reference().name()),
         ];
         let captions = [
             caption("Query", progress.query.len()),
@@ -88,7 +88,7 @@ impl View for ImagesView {
         let truth = selected.and_then(|feature| true_match(context, &progress, problem, feature));
         if let Some(truth) = &truth {
             let painter = pair.at[0].painter(painter);
-            draw_truth(&painter, &pair.at[0], &problem.query.intrinsics, truth);
+            draw_truth(&painter, &pair.at[0], problem.query().intrinsics(), truth);
         }
         pair.name(ui, captions);
 

@@ -107,11 +107,11 @@ impl RetrievalView {
         let room = ui.available_rect_before_wrap();
         let area = room.with_max_y((room.bottom() - TABLE_HEIGHT).max(room.top() + 80.0));
         let [query, reference] =
-            [&problem.query.photo, of_frame].map(|source| photo(ui, context, source));
+            [problem.query().photo(), of_frame].map(|source| photo(ui, context, source));
         let found = frame.ranked.verification();
         let matches = found.map_or(&[][..], |found| &found.matches);
         let names = [
-            format!("query photo {}", problem.query.name),
+            format!("query photo {}", problem.query().name()),
             format!("{} matches with {}", matches.len(), frame.name),
         ];
         let pair = PhotoPair::show(ui, area, [&query, &reference], names, &mut self.pan_zoom);

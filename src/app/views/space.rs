@@ -81,7 +81,7 @@ impl SpaceView {
     /// What is drawn of a run at its cursor. The points of the cloud are prepared once.
     fn content(&mut self, context: &ViewContext<'_>) -> Option<SceneContent> {
         let geometry = SceneGeometry::of(context)?;
-        let (reference, params) = (&context.problem()?.reference, &context.run.params.render);
+        let (reference, params) = (context.problem()?.reference(), &context.run.params.render);
         let key = (Same(Arc::clone(reference)), geometry, params.clone());
         let points =
             self.cloud.get(key, || Arc::new(picture::points(&geometry, reference, params)));

@@ -138,7 +138,7 @@ impl SynthesisView {
         }
         let words = match (shown, blinks) {
             (None, _) => {
-                format!("query {}", context.setup.label_of(Side::Query, &problem.query.name))
+                format!("query {}", context.setup.label_of(Side::Query, problem.query().name()))
             }
             (Some(_), true) => format!("{name} (blinking)"),
             (Some(_), false) => name,
@@ -163,8 +163,8 @@ fn blinking(ui: &Ui, mode: Mode) -> Mode {
 /// The query in grey values, as the costs see it but for their smoothing.
 fn gray_query(ui: &Ui, context: &ViewContext<'_>, problem: &Problem) -> TextureHandle {
     let textures = &context.state.textures;
-    textures.of(ui.ctx(), "gray photo", &problem.query, |query| {
-        color_image(&query.photo.gray.clone().into())
+    textures.of(ui.ctx(), "gray photo", problem.query(), |query| {
+        color_image(&query.photo().gray.clone().into())
     })
 }
 
@@ -178,7 +178,7 @@ fn caption(
 ) {
     let score = &shown.comparison.score;
     let cost = score.cost.map_or("no cost".to_owned(), |cost| format!("cost {cost:.4}"));
-    let share = 100.0 * f64::from(score.covered) / problem.query.intrinsics.area();
+    let share = 100.0 * f64::from(score.covered) / problem.query().intrinsics().area();
     let words = format!(
         "{}, {}: {cost}, {} px covered ({share:.1} %), {}",
         method.label(),

@@ -330,13 +330,13 @@ impl Viewpoints<'_> {
 
     /// Looks down on the disc of the search, with the forward direction up.
     fn above(&self) -> EyeControls3D {
-        let height = 2.2 * self.0.uncertainty_radius_m;
+        let height = 2.2 * self.0.uncertainty_radius_m();
         self.at([0.0, -height, -0.01], [0.0, 0.0, 0.0], [0.0, 0.0, 1.0])
     }
 
     /// A point of view in the reference camera's frame; its centre is the drawn origin.
     fn at(&self, position: [f64; 3], target: [f64; 3], up: [f64; 3]) -> EyeControls3D {
-        let rotation = self.0.reference.world_from_camera.rotation;
+        let rotation = self.0.reference().world_from_camera().rotation;
         let world = |v: [f64; 3]| -> [f32; 3] {
             (rotation * nalgebra::Vector3::from(v)).cast::<f32>().into()
         };

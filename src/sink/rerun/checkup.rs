@@ -24,25 +24,25 @@ pub fn record_checkup(
 ) -> Result<(), RecordError> {
     let identity = Identity {
         scene: scene.to_owned(),
-        references: frames.iter().map(|frame| frame.name.clone()).collect(),
+        references: frames.iter().map(|frame| frame.name().to_owned()).collect(),
         ..Identity::default()
     };
     let mut stream = Stream::open(targets, &identity)?;
     stream.log_static(entities::WORLD, &ViewCoordinates::RDF());
-    let first = frames.first().map(|frame| frame.world_from_camera.translation.vector);
+    let first = frames.first().map(|frame| frame.world_from_camera().translation.vector);
     let origin = Origin(first.unwrap_or_default());
     for (index, tuple) in frames.iter().enumerate() {
         stream.set_query(index);
         stream.advance();
-        let photo = || jpeg(&picture::photo(&tuple.photo));
+        let photo = || jpeg(&picture::photo(tuple.photo()));
         stream.log_image("check/photo", photo());
-        scene::log_reference(&mut stream, index, tuple, &tuple.name, photo(), origin);
+        scene::log_reference(&mut stream, index, tuple, tuple.name(), photo(), origin);
         let params = RenderParams::default();
-        let colored = color_cloud(&tuple.cloud, &tuple.photo.gray, &tuple.intrinsics, &params);
+        let colored = color_cloud(tuple.cloud(), &tuple.photo().gray, tuple.intrinsics(), &params);
         scene::log_cloud(&mut stream, index, tuple, &colored, origin);
-        let seen = tuple.cloud.points.iter().filter_map(|point| {
-            let pixel = tuple.intrinsics.project(&point.cast())?;
-            let is_in_view = tuple.intrinsics.contains(&pixel);
+        let seen = tuple.cloud().points.iter().filter_map(|point| {
+            let pixel = tuple.intrinsics().project(&point.cast())?;
+            let is_in_view = tuple.intrinsics().contains(&pixel);
             is_in_view.then_some((pixel, f64::from(point.z)))
         });
         let (places, colors): (Vec<[f32; 2]>, Vec<rerun::Color>) = seen

@@ -82,7 +82,7 @@ impl FeatureContext {
 
     fn canvas(&mut self, context: &EventContext<'_>, stream: &mut Stream) {
         let problem = context.problem;
-        let (query, reference) = (&problem.query.photo, &problem.reference.photo);
+        let (query, reference) = (problem.query().photo(), problem.reference().photo());
         self.canvas_top = picture::row_below(query);
         if context.is_first_match {
             let (canvas, _) = picture::stacked(query, reference);

@@ -130,7 +130,7 @@ impl Recording {
 
     /// Records what the whole recording shares, from its first problem.
     fn set_up(&mut self, first: &Problem) -> Origin {
-        let reference = &first.reference.world_from_camera;
+        let reference = first.reference().world_from_camera();
         let origin = Origin(reference.translation.vector);
         self.origin = Some(origin);
         self.stream.log_static(entities::WORLD, &ViewCoordinates::RDF());
@@ -224,7 +224,7 @@ impl Recording {
                 let camera = PlacedCamera {
                     owner: &owner,
                     world_from_camera: &pose,
-                    intrinsics: &problem.query.intrinsics,
+                    intrinsics: problem.query().intrinsics(),
                     color: palette::ESTIMATE,
                     label: method.name().to_owned(),
                 };
@@ -304,8 +304,8 @@ impl Recording {
 
     /// The cloud with the colours of the direct methods.
     fn colored(&self, tuple: &ReferenceTuple) -> ColoredCloud {
-        let ReferenceTuple { photo, intrinsics, .. } = tuple;
-        color_cloud(&tuple.cloud, &photo.gray, intrinsics, &self.params.render)
+        let gray = &tuple.photo().gray;
+        color_cloud(tuple.cloud(), gray, tuple.intrinsics(), &self.params.render)
     }
 
     fn fused(&mut self, event: &ReferencesFused) {
@@ -325,7 +325,7 @@ impl Recording {
         };
         self.stream.advance();
         let truth = self.query.truth.as_ref();
-        retrieval::tell(event, &problem.query, truth, origin, &mut self.stream);
+        retrieval::tell(event, problem.query(), truth, origin, &mut self.stream);
         let words = narration::sentence(&Event::from(event.clone())).unwrap_or_default();
         let path = narration::stages(&self.query.stages);
         self.say(&format!("{path}: {words}"), TextLogLevel::INFO);
@@ -347,13 +347,13 @@ impl Recording {
         // FB uses the cloud without colouring it.
         let colored = match event {
             Event::CloudColored(event) => Some(Arc::clone(&event.cloud)),
-            Event::ProjectedCloud(_) => Some(Arc::new(self.colored(&problem.reference))),
+            Event::ProjectedCloud(_) => Some(Arc::new(self.colored(problem.reference()))),
             _ => None,
         };
         if let Some(cloud) = colored
             && self.query.clouds.insert(index)
         {
-            scene::log_cloud(&mut self.stream, index, &problem.reference, &cloud, origin);
+            scene::log_cloud(&mut self.stream, index, problem.reference(), &cloud, origin);
         }
         let context = EventContext {
             reference: index,
@@ -410,7 +410,7 @@ impl Recording {
             let camera = PlacedCamera {
                 owner: &entities::truth(),
                 world_from_camera: truth,
-                intrinsics: &first.query.intrinsics,
+                intrinsics: first.query().intrinsics(),
                 color: palette::TRUTH,
                 label: "truth".to_owned(),
             };

@@ -21,14 +21,14 @@ pub(super) fn markdown(
 ) -> String {
     let mut text = String::new();
     if let Some(problem) = problems.first() {
-        let references = problems.iter().map(|p| &p.reference.name);
+        let references = problems.iter().map(|p| p.reference().name());
         let names: Vec<String> = references.map(|name| identity.reference_label(name)).collect();
         let words = format!(
             "# Query {}\n\nReference: {}. Search radius: {} m. Seed: {}.\n\n",
-            identity.query_label(&problem.query.name),
+            identity.query_label(problem.query().name()),
             names.join(", "),
-            problem.uncertainty_radius_m,
-            problem.seed
+            problem.uncertainty_radius_m(),
+            problem.seed()
         );
         text += &unit.words(&words);
     }

@@ -35,7 +35,7 @@ pub(super) fn tell(
     for (rank, (reference, photo)) in pictured.enumerate() {
         // The frame is still in the table.
         let Some(photo) = photo else { continue };
-        let photo_pair = PhotoPair::of(&query.photo, photo);
+        let photo_pair = PhotoPair::of(query.photo(), photo);
         let path = entities::rank(rank);
         stream.log_image(&path, jpeg(&photo_pair.picture.clone().into()));
         let is_chosen = rank < ranking.chosen;

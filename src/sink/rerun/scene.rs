@@ -69,16 +69,16 @@ pub(super) fn log_photos(
     let Some(first) = problems.first() else {
         return;
     };
-    let photos = problems.iter().map(|problem| &problem.reference.photo);
-    let photos: Vec<&Arc<Photo>> = std::iter::once(&first.query.photo).chain(photos).collect();
+    let photos = problems.iter().map(|problem| problem.reference().photo());
+    let photos: Vec<&Arc<Photo>> = std::iter::once(first.query().photo()).chain(photos).collect();
     let encoded = photos.par_iter().map(|photo| jpeg(&picture::photo(photo)));
     let mut encoded = encoded.collect::<Vec<_>>().into_iter();
     if let Some(photo) = encoded.next() {
         stream.log_image(entities::QUERY_IMAGE, photo);
     }
     for (index, (problem, photo)) in problems.iter().zip(encoded).enumerate() {
-        let tuple = &problem.reference;
-        log_reference(stream, index, tuple, &label(&tuple.name), photo, origin);
+        let tuple = problem.reference();
+        log_reference(stream, index, tuple, &label(tuple.name()), photo, origin);
     }
 }
 
@@ -94,8 +94,8 @@ pub(super) fn log_reference(
     let owner = entities::reference(index);
     let camera = PlacedCamera {
         owner: &owner,
-        world_from_camera: &tuple.world_from_camera,
-        intrinsics: &tuple.intrinsics,
+        world_from_camera: tuple.world_from_camera(),
+        intrinsics: tuple.intrinsics(),
         color: palette::REFERENCE,
         label: format!("reference {label}"),
     };
@@ -147,7 +147,7 @@ pub(super) fn log_cloud(
     origin: Origin,
 ) {
     let world = |point: &Point3<f32>| {
-        let world = tuple.world_from_camera * point.cast::<f64>();
+        let world = tuple.world_from_camera() * point.cast::<f64>();
         origin.place(&world.coords)
     };
     let positions = cloud.points.iter().map(|point| world(&point.position));
@@ -162,8 +162,8 @@ pub(super) fn log_cloud(
 }
 
 fn photo_color(tuple: &ReferenceTuple, point: &Point3<f32>) -> Option<Rgb> {
-    let photo = tuple.photo.color.as_ref()?;
-    let pixel = tuple.intrinsics.project(&point.cast())?;
+    let photo = tuple.photo().color.as_ref()?;
+    let pixel = tuple.intrinsics().project(&point.cast())?;
     let nearest = |value: f64| value.round().max(0.0) as u32;
     Some(photo.get_pixel_checked(nearest(pixel.x), nearest(pixel.y))?.0)
 }
@@ -178,7 +178,7 @@ pub(super) fn log_rays(
     points: &[Point3<f64>],
     color: Rgb,
 ) {
-    let world_from_reference = &problem.reference.world_from_camera;
+    let world_from_reference = problem.reference().world_from_camera();
     let place = |point: &Point3<f64>| origin.place(&(world_from_reference * point).coords);
     let start = place(centre);
     let rays = LineStrips3D::new(points.iter().map(|point| [start, place(point)]))

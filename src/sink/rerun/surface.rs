@@ -106,13 +106,13 @@ fn map_rotation(context: &EventContext<'_>) -> [f32; 4] {
     let axes = [Vector3::x(), Vector3::z(), -Vector3::y()];
     let camera_from_map =
         UnitQuaternion::from_rotation_matrix(&Rotation3::from_basis_unchecked(&axes));
-    let world_from_map = context.problem.reference.world_from_camera.rotation * camera_from_map;
+    let world_from_map = context.problem.reference().world_from_camera().rotation * camera_from_map;
     world_from_map.coords.cast::<f32>().into()
 }
 
 fn on_ground(offset: &Offset, above_m: f64, context: &EventContext<'_>) -> [f32; 3] {
     let point = Point3::new(offset.right_m, GROUND_M - above_m, offset.forward_m);
-    let world = context.problem.reference.world_from_camera * point;
+    let world = context.problem.reference().world_from_camera() * point;
     context.origin.place(&world.coords)
 }
 

@@ -22,7 +22,7 @@ use posescope_core::history::History;
 use posescope_core::image::{FloatImage, gaussian_smoothed};
 use posescope_core::method::Method;
 use posescope_core::params::Params;
-use posescope_core::problem::Problem;
+use posescope_core::problem::{Problem, Query, ReferenceTuple};
 use posescope_core::render::{Objective as _, Scorer, color_cloud};
 use posescope_core::trace::{Cancelled, Record, Sink, Trace};
 use proptest::prelude::*;
@@ -100,12 +100,12 @@ impl<F: Fn(&[IntensityPair]) -> Option<f64> + Send + Sync> Cost for Own<F> {
 #[test]
 fn what_is_scored_at_a_time_is_bounded_and_scored_once() {
     let problem = solvable();
-    let query = Arc::new(gaussian_smoothed(&problem.query.photo.gray, 0.0));
-    let reference = &problem.reference;
+    let query = Arc::new(gaussian_smoothed(&problem.query().photo().gray, 0.0));
+    let reference = problem.reference();
     let cloud = color_cloud(
-        &reference.cloud,
-        &reference.photo.gray,
-        &reference.intrinsics,
+        reference.cloud(),
+        &reference.photo().gray,
+        reference.intrinsics(),
         &Params::default().render,
     );
     let judged = AtomicUsize::new(0);
@@ -149,7 +149,7 @@ fn in_order(pairs: &[IntensityPair]) -> Option<f64> {
 #[test]
 fn what_the_search_scores_is_what_the_view_shows() {
     let problem = solvable();
-    let reference = &problem.reference;
+    let reference = problem.reference();
     let registered = cost::ALL.iter().map(|entry| (entry.make)() as Box<dyn Cost>);
     // More bins than a byte tells apart are scored the plain way.
     let many = [16, 256, 300].map(|bins| Box::new(ManyBins(bins)) as Box<dyn Cost>);
@@ -161,9 +161,9 @@ fn what_the_search_scores_is_what_the_view_shows() {
         (0..9).map(|i| Pose::translation(0.1 * f64::from(i), 0.0, 0.3 * f64::from(i))).collect();
     for cost in registered.chain(many).chain(own) {
         let visible = reference.visible_cloud(&Params::default().render);
-        let cloud = visible.colored_by(cost.reference_channel(&reference.photo.gray));
+        let cloud = visible.colored_by(cost.reference_channel(&reference.photo().gray));
         let (cloud, query) =
-            (Arc::new(cloud), Arc::new(cost.query_channel(&problem.query.photo.gray)));
+            (Arc::new(cloud), Arc::new(cost.query_channel(&problem.query().photo().gray)));
         for splat_px in [1, 3] {
             let (cloud, query) = (Arc::clone(&cloud), Arc::clone(&query));
             let scorer = Scorer::new(cloud, query, &CAMERA, splat_px, cost.as_ref());
@@ -176,8 +176,7 @@ fn what_the_search_scores_is_what_the_view_shows() {
 
 #[test]
 fn a_grid_beyond_the_limit_is_a_failure_and_no_allocation() {
-    let mut problem = solvable();
-    problem.uncertainty_radius_m = 500.0;
+    let problem = within(solvable(), 500.0);
     let mut params = Params::default();
     params.assign("grid.coarse_step=0.05").expect("a good value");
     for entry in estimator::all() {
@@ -197,10 +196,8 @@ fn a_grid_beyond_the_limit_is_a_failure_and_no_allocation() {
 
 #[test]
 fn trials_that_are_not_remembered_are_told_again_all_the_same() {
-    let (mut problem, mut params) = (remembering(), Params::default());
     // No photo shows the other: no sample is ever good enough, and all trials are drawn.
-    let other = problem_of_strangers();
-    problem.query = Arc::new((*other.query).clone().remembering());
+    let (problem, mut params) = (remembering(&problem_of_strangers()), Params::default());
     let changes = [
         "fb.max_trials=30000",
         "fb.confidence=0.999999",
@@ -382,16 +379,9 @@ fn problem_of_strangers() -> Problem {
     problem(photo(1.0, 99), photo(0.0, 5), cloud_of_the_walls())
 }
 
-pub fn remembering() -> Problem {
-    let mut problem = solvable();
-    problem.query = Arc::new((*problem.query).clone().remembering());
-    problem.reference = Arc::new((*problem.reference).clone().remembering());
-    problem
-}
-
 #[test]
 fn a_remembering_problem_has_the_same_outcomes_the_second_time_too() {
-    let problem = remembering();
+    let problem = remembering(&solvable());
     for (name, estimator) in estimators() {
         let outcome = silent(estimator.as_ref(), &solvable());
         for _ in 0..2 {
@@ -403,7 +393,7 @@ fn a_remembering_problem_has_the_same_outcomes_the_second_time_too() {
 #[test]
 fn what_does_not_depend_on_a_changed_parameter_is_reused() {
     let reused_after = |method: Method, change: &str| -> Vec<&'static str> {
-        let problem = remembering();
+        let problem = remembering(&solvable());
         let entry = estimator::entry(method);
         let first = stages_of(entry.make(&Params::default()).as_ref(), &problem);
         assert!(first.iter().all(|(_, reused)| !reused), "{first:?}");
@@ -429,4 +419,16 @@ fn what_does_not_depend_on_a_changed_parameter_is_reused() {
         reused_after(Method::PM, "mi.bins=8"),
         [&positions[..], &["yaw_coarse", "yaw_fine"]].concat()
     );
+}
+
+/// The same problem, where the query is sought within another radius \[m\].
+pub fn within(problem: Problem, radius_m: f64) -> Problem {
+    problem.with_radius(radius_m).expect("a radius")
+}
+
+/// The same problem, where estimators keep what they compute of both frames.
+pub fn remembering(problem: &Problem) -> Problem {
+    let query = Query::clone(problem.query()).remembering();
+    let reference = ReferenceTuple::clone(problem.reference()).remembering();
+    problem.clone().with_query(query).with_reference(reference)
 }

@@ -12,6 +12,7 @@ use posescope_core::params::Params;
 use posescope_core::problem::Problem;
 use posescope_core::trace::Trace;
 
+use crate::conformance::within;
 use crate::two_walls::{cloud_of_the_walls, photo, problem, solvable};
 use crate::walls_scene::Walls;
 
@@ -33,8 +34,7 @@ fn outcome(method: Method, problem: &Problem, params: &Params) -> Outcome {
 #[test]
 fn a_consensus_outside_the_uncertainty_radius_is_refused_unless_the_bare_rule_is_asked_for() {
     // The query is 1 m from the reference.
-    let mut near = solvable();
-    near.uncertainty_radius_m = 0.5;
+    let near = within(solvable(), 0.5);
     let refused = outcome(Method::FB, &near, &Params::default()).pose;
     let failure = refused.expect_err("it is twice as far as it may be");
     assert!(matches!(failure, Failure::OutsideRadius { .. }), "{failure}");
@@ -46,8 +46,7 @@ fn a_consensus_outside_the_uncertainty_radius_is_refused_unless_the_bare_rule_is
         assert!(pose.is_ok(), "{accepting}");
     }
     // Who searches no disc goes by the prior, where there is one.
-    let mut far_prior = near;
-    far_prior.prior_m = Some(20.0);
+    let far_prior = near.with_prior(Some(20.0)).expect("a prior");
     let pose = outcome(Method::FB, &far_prior, &Params::default()).pose;
     assert!(pose.is_ok(), "{pose:?}");
 }
@@ -159,14 +158,14 @@ fn the_cost_at_the_truth_is_that_of_the_true_pose_and_absent_without_one() {
         evaluate("two walls", &subject, Assessment::of(&subject))
     };
     // If the reference pose were the true one, its cost would be the initial cost.
-    let reference = problem.reference.world_from_camera;
+    let reference = problem.reference().world_from_camera();
     for method in [Method::PM, Method::MI] {
-        let cost = result(method, Some(&reference)).cost.expect("a direct method");
+        let cost = result(method, Some(reference)).cost.expect("a direct method");
         assert!(cost.initial.is_some());
         assert_eq!(cost.truth, cost.initial, "{}", method.name());
         let unknown = result(method, None);
         assert_eq!(unknown.cost.expect("a direct method").truth, None);
         assert_eq!((unknown.error, unknown.initial_error), (None, None));
     }
-    assert_eq!(result(Method::FB, Some(&reference)).cost, None);
+    assert_eq!(result(Method::FB, Some(reference)).cost, None);
 }

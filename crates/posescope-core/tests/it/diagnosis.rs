@@ -4,6 +4,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
+use posescope_core::camera::Intrinsics;
 use posescope_core::diagnosis::Code;
 use posescope_core::diagnosis::{Diagnosis, Evidence, Subject, Tolerance, diagnose};
 use posescope_core::event::{JudgedPose, KindSet};
@@ -17,6 +18,7 @@ use posescope_core::params::Params;
 use posescope_core::problem::{Problem, Query};
 use posescope_core::trace::{Cancelled, Record, Sink, Trace};
 
+use crate::conformance::{remembering, within};
 use crate::two_walls::{cloud_of_the_walls, photo, problem, solvable};
 use crate::walls_scene::Walls;
 
@@ -26,7 +28,7 @@ const BESIDE_THE_PAPER: [Method; 3] =
 
 /// Where the query really is: 1 m ahead of the reference.
 fn truth(problem: &Problem) -> Pose {
-    problem.reference.world_from_camera * Pose::translation(0.0, 0.0, 1.0)
+    problem.reference().world_from_camera() * Pose::translation(0.0, 0.0, 1.0)
 }
 
 fn with(assignments: &[&str]) -> Params {
@@ -108,14 +110,19 @@ fn a_cloud_in_millimetres_is_suspect_with_and_without_the_truth() {
 
 #[test]
 fn another_camera_is_suspected_from_the_matches() {
-    let mut problem = solvable();
-    let mut query = Query::clone(&problem.query);
+    let problem = solvable();
+    let query = problem.query();
+    let stated = *query.intrinsics();
     // A longer focal length alone looks like a camera that stands nearer.
-    query.intrinsics.fx *= 0.8;
-    query.intrinsics.fy *= 0.8;
-    query.intrinsics.cx += 20.0;
-    query.intrinsics.cy -= 15.0;
-    problem.query = Arc::new(query);
+    let other = Intrinsics {
+        fx: 0.8 * stated.fx,
+        fy: 0.8 * stated.fy,
+        cx: stated.cx + 20.0,
+        cy: stated.cy - 15.0,
+        ..stated
+    };
+    let query = Query::new(query.name(), Arc::clone(query.photo()), other).expect("a camera");
+    let problem = problem.with_query(query);
     let found = verdicts(&problem, Method::FB, &Params::default(), Some(&truth(&problem)));
     assert_eq!(primary(&found), Some(Code::X1), "{found:?}");
     let focal_length = found[0].evidence["camera"]["fx"].as_f64().expect("a camera");
@@ -124,9 +131,8 @@ fn another_camera_is_suspected_from_the_matches() {
 
 #[test]
 fn a_truth_beyond_the_disc_is_outside_the_grid() {
-    let mut problem = solvable();
-    problem.uncertainty_radius_m = 3.0;
-    let far = problem.reference.world_from_camera * Pose::translation(0.0, 0.0, 9.0);
+    let problem = within(solvable(), 3.0);
+    let far = problem.reference().world_from_camera() * Pose::translation(0.0, 0.0, 9.0);
     let found = verdicts(&problem, Method::PM, &Params::default(), Some(&far));
     assert!(codes(&found).contains(&Code::D4), "{found:?}");
     let outside = found.iter().find(|finding| finding.code == Code::D4).expect("D4");
@@ -136,11 +142,10 @@ fn a_truth_beyond_the_disc_is_outside_the_grid() {
 #[test]
 fn what_is_remembered_of_a_search_is_said_of_no_other() {
     let problem = solvable();
-    let mut remembering = problem.clone();
-    remembering.query = Arc::new((*problem.query).clone().remembering());
-    remembering.reference = Arc::new((*problem.reference).clone().remembering());
-    let at =
-        |right, ahead| problem.reference.world_from_camera * Pose::translation(right, 0.0, ahead);
+    let remembering = remembering(&problem);
+    let at = |right, ahead| {
+        problem.reference().world_from_camera() * Pose::translation(right, 0.0, ahead)
+    };
     let truths = [None, Some(at(0.0, 1.0)), Some(at(2.0, 1.0)), Some(at(0.0, 9.0))];
     let settings = [
         with(&[]),
@@ -167,9 +172,7 @@ fn what_is_remembered_of_a_search_is_said_of_no_other() {
 #[test]
 fn the_look_of_one_pose_is_not_taken_for_that_of_another() {
     let problem = solvable();
-    let mut remembering = problem.clone();
-    remembering.query = Arc::new((*problem.query).clone().remembering());
-    remembering.reference = Arc::new((*problem.reference).clone().remembering());
+    let remembering = remembering(&problem);
     let believed = |problem: &Problem, params: &Params| {
         let mut evidence = Evidence::default();
         let mut trace = Trace::to(&mut evidence);
@@ -189,9 +192,8 @@ fn the_look_of_one_pose_is_not_taken_for_that_of_another() {
 
 #[test]
 fn a_truth_beyond_the_prior_is_said_of_a_pose_that_was_accepted_elsewhere() {
-    let mut problem = solvable();
-    problem.uncertainty_radius_m = 3.0;
-    let at = |metres| problem.reference.world_from_camera * Pose::translation(0.0, 0.0, metres);
+    let problem = within(solvable(), 3.0);
+    let at = |metres| problem.reference().world_from_camera() * Pose::translation(0.0, 0.0, metres);
     let found = |truth: Pose| verdicts(&problem, Method::FB, &Params::default(), Some(&truth));
     // A tenth beyond the prior is allowed.
     let beyond = found(at(3.4));
@@ -207,7 +209,7 @@ fn a_truth_beyond_the_prior_is_said_of_a_pose_that_was_accepted_elsewhere() {
 #[test]
 fn poses_that_are_read_the_wrong_way_round_are_suspect() {
     let problem = solvable();
-    let reference = problem.reference.world_from_camera;
+    let reference = problem.reference().world_from_camera();
     let from_query = Pose::translation(0.0, 0.0, 1.0);
     // As stated, the query is elsewhere; with both poses inverted it is where it is.
     let stated = from_query.inverse() * reference;

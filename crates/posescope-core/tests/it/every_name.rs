@@ -213,8 +213,11 @@ fn a_query_is_localised_and_watched() {
     let mut counter = Counter { wanted: KindSet::of(&[Kind::PoseScored]), count: 0 };
     let mut trace = Trace::to(&mut counter);
     let black = Photo::from_gray(GrayImage::new(camera.width, camera.height));
-    let black =
-        Problem::new(Query::new("black", black, camera).expect("fits"), problem.reference, 3.0);
+    let black = Problem::new(
+        Query::new("black", black, camera).expect("fits"),
+        Arc::clone(problem.reference()),
+        3.0,
+    );
     let outcome = localize_traced(&black.expect("a radius"), Method::MI, &params, &mut trace);
     let failure: Failure = outcome.expect("nobody cancels").pose.expect_err("black");
     assert!(matches!(failure, Failure::NothingComparable { .. }), "{failure}");
@@ -261,11 +264,11 @@ fn a_cost_states_what_decides_it() {
     struct Stays;
     impl Estimator for Stays {
         fn estimate(&self, problem: &Problem, _: &mut Trace<'_>) -> Result<Outcome, Cancelled> {
-            Ok(Outcome::of(Ok(problem.reference.world_from_camera)))
+            Ok(Outcome::of(Ok(*problem.reference().world_from_camera())))
         }
     }
     let stays = localize_by(&Stays, &solvable(), &mut Trace::off()).expect("nobody cancels");
-    assert_eq!(stays.pose, Ok(solvable().reference.world_from_camera));
+    assert_eq!(stays.pose, Ok(*solvable().reference().world_from_camera()));
 }
 
 #[test]
@@ -312,8 +315,7 @@ fn features_are_found_and_matched() {
     let Keypoint { x, y, .. } = found[0].keypoints[0];
     assert!(cubic_interpolated(&query, x, y) > 0.0);
     let given = FoundMatches::new(&[[x, y]], &[[x, y]], &[Some(0)]);
-    let mut problem = solvable();
-    problem.matches = Some(Arc::new(PairMatches::Found(given)));
+    let problem = solvable().with_matches(Some(Arc::new(PairMatches::Found(given))));
     assert!(localize(&problem, Method::FB, &Params::default()).pose.is_err());
 
     let found: SiftFeatures = sift(&query, &SiftParams::default());

@@ -283,7 +283,7 @@ fn two_threads_may_read_a_frame_at_once_and_get_the_same() {
     let got = got.into_inner().expect("whole");
     assert!(Arc::ptr_eq(&got[0].0, &got[1].0));
     assert!(Arc::ptr_eq(&got[0].1, &got[1].1));
-    assert!(Arc::ptr_eq(&got[0].0.photo, &got[0].1.photo));
+    assert!(Arc::ptr_eq(got[0].0.photo(), got[0].1.photo()));
 }
 
 /// A scene that answers everything in its own way.
@@ -309,10 +309,9 @@ impl Scene for UnusualScene {
     }
 
     fn query(&self, frame: usize) -> Result<Arc<Query>, SceneError> {
-        let mut query = Arc::unwrap_or_clone(self.0.query(frame)?);
-        query.name = format!("query {frame}");
-        query.intrinsics = self.intrinsics(frame);
-        Ok(Arc::new(query))
+        let photo = Arc::clone(self.0.query(frame)?.photo());
+        let query = Query::new(format!("query {frame}"), photo, self.intrinsics(frame));
+        Ok(Arc::new(query.expect("the photo fits")))
     }
 
     fn fingerprint(&self) -> u64 {
@@ -324,14 +323,14 @@ impl Scene for UnusualScene {
 /// trait is one more here.
 fn said(scene: &dyn Scene, frame: usize) -> Vec<String> {
     let error = |error: SceneError| error.to_string();
-    let query = scene.query(frame).map_err(error).map(|query| {
-        let Query { name, photo, intrinsics, .. } = &*query;
-        (name.clone(), photo.gray.clone(), *intrinsics)
-    });
+    let query = scene
+        .query(frame)
+        .map_err(error)
+        .map(|query| (query.name().to_owned(), query.photo().gray.clone(), *query.intrinsics()));
     let reference = scene.reference(frame).map_err(error).map(|tuple| {
-        let ReferenceTuple { name, photo, intrinsics, world_from_camera, cloud, .. } = &*tuple;
-        let pixels = photo.gray.clone();
-        (name.clone(), pixels, *intrinsics, *world_from_camera, cloud.points.clone())
+        let (name, pixels) = (tuple.name().to_owned(), tuple.photo().gray.clone());
+        let pose = *tuple.world_from_camera();
+        (name, pixels, *tuple.intrinsics(), pose, tuple.cloud().points.clone())
     });
     vec![
         scene.name().to_owned(),

@@ -16,6 +16,7 @@ use posescope_core::render::{Objective as _, RenderParams};
 use posescope_core::search::{Freedoms, Refined};
 use posescope_core::trace::Trace;
 
+use crate::conformance::within;
 use crate::two_walls::{cloud_of_the_walls, photo, problem, solvable};
 
 /// A query and a reference of different walls.
@@ -142,9 +143,8 @@ fn copies_are_searched_with_all_channels_and_samples_gather_around_what_they_lea
 
 #[test]
 fn a_search_whose_minima_all_lead_out_of_the_disc_says_so() {
-    let mut problem = solvable();
     // The query is 1 m away.
-    problem.uncertainty_radius_m = 0.05;
+    let problem = within(solvable(), 0.05);
     let (outcome, _) = told("mi6", &problem, &Params::default());
     let failure = outcome.pose.expect_err("its basin has its foot outside");
     assert!(matches!(failure, Failure::LedOutside { minima, .. } if minima > 1), "{failure}");
@@ -153,8 +153,7 @@ fn a_search_whose_minima_all_lead_out_of_the_disc_says_so() {
 
 #[test]
 fn refinements_take_no_steps_beyond_the_next_coarse_position() {
-    let mut problem = solvable();
-    problem.uncertainty_radius_m = 1.25;
+    let problem = within(solvable(), 1.25);
     let photos_alone = "mi6.coarse_shrink=1";
     let (outcome, history) =
         told("mi6", &problem, &params(&["grid.coarse_step=0.25", photos_alone]));

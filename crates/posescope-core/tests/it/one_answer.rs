@@ -1,7 +1,5 @@
 //! An answer depends on the question alone: not on who asks, who listens, or what else was asked.
 
-use std::sync::Arc;
-
 use posescope_core::camera::Intrinsics;
 use posescope_core::cloud::Cloud;
 use posescope_core::diagnosis::Evidence;
@@ -20,7 +18,8 @@ use posescope_core::params::Params;
 use posescope_core::scene::{Scene, SceneError};
 use posescope_core::trace::{Cancelled, Record, Sink, Trace};
 
-use crate::two_walls::solvable;
+use crate::conformance::within;
+use crate::two_walls::{cloud_of_the_walls, photo, problem, solvable};
 use crate::walls_scene::Walls;
 
 const FB2: Method = Method::named("fb2");
@@ -136,12 +135,10 @@ fn points_in_view_are_fewer_than_all_where_some_are_not() {
             Ok(())
         }
     }
-    let mut problem = solvable();
-    let mut reference = posescope_core::problem::ReferenceTuple::clone(&problem.reference);
-    let behind = reference.cloud.points.clone();
-    let behind = behind.iter().map(|point| -*point);
-    reference.cloud.points.extend(behind);
-    problem.reference = Arc::new(reference);
+    let mut cloud = cloud_of_the_walls();
+    let behind: Vec<_> = cloud.points.iter().map(|point| -*point).collect();
+    cloud.points.extend(behind);
+    let problem = problem(photo(1.0, 5), photo(0.0, 5), cloud);
     for method in [Method::FB, FB2] {
         let mut clouds = Clouds::default();
         localize_traced(&problem, method, &Params::default(), &mut Trace::to(&mut clouds))
@@ -178,8 +175,7 @@ fn a_hybrid_falls_back_where_its_first_pose_is_refused_whoever_asks_and_listens(
 #[test]
 fn a_later_round_of_the_search_never_ends_higher() {
     for radius in [0.5, 0.7] {
-        let mut problem = solvable();
-        problem.uncertainty_radius_m = radius;
+        let problem = within(solvable(), radius);
         for method in [Method::PM, Method::MI, NID] {
             let mut before = f64::INFINITY;
             for rounds in 1..=4 {

@@ -78,7 +78,7 @@ fn a_cost_of_ones_own_is_searched_and_told_like_any_other() {
 
 #[test]
 fn what_is_remembered_of_one_cost_is_not_taken_for_another_of_the_same_name() {
-    let problem = remembering();
+    let problem = remembering(&solvable());
     for _ in 0..2 {
         for cost in [difference, brightness] {
             assert_eq!(outcome(cost, &problem), outcome(cost, &solvable()));

@@ -16,6 +16,7 @@ use posescope_core::params::Params;
 use posescope_core::problem::Problem;
 use posescope_core::trace::Trace;
 
+use crate::conformance::within;
 use crate::two_walls::{cloud_of_the_walls, photo, problem, solvable};
 
 /// Every method with every search that it can be set to.
@@ -85,9 +86,9 @@ fn with(assignments: &[&str]) -> Params {
 #[test]
 fn every_search_answers_the_same_with_and_without_a_listener() {
     assert_eq!(settings().len(), estimator::all().len() + 6, "three costs have three searches");
-    for mut problem in [solvable(), strangers()] {
+    for problem in [solvable(), strangers()] {
         for seed in [0, 11] {
-            problem.seed = seed;
+            let problem = problem.clone().with_seed(seed);
             for (name, method, params) in settings() {
                 let quiet = localize(&problem, method, &params);
                 let (heard, _) = traced(&problem, method, &params);
@@ -99,8 +100,7 @@ fn every_search_answers_the_same_with_and_without_a_listener() {
 
 #[test]
 fn a_descent_needs_no_lattice_so_none_is_too_large_for_it() {
-    let mut problem = solvable();
-    problem.uncertainty_radius_m = 600.0;
+    let problem = within(solvable(), 600.0);
     let params = with(&["pm.search=descent"]);
     let quiet = localize(&problem, Method::PM, &params);
     assert!(quiet.pose.is_ok(), "{:?}", quiet.pose);
@@ -114,7 +114,7 @@ fn a_descent_needs_no_lattice_so_none_is_too_large_for_it() {
 #[test]
 fn what_is_said_of_a_cost_is_of_the_pose_that_is_answered() {
     let problem = solvable();
-    let area = f64::from(problem.query.intrinsics.width * problem.query.intrinsics.height);
+    let area = f64::from(problem.query().intrinsics().width * problem.query().intrinsics().height);
     let mut settings = settings();
     // With so much credit the features' pose wins against that of the search.
     let credit = with(&["robust.credit=100"]);
@@ -170,8 +170,8 @@ fn a_search_is_the_family_that_its_parameter_says() {
 fn no_verdict_speaks_of_a_search_that_was_not_made() {
     // The truth is named wrongly, so that every search has a cause to be looked for.
     let problem = solvable();
-    let elsewhere = problem.reference.world_from_camera * Pose::translation(2.0, 0.4, 2.2);
-    let far = problem.reference.world_from_camera * Pose::translation(0.0, 0.0, -9.0);
+    let elsewhere = problem.reference().world_from_camera() * Pose::translation(2.0, 0.4, 2.2);
+    let far = problem.reference().world_from_camera() * Pose::translation(0.0, 0.0, -9.0);
     for cost in ["pm", "mi", "nid"] {
         let method = cost.parse().expect("a method");
         for search in ["starts", "descent"] {
@@ -196,16 +196,16 @@ fn a_descent_that_ends_right_has_no_verdict_and_one_that_was_led_astray_says_so(
     let params = with(&["pm.search=descent"]);
     // From 1 m away a descent arrives.
     let near = solvable();
-    let truth = near.reference.world_from_camera * Pose::translation(0.0, 0.0, 1.0);
+    let truth = near.reference().world_from_camera() * Pose::translation(0.0, 0.0, 1.0);
     assert_eq!(codes_and_texts(&near, Method::PM, &params, &truth), []);
     // From 6 m away it ends in another minimum, or outside of the disc.
-    let mut far = problem(photo(6.0, 5), photo(0.0, 5), cloud_of_the_walls());
-    let truth = far.reference.world_from_camera * Pose::translation(0.0, 0.0, 6.0);
+    let far = problem(photo(6.0, 5), photo(0.0, 5), cloud_of_the_walls());
+    let truth = far.reference().world_from_camera() * Pose::translation(0.0, 0.0, 6.0);
     for (radius_m, code, words) in [
         (20.0, Code::D3, "The way down from the reference led elsewhere."),
         (8.0, Code::D8, "lies outside the search, more than 8.0 m from the reference."),
     ] {
-        far.uncertainty_radius_m = radius_m;
+        let far = within(far.clone(), radius_m);
         let found = codes_and_texts(&far, Method::PM, &params, &truth);
         assert_eq!(found[0].0, code, "{found:?}");
         assert!(found[0].1.ends_with(words), "{found:?}");
@@ -214,10 +214,10 @@ fn a_descent_that_ends_right_has_no_verdict_and_one_that_was_led_astray_says_so(
 
 #[test]
 fn another_seed_draws_other_samples_and_the_same_seed_the_same() {
-    let mut problem = strangers();
+    let problem = strangers();
     let mut poses = Vec::new();
     for seed in [0, 1, 2, 0] {
-        problem.seed = seed;
+        let problem = problem.clone().with_seed(seed);
         let outcome = localize(&problem, Method::named("mi6"), &Params::default());
         poses.push(outcome.pose.expect("a search always ends somewhere"));
     }

@@ -38,9 +38,7 @@ pub fn problem(query: GrayImage, reference: GrayImage, cloud: Cloud) -> Problem 
     let query = Query::new("query", Photo::from_gray(query), CAMERA).expect("fits");
     let reference =
         ReferenceTuple::new("reference", Photo::from_gray(reference), CAMERA, pose, cloud);
-    let mut problem = Problem::new(query, reference.expect("fits"), 3.0).expect("a radius");
-    problem.seed = 7;
-    problem
+    Problem::new(query, reference.expect("fits"), 3.0).expect("a radius").with_seed(7)
 }
 
 /// A point in every other pixel of the reference.

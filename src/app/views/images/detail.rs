@@ -119,14 +119,14 @@ impl Detail {
         let at = patch(ui, "query patch", query, scales, query_photo);
         if let Some(truth) = &subject.truth {
             let painter = at.painter(ui.painter());
-            draw_truth(&painter, &at, &subject.problem.query.intrinsics, truth);
+            draw_truth(&painter, &at, subject.problem.query().intrinsics(), truth);
         }
         let Some(reference) = reference else {
             ui.weak("Nothing to match");
             return;
         };
         let at = patch(ui, "reference patch", reference, scales, reference_photo);
-        let tuple = &subject.problem.reference;
+        let tuple = subject.problem.reference();
         let painter = at.painter(ui.painter());
         self.draw_lidar(&painter, tuple, &reference.pixel(), &at);
         let radius = subject.depth_radius_px as f32 * at.scale;
@@ -220,9 +220,9 @@ fn patch(
 
 /// The points within a radius \[px\] of a pixel, the nearest to it first.
 fn lidar_around(tuple: &ReferenceTuple, pixel: &Point2<f64>, radius_px: f64) -> Vec<SeenPoint> {
-    let points = tuple.cloud.points.iter();
+    let points = tuple.cloud().points.iter();
     let seen = points.filter_map(|point| {
-        let seen = tuple.intrinsics.project(&point.cast())?;
+        let seen = tuple.intrinsics().project(&point.cast())?;
         Some((seen, f64::from(point.z)))
     });
     let distance = |seen: &SeenPoint| (seen.0 - pixel).norm_squared();

@@ -78,10 +78,10 @@ impl TrueMatch {
         within_px: f64,
     ) -> Self {
         let query_from_reference = problem.reference_from_query(truth).inverse();
-        let camera = &problem.query.intrinsics;
+        let camera = problem.query().intrinsics();
         let line = ImageLine::epipolar(
             camera,
-            &problem.reference.intrinsics,
+            problem.reference().intrinsics(),
             &query_from_reference,
             reference,
         );

@@ -104,7 +104,7 @@ fn row(
     let inlier_px = context.run.params.fb.mlesac.inlier_threshold_px;
     for hypothesis in [&trial.hypothesis, &trial.best] {
         let error = hypothesis.as_ref().zip(seen).and_then(|(hypothesis, seen)| {
-            residual_px(&problem.query.intrinsics, &hypothesis.pose, &point, seen)
+            residual_px(problem.query().intrinsics(), &hypothesis.pose, &point, seen)
         });
         ui.label(match error {
             Some(error) if error <= inlier_px => format!("{error:.1} inlier"),
@@ -154,7 +154,7 @@ fn acceptance(ui: &mut Ui, context: &ViewContext<'_>, judged: &ConsensusJudged) 
         }
     });
     let Some(problem) = context.problem() else { return };
-    let radius_m = problem.uncertainty_radius_m;
+    let radius_m = problem.uncertainty_radius_m();
     let limit_m = radius_m * (1.0 + params.radius_slack);
     let note = match params.accept {
         AcceptanceRule::Consensus => "",

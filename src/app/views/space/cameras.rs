@@ -141,15 +141,15 @@ pub(super) fn cameras(context: &ViewContext<'_>, geometry: &SceneGeometry) -> Ve
             scene_from_camera: geometry.scene_from_world * world,
             // The reference camera took the reference photo, all others take the query's.
             intrinsics: match kind {
-                CameraKind::Reference => problem.reference.intrinsics,
-                _ => problem.query.intrinsics,
+                CameraKind::Reference => *problem.reference().intrinsics(),
+                _ => *problem.query().intrinsics(),
             },
             depth_m: kind.look().0 * geometry.camera_m(),
             about,
             thing,
         }
     };
-    let mut all = vec![camera(CameraKind::Reference, problem.reference.world_from_camera)];
+    let mut all = vec![camera(CameraKind::Reference, *problem.reference().world_from_camera())];
     all.extend(truth.map(|pose| camera(CameraKind::Truth, *pose)));
     for &method in &context.setup.task.protocol.methods {
         if let Some(pose) = estimate(context, method) {

@@ -72,8 +72,8 @@ pub(super) fn points(
 /// All points of the scan: those that the photo shows in its colours, the others grey.
 fn colored(reference: &ReferenceTuple, params: &RenderParams) -> Vec<(Point3<f32>, Color32)> {
     const UNSEEN: Color32 = Color32::from_gray(105);
-    let ReferenceTuple { cloud, photo, intrinsics, .. } = reference;
-    let visible = render::color_cloud(cloud, &photo.gray, intrinsics, params);
+    let (cloud, gray) = (reference.cloud(), &reference.photo().gray);
+    let visible = render::color_cloud(cloud, gray, reference.intrinsics(), params);
     // The visible points are in the order of the scan.
     let mut visible = visible.points.iter().peekable();
     let mut color = |point: &Point3<f32>| match visible.next_if(|seen| seen.position == *point) {
@@ -88,8 +88,8 @@ fn colored(reference: &ReferenceTuple, params: &RenderParams) -> Vec<(Point3<f32
 }
 
 fn photo_color(reference: &ReferenceTuple, point: &Point3<f32>) -> Option<Color32> {
-    let photo = reference.photo.color.as_ref()?;
-    let pixel = reference.intrinsics.project(&point.cast())?;
+    let photo = reference.photo().color.as_ref()?;
+    let pixel = reference.intrinsics().project(&point.cast())?;
     let nearest = |value: f64| value.round().max(0.0) as u32;
     let [r, g, b] = photo.get_pixel_checked(nearest(pixel.x), nearest(pixel.y))?.0;
     Some(Color32::from_rgb(r, g, b))

@@ -28,11 +28,11 @@ impl SceneGeometry {
     pub(super) fn of(context: &ViewContext<'_>) -> Option<Self> {
         let first = context.run.problems().first()?;
         let here = context.problem()?;
-        let scene_from_world = first.reference.world_from_camera.inverse();
+        let scene_from_world = first.reference().world_from_camera().inverse();
         Some(Self {
             scene_from_world,
-            scene_from_reference: scene_from_world * here.reference.world_from_camera,
-            radius_m: here.uncertainty_radius_m,
+            scene_from_reference: scene_from_world * here.reference().world_from_camera(),
+            radius_m: here.uncertainty_radius_m(),
         })
     }
 

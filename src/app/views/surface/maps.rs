@@ -267,7 +267,7 @@ pub(super) fn progress(searched: &Searched) -> String {
 /// All lattices with a margin.
 fn whole(shown: &MapContent<'_>) -> PlotBounds {
     const MARGIN: f64 = 1.04;
-    let radius = shown.search.problem.uncertainty_radius_m;
+    let radius = shown.search.problem.uncertainty_radius_m();
     let half = shown.layers().into_iter().fold(radius, |half, layer| {
         let lattice = &layer.lattice;
         let reach = |middle: f64, count: usize| middle.abs() + 0.5 * count as f64 * lattice.step;

@@ -86,7 +86,7 @@ impl<'a> Search<'a> {
         let is_new = search.lattices.is_empty() && search.assessed.is_none();
         let first = single.first().map(|scored| scored.phase);
         let phase = first.or(is_new.then_some(Phase::PositionCoarse));
-        let radius_m = problem.uncertainty_radius_m;
+        let radius_m = problem.uncertainty_radius_m();
         let lattice = phase.and_then(|phase| Lattice::new(phase, centre, radius_m, params).ok());
         search.lattices.extend(lattice.map(|lattice| {
             let mut scores = vec![None; lattice.cells()];

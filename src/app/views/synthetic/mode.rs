@@ -77,9 +77,9 @@ impl Mode {
         let picture = match self {
             Self::Query => return None,
             Self::View => {
-                let query = Arc::clone(&problem.query);
+                let query = Arc::clone(problem.query());
                 of("synthetic/over", &move |made| {
-                    picture::over(&query.photo.gray, &made.view).into()
+                    picture::over(&query.photo().gray, &made.view).into()
                 })
             }
             Self::Blend => of("synthetic/view", &|made| picture::synthetic(&made.view).into()),
