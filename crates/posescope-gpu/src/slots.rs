@@ -31,8 +31,6 @@ pub(crate) struct Drawing {
     pub count: u32,
     /// Pixels of each.
     pixels: u64,
-    /// Pixels that there is room for.
-    room: u64,
     has_errors: bool,
 }
 
@@ -53,10 +51,9 @@ impl Slots {
         projection_bytes: u64,
         answer_bytes: u64,
     ) -> Result<Batch<'_>, GpuError> {
-        let fits = |drawing: &mut Drawing| {
-            (drawing.has_errors || !has_errors) && drawing.divide(card, pixels)
-        };
-        if !self.drawing.as_mut().is_some_and(fits) {
+        let fits =
+            |drawing: &Drawing| drawing.pixels == pixels && (drawing.has_errors || !has_errors);
+        if !self.drawing.as_ref().is_some_and(fits) {
             // Before the new buffers are asked for, the old ones are given back.
             self.drawing = None;
             self.drawing = Some(Drawing::new(card, pixels, has_errors)?);
@@ -82,18 +79,13 @@ fn grow(card: &Card, buffer: &mut Option<wgpu::Buffer>, bytes: u64, usage: Buffe
     }
 }
 
-/// As many slots of so many pixels as are of use, if there is memory for them.
-fn most_slots(card: &Card, pixels: u64) -> u64 {
-    let limits = &card.limits;
-    let bytes = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
-    let most = if card.is_software { MAX_SLOTS_OF_SOFTWARE } else { MAX_SLOTS };
-    (bytes.min(MAX_BYTES) / (4 * pixels)).min(most)
-}
-
 impl Drawing {
     /// As many slots as are of use and fit.
     fn new(card: &Card, pixels: u64, has_errors: bool) -> Result<Self, GpuError> {
-        let mut count = most_slots(card, pixels);
+        let limits = &card.limits;
+        let bytes = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
+        let most = if card.is_software { MAX_SLOTS_OF_SOFTWARE } else { MAX_SLOTS };
+        let mut count = (bytes.min(MAX_BYTES) / (4 * pixels)).min(most);
         while count > 0 {
             match Self::with(card, pixels, has_errors, count) {
                 Some(drawing) => return Ok(drawing),
@@ -115,32 +107,11 @@ impl Drawing {
             nearest: storage("nearest", bytes),
             first: storage("first", bytes),
             errors: storage("errors", if has_errors { bytes } else { 0 }),
-            ages: card.buffer(
-                "ages",
-                4 * MAX_SLOTS,
-                BufferUsages::STORAGE | BufferUsages::COPY_DST,
-            ),
+            ages: storage("ages", 4 * count),
             count: count as u32,
             pixels,
-            room: pixels * count,
             has_errors,
         };
         pollster::block_on(scope.pop()).is_none().then_some(drawing)
-    }
-
-    /// Divides the room into slots of so many pixels; `false` where new buffers would have more than twice as many.
-    fn divide(&mut self, card: &Card, pixels: u64) -> bool {
-        if self.pixels == pixels {
-            return true;
-        }
-        let wanted = most_slots(card, pixels);
-        let count = (self.room / pixels).min(wanted);
-        if count == 0 || 2 * count < wanted {
-            return false;
-        }
-        // What is drawn first clears its slot.
-        card.queue.write_buffer(&self.ages, 0, &[0; 4 * MAX_SLOTS as usize]);
-        (self.pixels, self.count) = (pixels, count as u32);
-        true
     }
 }

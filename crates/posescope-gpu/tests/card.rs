@@ -110,25 +110,6 @@ fn scores_are_those_of_the_threads_to_the_last_bit() {
     }
 }
 
-#[test]
-fn queries_of_two_sizes_in_turn_are_scored_as_by_the_threads() {
-    let Some(gpu) = gpu() else { return };
-    let world = world(5, 4000, 40);
-    let small = Intrinsics { width: 97, height: 50, ..camera() };
-    let query = FloatImage::from_fn(97, 50, |x, y| *world.query.get_pixel(x, y));
-    let queries = [(camera(), Arc::clone(&world.query)), (small, Arc::new(query))];
-    for (name, (camera, query)) in
-        ["mi", "pm", "mi", "pm", "mi"].into_iter().zip(queries.iter().cycle())
-    {
-        let cost = cost_of(name, "");
-        let scorer = || Scorer::new(world.cloud.clone(), query.clone(), camera, 1, cost.as_ref());
-        let expected = scorer().on(None).score(&world.poses);
-        let device = Arc::clone(&gpu) as Arc<dyn Device>;
-        assert_eq!(scorer().on(Some(device)).score(&world.poses), expected, "{name}");
-        assert_eq!(gpu.complaint(), None);
-    }
-}
-
 fn expected_costs(world: &World) -> usize {
     let cost = cost_of("mi", "");
     let scorer = Scorer::new(world.cloud.clone(), world.query.clone(), &camera(), 1, cost.as_ref());
