@@ -81,6 +81,7 @@ pub(super) use l1::low;
 
 verdicts! {
     X9 in x9,
+    I1 in i1,
     X1 in x1,
     V1 in v1,
     F1 in f1,
@@ -249,6 +250,7 @@ impl Code {
             Failure::UnknownMethod { .. } | Failure::Parameter(_) => Self::E2,
             Failure::LowConfidence { .. } => Self::L1,
             Failure::Internal { .. } => Self::X9,
+            Failure::Unreadable { .. } => Self::I1,
         }
     }
 }

@@ -199,6 +199,12 @@ pub enum Failure {
         /// The probability that is required.
         needed: f64,
     },
+    /// A file of the query or of its references cannot be read.
+    #[error("{message}")]
+    Unreadable {
+        /// The file and what is wrong with it.
+        message: String,
+    },
     /// A bug: an estimator panicked.
     #[error("Internal error, please report it: {message}")]
     Internal {
