@@ -412,7 +412,9 @@ impl Protocol {
             foreign = foreign.with_estimates(*method, estimates);
         }
         if let Some(folder) = &self.matches {
-            foreign = foreign.with_matches(Arc::new(MatchFolder::open(folder)?));
+            let matches = MatchFolder::open(folder)?;
+            let matches = matches.between(localizer.queries(), localizer.references());
+            foreign = foreign.with_matches(Arc::new(matches));
         }
         Ok(localizer
             .with_foreign(foreign)

@@ -11,7 +11,7 @@ mod camera;
 mod model;
 mod text;
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 pub(super) use self::camera::ModelCamera;
@@ -19,6 +19,7 @@ use self::model::ModelImage;
 pub(super) use self::text::{camera as camera_of_line, image_lines};
 use super::file_scene::{Clouds, FileScene, Frame};
 use super::folder::{folder_name, within};
+use super::frame_names::names_of;
 use super::lens::developed_camera;
 use super::{Lengths, Scene, SceneError, SceneFormat};
 use crate::cloud::Cloud;
@@ -73,7 +74,13 @@ fn open(folder: &Path) -> Result<Box<dyn Scene>, SceneError> {
             .map_err(|why| error(format!("camera {id}: {why}")))?;
         cameras.insert(*id, camera);
     }
-    let names = frame_names(&images).map_err(error)?;
+    let paths: Vec<String> = images.iter().map(|image| image.name.clone()).collect();
+    let names = names_of(&paths);
+    // Images are in the order of their names.
+    if let Some(twice) = names.windows(2).find(|pair| pair[0] == pair[1]) {
+        let expected = format!("images with different names expected, two are called {}", twice[0]);
+        return Err(error(expected));
+    }
     let listed = images.len();
     let mut frames = Vec::with_capacity(listed);
     let mut observed = Vec::with_capacity(listed);
@@ -129,22 +136,6 @@ fn photo_folder(model: &Path, images: &[ModelImage]) -> Option<PathBuf> {
     places.into_iter().find(holds_any)
 }
 
-/// The images' names, without folders and extensions as long as they stay unique.
-fn frame_names(images: &[ModelImage]) -> Result<Vec<String>, String> {
-    let flat = |name: &str| name.replace(['/', '\\'], "-");
-    let without_extension = |name: &str| match name.rsplit_once('.') {
-        Some((stem, _)) if !stem.is_empty() => stem.to_owned(),
-        _ => name.to_owned(),
-    };
-    let file = |name: &str| name.rsplit(['/', '\\']).next().unwrap_or(name).to_owned();
-    let briefest_first: [&dyn Fn(&str) -> String; 3] =
-        [&|name| without_extension(&file(name)), &|name| without_extension(&flat(name)), &flat];
-    let ways = briefest_first.into_iter();
-    ways.map(|brief| images.iter().map(|image| brief(&image.name)).collect())
-        .find(|names: &Vec<String>| names.iter().collect::<BTreeSet<_>>().len() == names.len())
-        .ok_or_else(|| "images with different names expected, two are the same".to_owned())
-}
-
 /// The points of the model, with the frames that observe them.
 struct ObservedPoints {
     /// In the world's frame.
@@ -177,30 +168,5 @@ impl Clouds for ObservedPoints {
             in_camera.cast()
         });
         Ok(Cloud { points: points.collect() })
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::geometry::Pose;
-
-    fn images(names: &[&str]) -> Vec<ModelImage> {
-        let image = |name: &&str| ModelImage {
-            name: (*name).to_owned(),
-            camera: 1,
-            camera_from_world: Pose::identity(),
-            observed: Vec::new(),
-        };
-        names.iter().map(image).collect()
-    }
-
-    #[test]
-    fn frames_are_called_as_briefly_as_tells_them_apart() {
-        let names = |names: &[&str]| frame_names(&images(names));
-        assert_eq!(names(&["a/1.jpg", "a/2.5.jpg"]), Ok(vec!["1".to_owned(), "2.5".to_owned()]));
-        assert_eq!(names(&["a/1.jpg", "b/1.jpg"]), Ok(vec!["a-1".to_owned(), "b-1".to_owned()]));
-        assert_eq!(names(&["1.jpg", "1.png"]), Ok(vec!["1.jpg".to_owned(), "1.png".to_owned()]));
-        assert!(names(&["a/1.jpg", "b/1.jpg", "a-1.jpg"]).is_err());
     }
 }

@@ -28,6 +28,7 @@ use self::poses::FramePoses;
 use super::cloud_file;
 use super::file_scene::{Clouds, Develop, FileScene, Frame};
 use super::folder::{folder_name, stem, warn_without_poses, within};
+use super::frame_names::names_of;
 use super::lens::{Distortion, developed_camera, pinhole};
 use super::map_blocks::MapBlocks;
 use super::{Scene, SceneError, SceneFormat, lines, photo_file, view_crop};
@@ -177,8 +178,12 @@ fn open(path: &Path) -> Result<Box<dyn Scene>, SceneError> {
     })?;
     let photos = source.files(&description.images)?;
     let (intrinsics, develop) = camera(&source, &description.camera, &photos[0])?;
+    let file_names = photos.iter().map(|photo| photo.file_name().unwrap_or_default());
+    let file_names: Vec<String> =
+        file_names.map(|name| name.to_string_lossy().into_owned()).collect();
+    let names = names_of(&file_names);
     let poses = match &description.poses {
-        Some(name) => poses::read(&source.file(name)?, &photos)?,
+        Some(name) => poses::read(&source.file(name)?, &names)?,
         None => {
             warn_without_poses(path, "poses");
             vec![FramePoses::default(); photos.len()]
@@ -193,7 +198,9 @@ fn open(path: &Path) -> Result<Box<dyn Scene>, SceneError> {
     let frames = photos
         .into_iter()
         .zip(poses)
-        .map(|(photo, FramePoses { pose, time_s })| Frame {
+        .zip(names)
+        .map(|((photo, FramePoses { pose, time_s }), name)| Frame {
+            name,
             develop: develop.clone(),
             world_from_camera: match description.pose {
                 PoseMeaning::WorldFromCamera => pose,

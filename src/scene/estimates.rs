@@ -3,11 +3,10 @@
 use std::path::Path;
 
 use posescope_core::foreign::Estimates;
-use posescope_core::scene::trailing_number;
 
 use super::frame_names::FrameNames;
 use super::lines::TextFile;
-use super::pose_text::{NamedPose, PoseLines, PoseText};
+use super::pose_text::{NamedPose, PoseLines, PoseText, line_of};
 use super::trajectory::{SAME_MOMENT_S, associated};
 use super::{Scene, SceneError};
 use crate::geometry::Pose;
@@ -24,7 +23,7 @@ pub fn read_estimates(path: &Path, scene: &dyn Scene) -> Result<Estimates, Scene
     match PoseText::read(&file, Some(&names))? {
         PoseText::Timed(samples) => by_time(&file, samples, scene),
         PoseText::Lines(poses) => by_line(&file, &poses, scene),
-        PoseText::Named(poses) => by_name(&file, poses, scene, &names),
+        PoseText::Named(poses) => by_name(&file, &poses, scene, &names),
     }
 }
 
@@ -71,7 +70,7 @@ fn by_time(
 /// Poses without names. Fewer lines than frames could belong to any of them.
 fn by_line(file: &TextFile, poses: &PoseLines, scene: &dyn Scene) -> Result<Estimates, SceneError> {
     let frames = scene.frames();
-    let last = frames.iter().filter_map(|name| trailing_number(name)).max();
+    let last = frames.iter().filter_map(|name| line_of(name)).max();
     if poses.count() != frames.len() && last.is_none_or(|last| poses.count() as u64 <= last) {
         return Err(file.error(format!(
             "one line per frame expected ({} of {}), or one per number from 0 at the end of their names; {} lines \
@@ -92,27 +91,29 @@ fn by_line(file: &TextFile, poses: &PoseLines, scene: &dyn Scene) -> Result<Esti
 /// Looks poses up by name; each frame may occur once.
 fn by_name(
     file: &TextFile,
-    poses: Vec<NamedPose<'_>>,
+    poses: &[NamedPose<'_>],
     scene: &dyn Scene,
     names: &FrameNames<'_>,
 ) -> Result<Estimates, SceneError> {
     let mut estimates = Estimates::new();
-    let mut stranger = None;
-    for NamedPose { line, name, world_from_camera } in poses {
-        let Some(frame) = names.find(&name) else {
-            stranger = stranger.or(Some(name));
+    let mut strangers: Vec<&str> = Vec::new();
+    let found = names.find_all(poses.iter().map(|pose| pose.name.as_str()));
+    for (NamedPose { line, name, world_from_camera }, frame) in poses.iter().zip(found) {
+        let Some(frame) = frame else {
+            strangers.push(name);
             continue;
         };
         let frame = &scene.frames()[frame];
-        if estimates.insert(frame.clone(), world_from_camera).is_some() {
+        if estimates.insert(frame.clone(), *world_from_camera).is_some() {
             return Err(
                 line.error(format!("one pose per frame expected, frame {frame} has one already"))
             );
         }
     }
     if estimates.is_empty() {
-        let called = stranger.as_deref().unwrap_or_default();
+        let called = strangers.first().copied().unwrap_or_default();
         return Err(file.error(names.none_found("poses of the frames", called)));
     }
+    names.warn_of_strangers(&file.name(), "poses", &strangers, poses.len());
     Ok(estimates)
 }

@@ -37,11 +37,13 @@ pub fn located(
     let file = TextFile::read(path)?;
     let (is_geographic, rows) = read_rows(&file)?;
     let scenes = [queries.as_ref(), references];
-    let world = is_geographic.then(|| Tie::fit(&file, &rows, &scenes)).transpose()?;
+    let world = is_geographic.then(|| Tie::fit(&file, &rows, scenes)).transpose()?;
     let names = FrameNames::new(queries.as_ref());
     let mut positions = BTreeMap::new();
-    for row in &rows {
-        let Some(frame) = names.find(row.name) else {
+    let mut strangers = Vec::new();
+    for (row, frame) in rows.iter().zip(names.find_all(rows.iter().map(|row| row.name))) {
+        let Some(frame) = frame else {
+            strangers.push(row.name);
             continue;
         };
         let position = match &world {
@@ -59,6 +61,9 @@ pub fn located(
     if positions.is_empty() {
         let called = rows.first().map_or("", |row| row.name);
         return Err(file.error(names.none_found("positions of the queries", called)));
+    }
+    if world.is_none() {
+        names.warn_of_strangers(&file.name(), "positions", &strangers, rows.len());
     }
     Ok(Arc::new(Located { scene: queries, positions }))
 }
@@ -136,17 +141,13 @@ impl Tie {
     }
 
     /// Fits the similarity between places and poses of the frames that have both.
-    fn fit(file: &TextFile, rows: &[Row<'_>], scenes: &[&dyn Scene]) -> Result<Self, SceneError> {
-        let names = scenes.iter().map(|scene| (FrameNames::new(*scene), scene));
-        let names: Vec<_> = names.collect();
-        let pose = |row: &Row<'_>| {
-            let of_scene = |(names, scene): &(FrameNames<'_>, &&dyn Scene)| {
-                Some(scene.pose(names.find(row.name)?)?.translation.vector)
-            };
-            names.iter().find_map(of_scene)
-        };
+    fn fit(file: &TextFile, rows: &[Row<'_>], scenes: [&dyn Scene; 2]) -> Result<Self, SceneError> {
+        let names = rows.iter().map(|row| row.name);
+        let found = scenes.map(|scene| (scene, FrameNames::new(scene).find_all(names.clone())));
+        let pose = |row: usize| found.iter().find_map(|(scene, frames)| scene.pose(frames[row]?));
+        let ties = rows.iter().enumerate();
         let ties: Vec<([f64; 3], Vector3<f64>)> =
-            rows.iter().filter_map(|row| Some((row.place, pose(row)?))).collect();
+            ties.filter_map(|(at, row)| Some((row.place, pose(at)?.translation.vector))).collect();
         let [(origin, _), _, _, ..] = ties[..] else {
             return Err(file.error(format!(
                 "at least 3 frames with a known pose expected, to convert latitudes and longitudes to the \

@@ -43,6 +43,11 @@ impl TextFile {
         lines.map(|(index, text)| Line { path: &self.path, number: index + 1, text: text.trim() })
     }
 
+    /// The path, for messages.
+    pub fn name(&self) -> String {
+        self.path.display().to_string()
+    }
+
     /// An error about the file as a whole.
     pub fn error(&self, expected: impl Into<String>) -> SceneError {
         SceneError::expected(&self.path, expected)

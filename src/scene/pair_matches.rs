@@ -12,14 +12,17 @@ mod hloc;
 mod npz;
 mod text;
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use posescope_core::features::{FoundMatches, PairMatches};
 use posescope_core::foreign::MatchSource;
+use posescope_core::scene::stem;
 
 use self::hloc::HlocFiles;
-use super::SceneError;
 use super::folder::entries;
+use super::frame_names::flat;
+use super::{Scene, SceneError};
 
 pub use self::text::write_matches;
 
@@ -94,6 +97,15 @@ impl RawMatches {
 pub struct MatchFolder {
     folder: PathBuf,
     hloc: Option<HlocFiles>,
+    /// Names of files that several frames have, of the queries' scene and of the references'.
+    shared: [BTreeSet<String>; 2],
+}
+
+/// What a frame may be called in the files.
+struct Names<'a> {
+    frame: &'a str,
+    /// Whether no other frame's photo has a file of this name.
+    is_file_unique: bool,
 }
 
 impl MatchFolder {
@@ -123,24 +135,41 @@ impl MatchFolder {
             [] => None,
             files => Some(HlocFiles::open(folder, files)?),
         };
-        Ok(Self { folder: folder.to_owned(), hloc })
+        Ok(Self { folder: folder.to_owned(), hloc, shared: Default::default() })
+    }
+
+    /// The matches of frames of these scenes.
+    #[must_use]
+    pub fn between(self, queries: &dyn Scene, references: &dyn Scene) -> Self {
+        let shared = [queries, references].map(|scene| {
+            let mut seen = BTreeSet::new();
+            let stems = scene.frames().iter().map(|frame| stem(frame));
+            stems.filter(|stem| !seen.insert(*stem)).map(str::to_owned).collect()
+        });
+        Self { shared, ..self }
+    }
+
+    /// The names of a frame of the queries' scene (0) or of the references' (1).
+    fn names<'a>(&self, scene: usize, frame: &'a str) -> Names<'a> {
+        Names { frame, is_file_unique: !self.shared[scene].contains(stem(frame)) }
     }
 }
 
 impl MatchSource for MatchFolder {
     fn matches(&self, query: &str, reference: &str) -> Result<Option<PairMatches>, SceneError> {
+        let (query, reference) = (self.names(0, query), self.names(1, reference));
         let orders =
-            [(Order::QueryFirst, query, reference), (Order::ReferenceFirst, reference, query)];
+            [(Order::QueryFirst, &query, &reference), (Order::ReferenceFirst, &reference, &query)];
         for (order, first, second) in orders {
-            let file = |ending: &str| self.folder.join(format!("{}.{ending}", pair(first, second)));
-            let (text, npz) = (file("txt"), file("npz"));
-            let found = if text.is_file() {
-                Some(text::read(&text)?.checked(&text)?)
-            } else if npz.is_file() {
-                Some(npz::read(&npz)?.checked(&npz)?)
-            } else {
-                let found = self.hloc.as_ref().map(|hloc| hloc.read(first, second));
-                found.transpose()?.flatten()
+            let found = match self.file(first, second) {
+                Some(file) if file.extension().is_some_and(|ending| ending == "txt") => {
+                    Some(text::read(&file)?.checked(&file)?)
+                }
+                Some(file) => Some(npz::read(&file)?.checked(&file)?),
+                None => {
+                    let found = self.hloc.as_ref().map(|hloc| hloc.read(first, second));
+                    found.transpose()?.flatten()
+                }
             };
             if let Some(found) = found {
                 return Ok(Some(PairMatches::Found(found.of_query(order))));
@@ -150,13 +179,25 @@ impl MatchSource for MatchFolder {
     }
 }
 
+impl MatchFolder {
+    /// The file of a pair: by the paths of its frames, or by the names of their files where these are unique.
+    fn file(&self, first: &Names<'_>, second: &Names<'_>) -> Option<PathBuf> {
+        let file = |first: &str, second: &str| {
+            let files = ["txt", "npz"].map(|ending| format!("{}.{ending}", pair(first, second)));
+            files.into_iter().map(|file| self.folder.join(file)).find(|file| file.is_file())
+        };
+        let by_file = || file(stem(first.frame), stem(second.frame));
+        let is_unique = first.is_file_unique && second.is_file_unique;
+        file(first.frame, second.frame).or_else(|| is_unique.then(by_file).flatten())
+    }
+}
+
 /// The end of the name of a pair's file.
 const PAIR_ENDING: &str = "_matches";
 
 /// The name of a pair's file without extension. Folders in frame names are kept with `-`, as in hloc.
 fn pair(first: &str, second: &str) -> String {
-    let plain = |name: &str| name.replace(['/', '\\'], "-");
-    format!("{}_{}{PAIR_ENDING}", plain(first), plain(second))
+    format!("{}_{}{PAIR_ENDING}", flat(first), flat(second))
 }
 
 #[cfg(test)]

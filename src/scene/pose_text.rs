@@ -113,7 +113,7 @@ fn with_header<'a>(
 fn is_named(line: Line<'_>, names: &FrameNames<'_>) -> bool {
     let name = line.words().next().unwrap_or_default();
     match (timed(line).is_ok(), named(line).is_ok()) {
-        (true, true) => names.find_named(name).is_some(),
+        (true, true) => names.find_alone(name).is_some(),
         (false, false) => line.number(name).is_err(),
         (_, is_named) => is_named,
     }
@@ -161,9 +161,14 @@ impl PoseLines {
     /// The pose of a frame. If there are as many lines as frames, lines are in the order of the frames. Otherwise
     /// the number at the end of the frame's name is the number of its line.
     pub fn of_frame(&self, index: usize, frames: usize, name: &str) -> Option<Pose> {
-        let by_name = || trailing_number(name)?.try_into().ok();
+        let by_name = || line_of(name)?.try_into().ok();
         self.get(if self.count() == frames { index } else { by_name()? })
     }
+}
+
+/// The line of a frame in a file with a line per number. Cameras of a rig share their numbers, so folders have none.
+pub(super) fn line_of(name: &str) -> Option<u64> {
+    trailing_number(name).filter(|_| !name.contains('/'))
 }
 
 #[cfg(test)]

@@ -13,7 +13,7 @@ use posescope::problem::Problem;
 use posescope::scene;
 use tempfile::TempDir;
 
-use crate::binary::{arg, has};
+use crate::binary::{arg, has, run_in};
 use crate::damage::open;
 use crate::small_sequence::wall;
 use crate::{damage, data};
@@ -141,7 +141,7 @@ fn both_forms_say_the_same() {
         write(&project, form);
         let scene = open(&project);
         assert_eq!(scene.name(), "colmap/yard");
-        assert_eq!(scene.frames(), ["1", "2"]);
+        assert_eq!(scene.frames(), ["a/1", "b side/2"]);
 
         // The centre of the first pixel is at (0.5, 0.5) of the model.
         let camera = scene.intrinsics(0);
@@ -177,8 +177,61 @@ fn both_forms_say_the_same() {
         assert_eq!(cloud.points, expected.map(Point3::from));
         assert!(!scene.has_cloud(1));
         let error = scene.reference(1).expect_err("observes nothing").to_string();
-        has(&error, "frame 1 has one");
+        has(&error, "frame a/1 has one");
     }
+}
+
+/// A model of two cameras whose photos have the same number.
+fn write_rig(folder: &Path) {
+    write(folder, Form::Text);
+    let images = folder.join("images");
+    for (name, renamed) in [("a/1.png", "cam0/000001.png"), ("b side/2.png", "cam1/000001.png")] {
+        let renamed = images.join(renamed);
+        fs::create_dir_all(renamed.parent().expect("has one")).expect("writable");
+        fs::rename(images.join(name), renamed).expect("is there");
+    }
+    let listed = folder.join("sparse/0/images.txt");
+    let text = fs::read_to_string(&listed).expect("just written");
+    let text =
+        text.replace("a/1.png", "cam0/000001.png").replace("b side/2.png", "cam1/000001.png");
+    fs::write(listed, text).expect("writable");
+}
+
+#[test]
+fn photos_of_a_rig_are_told_apart_by_their_folders() {
+    let folder = TempDir::new().expect("a folder");
+    write_rig(folder.path());
+    let scene = open(folder.path());
+    assert_eq!(scene.frames(), ["cam0/000001", "cam1/000001"]);
+    assert_eq!(scene.find("cam1/000001.png").expect("is there"), 1);
+    let error = scene.find("1").expect_err("either").to_string();
+    has(&error, "`1` may be cam0/000001, cam1/000001");
+    // The model's own images, and the names of hloc.
+    let file = folder.path().join("poses.txt");
+    let line = |name: &str| format!("{name} 1 0 0 0 0 0 0\n");
+    let keys = |path: &Path| -> Vec<String> {
+        let read = scene::read_estimates(path, scene.as_ref());
+        read.unwrap_or_else(|error| panic!("{error}")).into_keys().collect()
+    };
+    let both = ["cam0/000001", "cam1/000001"];
+    assert_eq!(keys(&folder.path().join("sparse/0")), both);
+    for names in [["cam0/000001.png", "cam1/000001.png"], ["cam0-000001.png", "cam1-000001"]] {
+        fs::write(&file, names.map(line).concat()).expect("writable");
+        assert_eq!(keys(&file), both);
+    }
+    // A name that both share, and one of a third camera, mean neither.
+    for name in ["000001.png", "1", "cam2/000001.png"] {
+        fs::write(&file, line(name)).expect("writable");
+        let error = scene::read_estimates(&file, scene.as_ref()).expect_err(name).to_string();
+        damage::expect_words(
+            &error,
+            &format!("with names like `cam0/000001`; the file has names like `{name}`"),
+        );
+    }
+    // Files of ours have no folders.
+    let line = "run . --all --reference cam0/000001 --method fb --export-matches matches";
+    run_in(folder.path(), line).ok();
+    assert!(folder.path().join("matches/cam1-000001_cam0-000001_matches.txt").is_file());
 }
 
 #[test]
@@ -196,7 +249,7 @@ fn photos_that_are_not_there_are_left_out() {
     write(folder.path(), Form::Text);
     let images = folder.path().join("images");
     fs::remove_file(images.join("b side/2.png")).expect("just written");
-    assert_eq!(open(folder.path()).frames(), ["1"]);
+    assert_eq!(open(folder.path()).frames(), ["a/1"]);
     fs::remove_dir_all(images).expect("just written");
     let error = error_of(folder.path());
     has(&error, "`images` ~ a/1.png");

@@ -174,38 +174,64 @@ pub fn fingerprint(scene: &(impl Scene + ?Sized), more: &[u8]) -> u64 {
 }
 
 impl dyn Scene + '_ {
-    /// The frame of a name, which may lack leading zeros (`3823` finds `003823`), what stands before the number
-    /// (`frame-003823`) or decimals of a time, and may have a folder and the extension of a photo.
+    /// The frame of a name: that of its photo, with the folder below the scene's images or without, as long as only
+    /// one frame fits. It may lack leading zeros (`3823` finds `003823`), what stands before the number
+    /// (`frame-003823`) or decimals of a time, and may have the extension of a photo and further folders in front.
     ///
     /// # Errors
-    /// [`SceneError::UnknownFrame`] says which frames there are.
+    /// [`SceneError::UnknownFrame`] says which frames there are, [`SceneError::SeveralFrames`] which ones fit.
     pub fn find(&self, name: &str) -> Result<usize, SceneError> {
         let frames = self.frames();
-        let short = stem(name);
-        let number = short.parse::<u64>().ok();
-        let first = |is_it: &dyn Fn(&str) -> bool| frames.iter().position(|frame| is_it(frame));
-        // These may fit several frames, and then name none.
-        let only = |is_it: &dyn Fn(&str) -> bool| {
-            let mut fitting = (0..frames.len()).filter(|&at| is_it(&frames[at]));
-            fitting.next().filter(|_| fitting.next().is_none())
+        let path = without_extension(name);
+        let number = path.parse::<u64>().ok();
+        let ends_path = |frame: &str| {
+            frame.len() < path.len() && path.ends_with(frame) && {
+                let before = &path[..path.len() - frame.len()];
+                before.ends_with(['/', '\\'])
+            }
         };
         let begins_a_time = |frame: &str| {
-            let rest = frame.strip_prefix(short).unwrap_or_default();
-            short.parse::<f64>().is_ok()
-                && (rest.starts_with('.') || short.contains('.') && !rest.is_empty())
+            let rest = frame.strip_prefix(path).unwrap_or_default();
+            path.parse::<f64>().is_ok()
+                && (rest.starts_with('.') || path.contains('.') && !rest.is_empty())
         };
-        first(&|frame| frame == name || frame == short)
-            .or_else(|| first(&|frame| number.is_some() && frame.parse().ok() == number))
-            .or_else(|| only(&|frame| stem(frame) == short))
-            .or_else(|| only(&|frame| number.is_some() && trailing_number(frame) == number))
-            .or_else(|| only(&begins_a_time))
-            .ok_or_else(|| SceneError::UnknownFrame {
-                scene: self.name().to_owned(),
-                frame: name.to_owned(),
-                known: frame_range(self),
-            })
+        let readings: [&dyn Fn(&str) -> bool; 8] = [
+            &|frame| frame == name,
+            &|frame| frame == path,
+            &|frame| frame.contains('/') && frame.replace('/', "-") == path,
+            &ends_path,
+            &|frame| number.is_some() && frame.parse().ok() == number,
+            &|frame| stem(frame) == path,
+            &|frame| number.is_some() && trailing_number(frame) == number,
+            &begins_a_time,
+        ];
+        for is_meant in readings {
+            let fitting: Vec<usize> =
+                (0..frames.len()).filter(|&at| is_meant(&frames[at])).collect();
+            match fitting.as_slice() {
+                [] => {}
+                [only] => return Ok(*only),
+                several => {
+                    let named = several.iter().take(SHOWN).map(|&at| frames[at].as_str());
+                    let mut known = named.collect::<Vec<_>>().join(", ");
+                    if several.len() > SHOWN {
+                        known += &format!(" and {} more", several.len() - SHOWN);
+                    }
+                    let (scene, frame) = (self.name().to_owned(), name.to_owned());
+                    return Err(SceneError::SeveralFrames { scene, frame, known });
+                }
+            }
+        }
+        Err(SceneError::UnknownFrame {
+            scene: self.name().to_owned(),
+            frame: name.to_owned(),
+            known: frame_range(self),
+        })
     }
 }
+
+/// The most frames that an error lists.
+const SHOWN: usize = 5;
 
 /// The first and the last frame of a scene and their number, for messages.
 pub fn frame_range(scene: &dyn Scene) -> String {
@@ -224,11 +250,15 @@ pub fn trailing_number(name: &str) -> Option<u64> {
 
 /// A name without folder and extension of a photo.
 pub fn stem(name: &str) -> &str {
+    without_extension(name.rsplit(['/', '\\']).next().unwrap_or(name))
+}
+
+/// A name without the extension of a photo.
+pub fn without_extension(name: &str) -> &str {
     const ENDINGS: [&str; 6] = ["png", "jpg", "jpeg", "bmp", "tif", "tiff"];
-    let base = name.rsplit(['/', '\\']).next().unwrap_or(name);
-    match base.rsplit_once('.') {
+    match name.rsplit_once('.') {
         Some((stem, ending)) if ENDINGS.contains(&ending.to_ascii_lowercase().as_str()) => stem,
-        _ => base,
+        _ => name,
     }
 }
 
@@ -314,6 +344,24 @@ mod tests {
         assert_eq!(found(times, "1"), None);
         assert_eq!(found(["a/b.png", "c/b.png", "c/d.png"], "d"), Some(2));
         assert_eq!(found(["a/b.png", "c/b.png", "c/d.png"], "b.png"), None);
+        let rig = ["cam0/000003", "cam1/000003", "cam1/000004"];
+        for name in ["cam1/000003", "cam1/000003.jpg", "cam1-000003", "data/images/cam1/000003.jpg"]
+        {
+            assert_eq!(found(rig, name), Some(1), "{name}");
+        }
+        for name in ["4", "000004", "000004.jpg"] {
+            assert_eq!(found(rig, name), Some(2), "{name}");
+        }
+        for name in ["3", "000003", "cam2/000004", "xcam1/000003"] {
+            assert_eq!(found(rig, name), None, "{name}");
+        }
+        let scene = Bare(rig.map(str::to_owned), [1.5; 3]);
+        let scene: &dyn Scene = &scene;
+        let error = scene.find("3").expect_err("two").to_string();
+        assert!(
+            error.ends_with("`3` may be cam0/000003, cam1/000003; name one of them"),
+            "{error}"
+        );
     }
 
     #[test]

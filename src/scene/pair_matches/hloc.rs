@@ -1,14 +1,17 @@
 //! Features and matches of hloc (Sarlin et al., *From Coarse to Fine*, CVPR 2019): one file with `IMAGE/keypoints`
 //! (N × 2, often in 16 bits), one with `IMAGE0/IMAGE1/matches0`, where names have `-` instead of `/`.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use half::f16;
 use hdf5_pure::{Dataset, File, Group};
 
-use super::{MAX_KEYPOINTS, RawMatches};
+use posescope_core::scene::stem;
+
+use super::{MAX_KEYPOINTS, Names, RawMatches};
 use crate::scene::SceneError;
+use crate::scene::frame_names::{agree, flat};
 
 /// How deep groups are searched for images.
 const DEEPEST: usize = 8;
@@ -23,8 +26,12 @@ pub(super) struct HlocFiles {
     matches_path: PathBuf,
     /// Images by their names with `-` instead of `/`.
     images: BTreeMap<String, String>,
-    /// Stored pairs by the frames' names.
-    pairs: BTreeMap<(String, String), Vec<[String; 2]>>,
+    /// The same names of images by what is left without the extension.
+    by_path: BTreeMap<String, Vec<String>>,
+    /// The same names of images by the names of their files without extension.
+    by_file: BTreeMap<String, Vec<String>>,
+    /// Stored pairs, by these names.
+    pairs: BTreeSet<(String, String)>,
 }
 
 impl HlocFiles {
@@ -57,26 +64,56 @@ impl HlocFiles {
         };
         let images: BTreeMap<String, String> =
             found.keypoints.into_iter().map(|name| (name.replace('/', "-"), name)).collect();
-        let mut pairs: BTreeMap<_, Vec<[String; 2]>> = BTreeMap::new();
-        for [first, second] in stored.matches {
-            let frame = |name: &str| frame_name(images.get(name).map_or(name, String::as_str));
-            let key = (frame(&first), frame(&second));
-            pairs.entry(key).or_default().push([first, second]);
+        let (mut by_path, mut by_file) = (BTreeMap::new(), BTreeMap::new());
+        for name in stored.matches.iter().flatten().collect::<BTreeSet<_>>() {
+            let own: &mut Vec<String> = by_path.entry(without_ending(name)).or_default();
+            own.push(name.clone());
+            let path = images.get(name).unwrap_or(name);
+            let file = path.rsplit('/').next().unwrap_or(path);
+            let same: &mut Vec<String> = by_file.entry(without_ending(file)).or_default();
+            same.push(name.clone());
         }
-        Ok(Self { features, features_path, matches, matches_path, images, pairs })
+        let pairs = stored.matches.into_iter().map(|[first, second]| (first, second)).collect();
+        Ok(Self { features, features_path, matches, matches_path, images, by_path, by_file, pairs })
+    }
+
+    /// The images that a frame may be: those of its path, or the only one of its file.
+    fn images_of(&self, names: &Names<'_>) -> Vec<&String> {
+        let flat = flat(names.frame);
+        if let Some((image, _)) = self.images.get_key_value(&flat) {
+            return vec![image];
+        }
+        if let Some(images) = self.by_path.get(&flat) {
+            return images.iter().collect();
+        }
+        let of_file = self.by_file.get(stem(names.frame)).map(Vec::as_slice);
+        match of_file {
+            Some([image]) if names.is_file_unique => {
+                let path = self.images.get(image).unwrap_or(image);
+                let may_be = agree(&without_ending(path), names.frame);
+                may_be.then_some(image).into_iter().collect()
+            }
+            _ => Vec::new(),
+        }
     }
 
     /// Reads the matches of two frames, if they are stored in this order.
-    pub(super) fn read(&self, first: &str, second: &str) -> Result<Option<RawMatches>, SceneError> {
-        let key = (first.to_owned(), second.to_owned());
-        let stored = match self.pairs.get(&key).map(Vec::as_slice) {
-            None | Some([]) => return Ok(None),
-            Some([stored]) => stored,
-            Some([a, b, ..]) => {
+    pub(super) fn read(
+        &self,
+        first: &Names<'_>,
+        second: &Names<'_>,
+    ) -> Result<Option<RawMatches>, SceneError> {
+        let seconds = self.images_of(second);
+        let both = self.images_of(first).into_iter();
+        let both = both.flat_map(|a| seconds.iter().map(move |b| (a.clone(), (*b).clone())));
+        let stored: Vec<(String, String)> = both.filter(|pair| self.pairs.contains(pair)).collect();
+        let stored = match stored.as_slice() {
+            [] => return Ok(None),
+            [(a, b)] => [a, b],
+            [a, b, ..] => {
                 let expected = format!(
-                    "one pair of images called {first} and {second} expected, `{}` and `{}` are both",
-                    a.join("/"),
-                    b.join("/")
+                    "one pair of images called {} and {} expected, `{}/{}` and `{}/{}` are both",
+                    first.frame, second.frame, a.0, a.1, b.0, b.1
                 );
                 return Err(content(&self.matches_path, &expected));
             }
@@ -91,7 +128,7 @@ impl HlocFiles {
             let found = found.and_then(|set| positions(&set));
             found.map_err(|why| content(&self.features_path, &format!("{place}: {why}")))
         };
-        let (first, second) = (keypoints(&stored[0])?, keypoints(&stored[1])?);
+        let (first, second) = (keypoints(stored[0])?, keypoints(stored[1])?);
         let place = format!("{}/{}/matches0", stored[0], stored[1]);
         let partners = self.matches.dataset(&place).map_err(text_of);
         let partners = partners
@@ -110,12 +147,11 @@ fn content(path: &Path, expected: &dyn std::fmt::Display) -> SceneError {
     SceneError::expected(path, expected.to_string().replace('\n', " "))
 }
 
-/// The name of the frame of an image.
-fn frame_name(image: &str) -> String {
-    let base = image.rsplit('/').next().unwrap_or(image);
-    match base.rsplit_once('.') {
-        Some((stem, ending)) if ending.len() <= 4 => stem.to_owned(),
-        _ => base.to_owned(),
+/// The name of an image without the extension of its file.
+fn without_ending(image: &str) -> String {
+    match image.rsplit_once('.') {
+        Some((stem, ending)) if ending.len() <= 4 && !ending.contains('/') => stem.to_owned(),
+        _ => image.to_owned(),
     }
 }
 

@@ -83,6 +83,16 @@ pub enum SceneError {
         /// Which frames there are.
         known: String,
     },
+    /// Several frames fit a name.
+    #[error("{scene}: frame `{frame}` may be {known}; name one of them")]
+    SeveralFrames {
+        /// The scene's name.
+        scene: String,
+        /// The frame as it was given.
+        frame: String,
+        /// Which frames fit.
+        known: String,
+    },
     /// A frame without a pose cannot be a reference.
     #[error("{scene}: frame {frame} has no pose, so it cannot be a reference")]
     NoPose {
