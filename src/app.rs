@@ -152,6 +152,11 @@ impl App {
         self.frame(ui);
         self.above(ui.ctx());
         self.state.textures.end_frame();
+        let pointed_at = self.state.pointed_at.take();
+        if pointed_at != self.state.hovered {
+            self.state.hovered = pointed_at;
+            ui.ctx().request_repaint();
+        }
         self.obey();
     }
 

@@ -98,6 +98,7 @@ impl Asking {
                 let is_named = !self.path.trim().is_empty();
                 let does = match self.target {
                     SaveTarget::Restored => "Restore",
+                    _ if Path::new(self.path.trim()).exists() => "Replace the file",
                     _ => "Save it",
                 };
                 let button = ui.add_enabled(is_named, egui::Button::new(does));

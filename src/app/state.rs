@@ -2,6 +2,7 @@
 
 mod shown;
 
+use std::cell::Cell;
 use std::time::Duration;
 
 use egui::TextureHandle;
@@ -57,8 +58,10 @@ pub struct AppState {
     pub kept: Option<KeptRun>,
     /// What is switched on and selected.
     pub options: ViewOptions,
-    /// The pose under the pointer (`world_from_camera`).
+    /// The pose that was under the pointer when the last frame was drawn (`world_from_camera`).
     pub hovered: Option<Pose>,
+    /// The pose under the pointer, set by the view that is pointed at while a frame is drawn.
+    pub pointed_at: Cell<Option<Pose>>,
     /// The camera in hand (`world_from_camera`).
     pub camera: Option<Pose>,
     /// Where the camera was before the last jump.
@@ -96,6 +99,7 @@ impl AppState {
                 ..ViewOptions::default()
             },
             hovered: None,
+            pointed_at: Cell::default(),
             camera: None,
             camera_before: None,
             notes: Vec::new(),

@@ -242,6 +242,16 @@ fn saving_asks_where_and_offers_a_name_that_says_what_it_is() {
     assert!(!is_said(&window, "Save the recording"));
     let name = folder.path().join("walls-000001-000000.rrd");
     assert!(!name.exists(), "nobody said so");
+    // A file that is there is replaced by a button that says so.
+    for (content, does) in [(None, "Save it"), (Some("old"), "Replace the file")] {
+        if let Some(content) = content {
+            std::fs::write(&name, content).expect("writable");
+        }
+        send(&mut window, |app| app.ask_where(SaveTarget::Recording));
+        assert!(is_said(&window, does), "{does}");
+        press(&mut window, Modifiers::NONE, Key::Escape);
+    }
+    std::fs::remove_file(&name).expect("just written");
 
     send(&mut window, |app| app.ask_where(SaveTarget::Recording));
     // Keys belong to the field meanwhile: no view changes for them.

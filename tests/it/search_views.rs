@@ -122,19 +122,23 @@ fn hovering_a_cell_tells_its_recorded_cost_and_sends_its_pose() {
 }
 
 #[test]
-fn leaving_a_map_is_said_once() {
+fn a_map_that_is_left_by_the_pointer_or_by_a_key_shows_no_pose() {
     let mut window = after("surface");
     move_to_end(&mut window, Method::MI);
-    hover(&mut window, "Cost map", 0.5, 0.5).expect("a cell");
-    let hovered = app(&window).hovered;
-    assert!(hovered.is_some());
+    let pointed_at = |window: &mut Harness<'static, App>| {
+        hover(window, "Cost map", 0.5, 0.5).expect("a cell");
+        // The pose stays as long as the pointer does.
+        window.run_steps(3);
+        assert!(app(window).hovered.is_some());
+    };
+    pointed_at(&mut window);
     window.hover_at(egui::pos2(5.0, 5.0));
     window.run_steps(3);
     assert_eq!(app(&window).hovered, None);
-    send(&mut window, |app| {
-        app.app_state_mut().hovered = hovered;
-    });
-    assert_eq!(app(&window).hovered, hovered);
+    pointed_at(&mut window);
+    send(&mut window, |app| app.app_state_mut().show_alone(Some("space")));
+    window.run_steps(2);
+    assert_eq!(app(&window).hovered, None);
 }
 
 #[test]

@@ -39,8 +39,6 @@ const PLOT: f32 = 168.0;
 #[derive(Default)]
 pub struct SurfaceView {
     map: CostMap,
-    /// Whether this view sent the pose under the pointer.
-    is_hovering: bool,
 }
 
 impl View for SurfaceView {
@@ -52,11 +50,9 @@ impl View for SurfaceView {
                 None
             }
         };
-        // The pose under the pointer is sent when it comes and when it leaves.
-        if (pointed_at.is_some() || self.is_hovering) && context.state.hovered != pointed_at {
-            context.send(move |app| app.state.hovered = pointed_at);
+        if pointed_at.is_some() {
+            context.state.pointed_at.set(pointed_at);
         }
-        self.is_hovering = pointed_at.is_some();
     }
 }
 
