@@ -1,5 +1,7 @@
 //! Text tables, for terminals of any width, pipes, Markdown, CSV and LaTeX.
 
+use unicode_width::UnicodeWidthStr as _;
+
 use crate::scale::LengthUnit;
 
 /// The alignment of a column.
@@ -180,7 +182,7 @@ impl Table {
     /// As Markdown, with the caption above.
     pub fn to_markdown(&self) -> String {
         let line = |cells: &[String]| {
-            let cells: Vec<String> = cells.iter().map(|cell| cell.replace('|', "\\|")).collect();
+            let cells: Vec<String> = cells.iter().map(|cell| cell_of(cell)).collect();
             format!("| {} |\n", cells.join(" | "))
         };
         let rule = self.align.iter().map(|align| match align {
@@ -237,11 +239,12 @@ impl Table {
 fn aligned(rows: &[&[String]], align: &[Align]) -> Vec<String> {
     let width = |at: usize| rows.iter().map(|row| length(&row[at])).max().unwrap_or(0);
     let widths: Vec<usize> = (0..align.len()).map(width).collect();
+    let space = |cell: &String, width: usize| " ".repeat(width - length(cell));
     let line = |row: &&[String]| {
         let cells = row.iter().zip(&widths).zip(align);
         let cells = cells.map(|((cell, &width), align)| match align {
-            Align::Left => format!("{cell:<width$}"),
-            Align::Right => format!("{cell:>width$}"),
+            Align::Left => format!("{cell}{}", space(cell, width)),
+            Align::Right => format!("{}{cell}", space(cell, width)),
             Align::Note => cell.clone(),
         });
         cells.collect::<Vec<_>>().join("  ").trim_end().to_owned()
@@ -272,8 +275,14 @@ pub fn wrapped(paragraph: &str, width: usize, indent: &str) -> String {
     text + &line + "\n"
 }
 
+/// The columns of a terminal that a text takes.
 fn length(text: &str) -> usize {
-    text.chars().count()
+    text.width()
+}
+
+/// A cell of a Markdown table.
+fn cell_of(text: &str) -> String {
+    text.replace('|', "\\|").replace(['\n', '\r'], " ")
 }
 
 /// A CSV field, quoted as in RFC 4180.
@@ -299,6 +308,9 @@ fn escaped(text: &str) -> String {
             '^' => escaped.push_str("\\textasciicircum{}"),
             '°' => escaped.push_str("\\textdegree{}"),
             '≥' => escaped.push_str("$\\ge$"),
+            '≤' => escaped.push_str("$\\le$"),
+            '→' => escaped.push_str("$\\rightarrow$"),
+            '\n' | '\r' => escaped.push(' '),
             '←' => escaped.push_str("$\\leftarrow$"),
             '–' => escaped.push_str("--"),
             _ => escaped.push(character),
@@ -316,14 +328,19 @@ mod tests {
         let mut table = Table::new("t", "100 % of a_b", ["method", "RMSE (m)"]);
         table.push(["a|b, \"c\"", "1.0"]);
         table.push(["only"]);
+        table.push(["two\nlines", "a → b ≤ c"]);
         let markdown = "100 % of a_b\n\n| method | RMSE (m) |\n|:--|--:|\n\
-                        | a\\|b, \"c\" | 1.0 |\n| only |  |\n";
+                        | a\\|b, \"c\" | 1.0 |\n| only |  |\n| two lines | a → b ≤ c |\n";
         assert_eq!(table.to_markdown(), markdown);
-        assert_eq!(table.to_csv(), "method,RMSE (m)\n\"a|b, \"\"c\"\"\",1.0\nonly,\n");
+        assert_eq!(
+            table.to_csv(),
+            "method,RMSE (m)\n\"a|b, \"\"c\"\"\",1.0\nonly,\n\"two\nlines\",a → b ≤ c\n"
+        );
         let latex = table.to_latex();
         assert!(latex.contains("\\caption{100 \\% of a\\_b}"), "{latex}");
         assert!(latex.contains("\\begin{tabular}{lr}"), "{latex}");
         assert!(latex.contains("    only &  \\\\\n"), "{latex}");
+        assert!(latex.contains("two lines & a $\\rightarrow$ b $\\le$ c"), "{latex}");
     }
 
     fn with_notes() -> Table {
@@ -400,6 +417,14 @@ town, 15 m
 
 ";
         assert_eq!(table.to_text(Some(30)), narrow);
+    }
+
+    #[test]
+    fn wide_letters_take_two_columns() {
+        let mut table = Table::new("t", "", ["scene", "n"]);
+        table.push(["日本", "1"]);
+        table.push(["rome", "2"]);
+        assert_eq!(table.to_text(Some(80)), "scene  n\n日本   1\nrome   2\n");
     }
 
     #[test]
