@@ -21,9 +21,10 @@ const COLUMNS: [&str; 8] =
     ["query", "reference", "method", "grade", "error", "rotation", "code", "probability"];
 
 pub fn results(args: &ResultsArgs, terminal: &Terminal) -> Result<(), CliError> {
+    args.refuse_unused()?;
     let run = read_run(&args.run)?;
     if let Some(plot) = args.plot {
-        return draw(args, plot, terminal);
+        return draw(args, &run, plot, terminal);
     }
     let form = args.form;
     if form == Form::Html {
@@ -34,21 +35,20 @@ pub fn results(args: &ResultsArgs, terminal: &Terminal) -> Result<(), CliError> 
     if let Some(format) = form.poses() {
         return poses(args, &run, format, terminal);
     }
-    let mut results = read_rows(&args.run)?;
-    if let Some(right) = args.right {
-        let graded = results.into_iter().map(|result| result.graded(right));
-        results = graded.collect();
-    }
+    let results = graded(args)?;
     let all: Vec<&QueryResult> = results.iter().collect();
     let chosen = select(&all, args.condition.as_ref(), args.sort);
     let shown = &chosen[..chosen.len().min(args.rows.unwrap_or(usize::MAX))];
     if form == Form::Json {
-        // The lines of the run folder as they are.
+        // The lines of the run folder as they are, unless they are graded anew.
         let lines: Vec<String> = result_lines(&args.run)?.collect::<Result<_, _>>()?;
         let stdout = PathBuf::from("-");
         let mut output = JsonLines::create(args.out.as_ref().unwrap_or(&stdout))?;
         for &index in shown {
-            output.write_line(&lines[index])?;
+            match args.right {
+                Some(_) => output.write(&results[index])?,
+                None => output.write_line(&lines[index])?,
+            }
         }
     } else {
         let results = shown.iter().map(|&index| &results[index]);
@@ -84,6 +84,15 @@ pub fn results(args: &ResultsArgs, terminal: &Terminal) -> Result<(), CliError> 
     Ok(())
 }
 
+/// The results of the run, graded by `--right` if it is given.
+fn graded(args: &ResultsArgs) -> Result<Vec<QueryResult>, CliError> {
+    let results = read_rows(&args.run)?;
+    Ok(match args.right {
+        Some(right) => results.into_iter().map(|result| result.graded(right)).collect(),
+        None => results,
+    })
+}
+
 /// One row per result, with the named columns; by default a few in a terminal, all in files.
 fn row_table<'a>(
     args: &ResultsArgs,
@@ -101,9 +110,14 @@ fn row_table<'a>(
 }
 
 /// Writes a figure of the run as SVG.
-fn draw(args: &ResultsArgs, plot: Plot, terminal: &Terminal) -> Result<(), CliError> {
+fn draw(
+    args: &ResultsArgs,
+    run: &RunFile,
+    plot: Plot,
+    terminal: &Terminal,
+) -> Result<(), CliError> {
     let svg = plot
-        .svg(&RunResults::read(&args.run)?)
+        .svg(&RunResults::of(graded(args)?, run.failure_radius_m()))
         .ok_or_else(|| CliError::Usage("the run has too few results for this plot: verdicts and causes need ground truth and failures, success needs \
              several radii, numbers of references or scenes, basin and margin a method with a cost"
                 .to_owned()))?;
@@ -122,7 +136,10 @@ fn poses(
     terminal: &Terminal,
 ) -> Result<(), CliError> {
     let condition = args.condition.as_ref();
-    let takes = |result: &QueryResult| condition.is_none_or(|one| one.is_met(result));
+    let takes = |result: &QueryResult| {
+        let graded = args.right.map(|right| result.clone().graded(right));
+        condition.is_none_or(|one| one.is_met(graded.as_ref().unwrap_or(result)))
+    };
     let exported = export(&args.run, run, format, &takes);
     let Export { files, left_out } = exported.map_err(|error| match error {
         ExportError::Folder(error) => CliError::Folder(error),

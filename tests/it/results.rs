@@ -94,3 +94,50 @@ fn tables_and_figures_come_in_the_form_that_is_asked_for() {
     let svg = sequence.text("recall.svg");
     assert!(svg.starts_with("<svg") && svg.contains("kitti/42"), "{svg}");
 }
+
+/// Each option with each form: it is obeyed, or refused with its name.
+#[test]
+fn no_option_is_dropped() {
+    let sequence = finished();
+    let strict = "--right 0.0000001m,0.0000001deg";
+    let options = [
+        "--where 'method = fb'",
+        "--sort -error",
+        "--rows 1",
+        "--columns query,error",
+        "--table summary",
+        strict,
+    ];
+    for (form, obeyed) in [
+        ("--as text", "--where --sort --rows --columns --table --right"),
+        ("--as csv", "--where --sort --rows --columns --table --right"),
+        ("--as markdown", "--where --sort --rows --columns --table --right"),
+        ("--as latex", "--where --sort --rows --columns --table --right"),
+        ("--as json", "--where --sort --rows --right"),
+        ("--as html", ""),
+        ("--as vloc --where 'method = fb'", "--right"),
+        ("--plot recall", "--right"),
+        ("--table summary", "--where --right"),
+    ] {
+        for option in options {
+            let name = option.split(' ').next().expect("a name");
+            if form.contains(name) {
+                continue;
+            }
+            let said = sequence.run(&format!("results run {form} {option}"));
+            if obeyed.split(' ').any(|obeyed| obeyed == name) {
+                said.ok();
+            } else {
+                said.fails(2, &format!("{name} has no effect"));
+            }
+        }
+    }
+    sequence.run("results run --plot recall --as csv").fails_with(2, "--plot ~ --as");
+    // What is right by another measure is so in each form.
+    let json = results(&sequence, &format!("--as json {strict}")).out;
+    assert!(!json.contains("\"grade\":\"right\""), "{json}");
+    has(&results(&sequence, "--as json --right 100m,180deg").out, "\"grade\":\"right\"");
+    let right = "--where 'method = fb and grade = right' --as vloc";
+    sequence.run(&format!("results run {right} {strict}")).fails(2, "no result");
+    assert!(!results(&sequence, &format!("{right} --right 100m,180deg")).out.is_empty());
+}

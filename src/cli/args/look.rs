@@ -6,6 +6,8 @@ use clap::{Args, ValueEnum};
 use posescope::diagnosis::{Code, Tolerance};
 use posescope::measure::{Condition, Field, Format, Order, Plot, TableName};
 
+use crate::cli::failure::CliError;
+
 #[derive(Debug, Args)]
 pub struct ResultsArgs {
     /// The run folder
@@ -32,12 +34,7 @@ pub struct ResultsArgs {
     #[arg(long, value_name = "TABLE", value_enum, default_value = "rows")]
     pub table: TableName,
     /// Draw a figure as SVG: errors, verdicts, success, recall, causes, basin or margin
-    #[arg(
-        long,
-        value_name = "NAME",
-        value_enum,
-        conflicts_with_all = ["condition", "sort", "columns", "rows"]
-    )]
+    #[arg(long, value_name = "NAME", value_enum, conflicts_with = "form")]
     pub plot: Option<Plot>,
     /// The file to write, or the folder for colmap [default: stdout]
     #[arg(long, value_name = "FILE")]
@@ -45,6 +42,38 @@ pub struct ResultsArgs {
     /// The largest error of a right pose [default: as in the run]
     #[arg(long, value_name = "METRES,DEGREES")]
     pub right: Option<Tolerance>,
+}
+
+impl ResultsArgs {
+    /// Refuses options that have no effect on what is asked for.
+    pub fn refuse_unused(&self) -> Result<(), CliError> {
+        let given = [
+            ("--where", self.condition.is_some()),
+            ("--sort", self.sort.is_some()),
+            ("--rows", self.rows.is_some()),
+            ("--columns", !self.columns.is_empty()),
+            ("--table", self.table != TableName::Rows),
+            ("--right", self.right.is_some()),
+        ];
+        let (asked, used): (&str, &[&str]) = match (self.plot, self.form) {
+            (Some(_), _) => ("--plot", &["--right"]),
+            (None, Form::Html) => ("--as html", &[]),
+            (None, Form::Json) => ("--as json", &["--where", "--sort", "--rows", "--right"]),
+            (None, form) if form.poses().is_some() => {
+                ("an export of poses", &["--where", "--right"])
+            }
+            (None, _) if self.table != TableName::Rows => {
+                ("a table of the whole run", &["--where", "--table", "--right"])
+            }
+            (None, _) => return Ok(()),
+        };
+        match given.iter().find(|(option, is_given)| *is_given && !used.contains(option)) {
+            Some((option, _)) => {
+                Err(CliError::Usage(format!("{option} has no effect on {asked}; leave it out")))
+            }
+            None => Ok(()),
+        }
+    }
 }
 
 #[derive(Debug, Args)]
