@@ -39,6 +39,9 @@ pub use posescope_core::scene::{
 };
 pub use posescope_street as street;
 
+use crate::camera::Intrinsics;
+
+pub use cloud_file::is_decoding;
 pub use estimates::read_estimates;
 pub use gps::located;
 pub use loose::{CameraArgument, LoosePhotos};
@@ -79,7 +82,34 @@ pub fn open(argument: &str, format: Option<&str>) -> Result<Box<dyn Scene>, Scen
             }
         }),
     };
-    (entry?.open)(argument)
+    let scene = (entry?.open)(argument)?;
+    sound(argument, scene.as_ref())?;
+    Ok(scene)
+}
+
+/// Checks what each format promises: names that can be printed, and cameras that see something.
+fn sound(argument: &str, scene: &dyn Scene) -> Result<(), SceneError> {
+    /// Half of the photo's width or height in focal lengths; 60 is a view of 178°.
+    const HALF_VIEW: std::ops::Range<f64> = 1e-4..60.0;
+    let frames = scene.frames();
+    let mut names = std::iter::once(scene.name()).chain(frames.iter().map(String::as_str));
+    if let Some(name) = names.find(|name| name.contains(char::is_control)) {
+        let name = name.escape_default();
+        let expected = format!("names without control characters expected, `{name}` found");
+        return Err(SceneError::expected(argument, expected));
+    }
+    for (frame, name) in frames.iter().enumerate() {
+        let Intrinsics { fx, fy, width, height, .. } = scene.intrinsics(frame);
+        for (focal, side) in [(fx, width), (fy, height)] {
+            if !HALF_VIEW.contains(&(f64::from(side) / 2.0 / focal)) {
+                let expected = format!(
+                    "a focal length that suits {side} px expected, frame {name} has {focal:?} px"
+                );
+                return Err(SceneError::expected(argument, expected));
+            }
+        }
+    }
+    Ok(())
 }
 
 /// What to try where a folder is no scene: a scene inside it, such as a sequence of a data set.

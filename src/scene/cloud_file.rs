@@ -13,6 +13,8 @@ use std::path::Path;
 
 use nalgebra::{Point3, Vector3};
 
+pub use las::is_decoding;
+
 use super::SceneError;
 
 /// The most points of a cloud, which take 1.2 GB.

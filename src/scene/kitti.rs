@@ -56,8 +56,10 @@ fn open(path: &Path) -> Result<Box<dyn Scene>, SceneError> {
     };
     let none = "a line `Tr:` expected (camera 0 from Velodyne), none found";
     let matrix = camera_from_velodyne.unwrap_or_else(Matrix3x4::zeros);
+    let paths: Vec<PathBuf> = photos.values().map(scan).collect();
     let scans = Scans {
-        paths: photos.values().map(scan).collect(),
+        exist: paths.iter().map(|path| path.is_file()).collect(),
+        paths,
         missing: camera_from_velodyne.is_none().then_some(none),
         into_camera: Box::new(move |_, point| Point3::from(matrix * point.to_homogeneous())),
     };

@@ -94,6 +94,9 @@ pub(super) fn split_projection(
 pub(super) struct Scans {
     /// The path of each frame's scan, whether it exists or not.
     pub paths: Vec<PathBuf>,
+    /// Whether it existed when the scene was opened: files that vanish later are errors, not another choice of
+    /// references.
+    pub exist: Vec<bool>,
     /// What all frames lack.
     pub missing: Option<&'static str>,
     /// Moves a point of the scan of a frame, by the frame's position, to the camera's frame.
@@ -102,7 +105,7 @@ pub(super) struct Scans {
 
 impl Clouds for Scans {
     fn has(&self, index: usize) -> bool {
-        self.missing.is_none() && self.paths[index].is_file()
+        self.missing.is_none() && self.exist[index]
     }
 
     fn lengths(&self) -> Lengths {

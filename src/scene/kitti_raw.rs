@@ -97,7 +97,8 @@ fn open(path: &Path, correct: bool) -> Result<Box<dyn Scene>, SceneError> {
         let corrected = sweep.map(|sweep| sweep.corrected(&point, &velodyne_from_imu));
         camera_from_velodyne * corrected.unwrap_or(point)
     };
-    let scans = Scans { paths, missing: None, into_camera: Box::new(into_camera) };
+    let exist = paths.iter().map(|path| path.is_file()).collect();
+    let scans = Scans { paths, exist, missing: None, into_camera: Box::new(into_camera) };
     let frames = photos.into_iter().map(|(number, photo)| Frame {
         world_from_camera: world_from_camera0
             .get(&number)

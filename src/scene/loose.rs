@@ -59,7 +59,9 @@ impl LoosePhotos {
         let frames = self.paths.iter().map(|path| self.frame(path));
         let frames = frames.collect::<Result<Vec<_>, _>>()?;
         let name = Self::NAME.to_owned();
-        Ok(Arc::new(FileScene::new(name, frames, NoClouds)))
+        let scene = FileScene::new(name, frames, NoClouds);
+        super::sound(Self::NAME, &scene)?;
+        Ok(Arc::new(scene))
     }
 
     fn frame(&self, path: &Path) -> Result<Frame, SceneError> {

@@ -1,5 +1,6 @@
 //! LAS and LAZ.
 
+use std::cell::Cell;
 use std::fs::File;
 use std::io::{BufReader, Read, Seek, SeekFrom};
 use std::panic::catch_unwind;
@@ -15,10 +16,21 @@ const BATCH: u64 = 65_536;
 /// The smallest size of an uncompressed point \[bytes\].
 const MIN_RECORD: u64 = 20;
 
+thread_local! {
+    static IS_DECODING: Cell<bool> = const { Cell::new(false) };
+}
+
+/// Whether a panic of this thread is the decoder's, which is caught and says nothing but that a file is damaged.
+pub fn is_decoding() -> bool {
+    IS_DECODING.get()
+}
+
 /// Reads the points. The decoder panics on damaged data, which becomes an error.
 pub(super) fn read(path: &Path, size: u64) -> Result<MapCloud, String> {
-    catch_unwind(|| decoded(path, size))
-        .unwrap_or_else(|_| Err("decodable points expected; the file is damaged".to_owned()))
+    IS_DECODING.set(true);
+    let read = catch_unwind(|| decoded(path, size));
+    IS_DECODING.set(false);
+    read.unwrap_or_else(|_| Err("decodable points expected; the file is damaged".to_owned()))
 }
 
 fn decoded(path: &Path, size: u64) -> Result<MapCloud, String> {
