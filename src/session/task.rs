@@ -112,7 +112,23 @@ impl Task {
         if let Some(camera) = photos.and_then(|photos| photos.camera.as_ref()) {
             option("camera", camera);
         }
-        for (name, value) in protocol.options() {
+        let mut given = protocol.options();
+        // Without these options, a scene of another size or a photo gets defaults of its own.
+        let mut spelt = Vec::new();
+        if !self.scene.starts_with("street") {
+            let radii: Vec<String> = protocol.radii_m.iter().map(f64::to_string).collect();
+            spelt.extend([("radius", radii.join(",")), ("right", protocol.right.to_string())]);
+        }
+        if photos.is_some() && protocol.gps.is_none() && !protocol.is_by_hand() {
+            spelt.push(("reference", protocol.selection().to_string()));
+        }
+        for (name, value) in spelt {
+            if !given.iter().any(|(known, _)| known == name) {
+                given.push((name.to_owned(), value));
+            }
+        }
+        given.sort_by(|(a, _), (b, _)| a.cmp(b));
+        for (name, value) in given {
             option(&name, &value);
         }
         for change in self.params.changes() {
@@ -207,6 +223,13 @@ mod tests {
         assert_eq!(
             Task::of("street").command_line("000070", &["000062".to_owned()]),
             "posescope run street --query 000070 --reference 000062"
+        );
+        // A room has a smaller radius by default, and a photo other references.
+        let photos = LoosePhotos { paths: vec!["a.jpg".into()], ..LoosePhotos::default() };
+        let of_room = Task { photos: Some(photos), ..Task::of("room") };
+        assert_eq!(
+            of_room.command_line("a", &[]),
+            "posescope run room --query a.jpg --radius 15 --reference random:1 --right 1m,5deg"
         );
     }
 

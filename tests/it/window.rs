@@ -536,7 +536,7 @@ fn the_run_is_saved_as_a_recording_and_its_command_line_is_copied() {
     assert!(path.metadata().expect("written").len() > 10_000);
     assert_eq!(
         app(&window).setup.command_line(),
-        "posescope run walls --query 000001 --radius 3 --reference 000000 --seed 7"
+        "posescope run walls --query 000001 --radius 3 --reference 000000 --right 1m,5deg --seed 7"
     );
 }
 
@@ -548,7 +548,7 @@ fn the_command_line_names_format_prior_and_breakpoints() {
     setup.task.breakpoints = vec!["inliers < 3".parse().expect("a breakpoint")];
     assert_eq!(
         setup.command_line(),
-        "posescope run walls --query 000001 --format kitti --prior 5 --radius 3 --reference 000000 --seed 7 \
+        "posescope run walls --query 000001 --format kitti --prior 5 --radius 3 --reference 000000 --right 1m,5deg --seed 7 \
          --break 'inliers < 3'"
     );
     // References that are still to be chosen are chosen in the same way.
