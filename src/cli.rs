@@ -24,6 +24,7 @@ mod results;
 mod run;
 #[cfg(feature = "app")]
 mod screenshot;
+mod stderr;
 mod story;
 mod surface;
 mod synth;
@@ -41,8 +42,9 @@ use std::path::Path;
 
 use clap::{CommandFactory as _, FromArgMatches as _, Parser as _};
 
-use args::{Arguments, Command};
+use args::{Arguments, Command, Everywhere};
 use failure::CliError;
+use stderr::tell;
 
 pub use doctor::report as examination_in_words;
 pub use host::Host;
@@ -59,12 +61,15 @@ pub fn run(arguments: Vec<OsString>) -> u8 {
         Err(error) => return answered(&error),
     };
     failure::report_panics_in_one_line();
-    let outcome = catch_unwind(AssertUnwindSafe(|| dispatch(&arguments)));
+    let outcome = catch_unwind(AssertUnwindSafe(|| match &arguments.command {
+        Some(Command::Open(words)) => dispatch(&opened_by(words, &arguments.everywhere)?),
+        _ => dispatch(&arguments),
+    }));
     match outcome {
         Ok(Ok(()) | Err(CliError::ReaderGone)) => failure::DONE,
         Ok(Err(CliError::Arguments(error))) => answered(&error),
         Ok(Err(error)) => {
-            eprintln!("posescope: {error}");
+            tell(&format!("posescope: {error}"));
             error.exit_code()
         }
         Err(_) => failure::INTERNAL,
@@ -86,7 +91,7 @@ fn dispatch(arguments: &Arguments) -> Result<(), CliError> {
         |command: &dyn Fn() -> Result<(), CliError>| compute::with(everywhere.compute, command);
     match &arguments.command {
         None => demo::demo(&terminal),
-        Some(Command::Open(words)) => dispatch(&opened_by(words)?),
+        Some(Command::Open(words)) => unreachable!("{words:?} are parsed already"),
         Some(Command::Run(args)) => scored(&|| match &args.surface {
             Some(path) => surface::surface(args, path, &terminal),
             None => run::run(args, &terminal),
@@ -106,14 +111,16 @@ fn dispatch(arguments: &Arguments) -> Result<(), CliError> {
         Some(Command::Params(params)) => params::print(params, &terminal),
         Some(Command::Completions { shell }) => {
             let mut command = Arguments::command();
-            clap_complete::generate(*shell, &mut command, "posescope", &mut std::io::stdout());
-            Ok(())
+            let mut script = Vec::new();
+            clap_complete::generate(*shell, &mut command, "posescope", &mut script);
+            output::print(&String::from_utf8_lossy(&script).trim_end())
         }
     }
 }
 
 /// `posescope SCENE` means `posescope view SCENE`. A word that is not a scene may be a misspelt command.
-fn opened_by(words: &[OsString]) -> Result<Arguments, CliError> {
+/// Options before it are kept.
+fn opened_by(words: &[OsString], before: &Everywhere) -> Result<Arguments, CliError> {
     let name = words.first().map(|word| word.to_string_lossy());
     let name = name.unwrap_or_default();
     let is_built_in = name.split(':').next() == Some("street");
@@ -121,7 +128,7 @@ fn opened_by(words: &[OsString]) -> Result<Arguments, CliError> {
         return Err(CliError::Usage(no_command(&name)));
     }
     let line = ["posescope", "view"].map(OsString::from);
-    Ok(Arguments::try_parse_from(line.iter().chain(words))?)
+    Ok(Arguments::try_parse_from(line.into_iter().chain(before.words()).chain(words.to_vec()))?)
 }
 
 /// The error message for a word that is neither a command nor a scene.
@@ -143,6 +150,14 @@ fn use_threads(threads: Option<NonZeroUsize>) -> Result<(), CliError> {
     let Some(threads) = threads else {
         return Ok(());
     };
+    // More threads than a few per core only slow each other down, and some systems do not even start them.
+    let cores = std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
+    let most = (4 * cores).max(64);
+    if threads.get() > most {
+        return Err(CliError::Usage(format!(
+            "--threads {threads}: at most {most} expected, for {cores} cores"
+        )));
+    }
     rayon::ThreadPoolBuilder::new()
         .num_threads(threads.get())
         .build_global()

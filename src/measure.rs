@@ -35,7 +35,7 @@ pub use findings::{Finding, failing_scenes, of_examination};
 pub use gate::{Gate, GateResult};
 pub use known::{KnownFailures, KnownReport};
 pub use metrics::{Group, Measures, RECALL_LIMITS, Spread, measure};
-pub use overview::{Bar, Overview};
+pub use overview::{Bar, Overview, worst_first};
 #[cfg(feature = "cli")]
 pub use paper::scene as paper_scene;
 #[cfg(feature = "cli")]

@@ -5,7 +5,9 @@
 mod page;
 mod pictures;
 
-use std::collections::{BTreeMap, BTreeSet};
+pub use page::repeat_command;
+
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
 
 use clap::ValueEnum as _;
@@ -17,6 +19,7 @@ use crate::chart::Chart;
 use crate::localize::{LocalizeError, Localizer, QueryResult, Request};
 use crate::measure::{
     Change, Measures, Plot, RunComparison, RunResults, StoredSummary, read_rows, tables,
+    worst_first,
 };
 use crate::params::Params;
 use crate::run::{FAILURES, FolderError, RunFile, Scenes, read_run, recording_name};
@@ -107,7 +110,9 @@ impl RunReport {
         let mut results = reported(folder, &run, &measured.results);
         let compared = |before| compared_with(before, &measured.results, &mut results);
         let baseline = baseline.map(compared).transpose()?;
-        let worst = worst_first(&results);
+        let mut worst = worst_first(&measured.results);
+        // Those that a change broke come first.
+        worst.sort_by_key(|&at| results[at].change != Some(Change::Broken));
         let mut thumbnails = BTreeMap::new();
         let protocol = &run.protocol;
         let scenes = Scenes::open(&run.scenes, &protocol.query_scene, protocol.format.as_deref());
@@ -159,23 +164,6 @@ impl RunReport {
     }
 }
 
-/// The positions of the failures: those that a change broke first, then wrong poses by their error, then those without
-/// a pose.
-fn worst_first(results: &[ReportedResult]) -> Vec<usize> {
-    let failures = (0..results.len()).filter(|&at| results[at].result.grade.is_failure());
-    let mut failures: Vec<usize> = failures.collect();
-    let is_broken = |at: usize| results[at].change == Some(Change::Broken);
-    let off_m = |at: usize| {
-        let error = results[at].result.error;
-        error.map_or(f64::NEG_INFINITY, |error| error.translation_m)
-    };
-    failures.sort_by(|&one, &other| {
-        let by_error = off_m(other).total_cmp(&off_m(one));
-        is_broken(other).cmp(&is_broken(one)).then(by_error)
-    });
-    failures
-}
-
 fn reported(folder: &Path, run: &RunFile, results: &[QueryResult]) -> Vec<ReportedResult> {
     let mut queries: BTreeMap<[String; 3], usize> = BTreeMap::new();
     let several_pairs = run.pairs.len() > 1;
@@ -209,12 +197,14 @@ fn compared_with(
     let run_before = read_run(before)?;
     let measured = RunResults::read(before)?;
     let comparison = RunComparison::of(&measured.results, rows, &RunComparison::TOLERANCE);
-    for one in &comparison.differences {
-        // Rows and results have the same order.
-        let at = rows.iter().position(|row| *row == one.after);
-        if let Some(result) = at.and_then(|at| results.get_mut(at)) {
-            result.change = Some(one.change);
-        }
+    let changes: HashMap<String, Change> = comparison
+        .differences
+        .iter()
+        .map(|one| (RunComparison::key(&one.after), one.change))
+        .collect();
+    // Rows and results have the same order.
+    for (row, result) in rows.iter().zip(results) {
+        result.change = changes.get(&RunComparison::key(row)).copied();
     }
     Ok(Baseline {
         name: before.display().to_string(),

@@ -13,6 +13,7 @@ mod reference;
 mod run_file;
 mod run_folder;
 mod scene_pair;
+mod scene_paths;
 mod sweep;
 
 #[cfg(feature = "cli")]
@@ -20,7 +21,7 @@ pub use arguments::{degradations, method, positive, probability};
 pub use draw::{Draw, DrawError};
 pub use estimates_file::EstimatesFile;
 pub use execute::{Execution, FailedQuery, RunError, RunObserver, Scenes};
-pub use inputs::inputs;
+pub use inputs::{content, inputs};
 pub use limit::Limit;
 pub use preset::{Preset, default_failure_radius_m};
 pub use protocol::{Protocol, ProtocolError, defaults, known};
@@ -31,4 +32,5 @@ pub use run_folder::{
     results_of_pair,
 };
 pub use scene_pair::{QueryCamera, ScenePair, is_called};
+pub use scene_paths::{is_same, labels};
 pub use sweep::{Sweep, SweepError};

@@ -13,7 +13,7 @@ use std::ffi::OsString;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
-use clap::{ArgAction, Args, CommandFactory as _, Parser, Subcommand};
+use clap::{ArgAction, Args, CommandFactory as _, Parser, Subcommand, ValueEnum as _};
 use posescope::params::Params;
 
 pub use eval::{EvalArgs, EvalCommand, JudgingArgs};
@@ -146,6 +146,19 @@ pub struct Everywhere {
     #[arg(long, global = true, value_name = "WHERE", value_enum, default_value_t)]
     #[arg(hide_short_help = true)]
     pub compute: Compute,
+}
+
+impl Everywhere {
+    /// The options as words of a command line.
+    pub fn words(&self) -> Vec<OsString> {
+        let compute = self.compute.to_possible_value();
+        let mut words: Vec<OsString> = Vec::new();
+        words.extend(compute.map(|value| format!("--compute={}", value.get_name()).into()));
+        words.extend(self.quiet.then(|| "--quiet".into()));
+        words.extend((0..self.verbose).map(|_| "--verbose".into()));
+        words.extend(self.threads.map(|threads| format!("--threads={threads}").into()));
+        words
+    }
 }
 
 /// Changes to the parameters' defaults.

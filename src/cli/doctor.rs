@@ -37,6 +37,13 @@ fn examine_scene(
     terminal: &Terminal,
 ) -> Result<Option<String>, CliError> {
     let scene = scene::open(argument, args.format.as_deref())?;
+    for (option, path, extension) in
+        [("--picture", &args.picture, "png"), ("--save", &args.save, "rrd")]
+    {
+        if let Some(path) = path {
+            output::refuse_to_replace(option, path, &[extension], &[argument])?;
+        }
+    }
     let found = examine(scene.as_ref())?;
     if let (Some(path), Some(picture)) = (&args.picture, &found.picture) {
         let written = picture.save_with_format(path, image::ImageFormat::Png);

@@ -1,11 +1,13 @@
 //! `posescope eval`: localises many queries into a run folder.
 
 mod again;
+mod ending;
 mod step_summary;
 mod sweep;
 
-use std::collections::BTreeSet;
-use std::path::{Path, PathBuf};
+use std::collections::{BTreeMap, BTreeSet};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::{Component, Path, PathBuf};
 
 use posescope::doctor::mistake;
 use posescope::fusion::Fusion;
@@ -18,13 +20,13 @@ use posescope::method::Method;
 use posescope::params::Params;
 use posescope::report::{PICTURES, write_html};
 use posescope::run::{
-    Draw, Execution, Preset, Protocol, RUN_SCHEMA, RunError, RunFile, RunFolder, ScenePair, Scenes,
-    Sweep, defaults, inputs, known, merge,
+    Draw, Execution, FolderError, Preset, Protocol, RUN_SCHEMA, RunError, RunFile, RunFolder,
+    ScenePair, Scenes, Sweep, content, defaults, inputs, known, labels, merge, read_run,
 };
 use posescope::scene::{Retriever, SceneSize};
 use posescope::session::command_line;
-use posescope::table::wrapped;
 
+use self::ending::ending;
 use super::args::{EvalArgs, EvalCommand, JudgingArgs};
 use super::compare;
 use super::event_export::EventExport;
@@ -32,7 +34,7 @@ use super::failure::CliError;
 use super::failures::{self, FailureRecordings};
 use super::opened;
 use super::output;
-use super::table;
+use super::run::JSON_LINES;
 use super::terminal::Terminal;
 
 /// Recorded failures by default.
@@ -84,6 +86,9 @@ pub fn folder(args: &EvalArgs) -> Result<PathBuf, CliError> {
     }
 }
 
+/// Indexes by scene, and the names and hashes of their files.
+type Indices = (Vec<Box<dyn Ranking>>, Vec<(String, String)>);
+
 /// A run that is about to start.
 struct PlannedRun {
     run: RunFile,
@@ -103,18 +108,28 @@ fn examined(run: &RunFile, scenes: &Scenes, folder: &Path) -> Result<Vec<Finding
     let rows = read_rows(folder)?;
     let failing = failing_scenes(&rows.iter().collect::<Vec<_>>());
     let mut examined = Vec::new();
-    let is_asked = |name: &str| run.shard.is_some() || failing.contains(name);
-    for scene in scenes.references.iter().filter(|scene| is_asked(scene.name())) {
-        let found = mistake(scene.as_ref())?;
-        examined.extend(found.map(|found| of_examination(scene.name(), &found)));
+    for (at, scene) in scenes.references.iter().enumerate() {
+        let pair = run.pairs.iter().find(|pair| pair.scene_index == at);
+        let is_asked = |label: &&str| run.shard.is_some() || failing.contains(*label);
+        let Some(label) = pair.map(|pair| pair.scene.as_str()).filter(is_asked) else {
+            continue;
+        };
+        // Nobody asked for it, so it costs no report.
+        match catch_unwind(AssertUnwindSafe(|| mistake(scene.as_ref()))) {
+            Ok(Ok(found)) => {
+                examined.extend(found.map(|found| of_examination(label, &found)));
+            }
+            Ok(Err(error)) => log::warn!("`posescope doctor` cannot examine {label}: {error}"),
+            Err(_) => log::warn!("`posescope doctor` cannot examine {label}"),
+        }
     }
     Ok(examined)
 }
 
 /// A folder below `runs`, named after scenes and options.
 fn default_folder(args: &EvalArgs, protocol: &Protocol) -> PathBuf {
-    let plain = |c: char| if c.is_ascii_alphanumeric() { c } else { '-' };
-    let mut name: String = args.scenes.join("-").chars().map(plain).collect();
+    let scenes: Vec<String> = args.scenes.iter().map(|scene| plain_name(scene)).collect();
+    let mut name = scenes.join("-");
     if let Some(preset) = protocol.preset {
         name = format!("{name}-{preset}").to_lowercase();
     }
@@ -128,7 +143,20 @@ fn default_folder(args: &EvalArgs, protocol: &Protocol) -> PathBuf {
     if let Some(shard) = args.shard {
         name = format!("{name}-{}-of-{}", shard.number, shard.of);
     }
-    Path::new("runs").join(name.trim_matches('-'))
+    Path::new("runs").join(name)
+}
+
+/// A scene's argument as the name of a folder. `.` and `..` have the names of their folders.
+fn plain_name(argument: &str) -> String {
+    let path = Path::new(argument);
+    let folder = path.canonicalize().ok().filter(|_| path.file_name().is_none());
+    let own = folder.as_deref().and_then(Path::file_name).map(|name| name.to_string_lossy());
+    let name = own.as_deref().unwrap_or(argument);
+    let plain: String = name.chars().map(|c| if c.is_alphanumeric() { c } else { '-' }).collect();
+    match plain.trim_matches('-') {
+        "" => "scene".to_owned(),
+        plain => plain.to_owned(),
+    }
 }
 
 fn execute(
@@ -142,12 +170,21 @@ fn execute(
         None => plan(args, swept, terminal)?,
     };
     let scenes = scenes.with_protocol(&run.protocol)?;
-    let indices = indices(&run, &scenes, &params)?;
-    if let Some(path) = args.events.as_ref().filter(|path| path.starts_with(folder)) {
-        return Err(CliError::Usage(format!(
-            "--events {}: a file outside the run folder expected; the folder may hold nothing but the run",
-            path.display()
-        )));
+    let (indices, contents) = indices(&run, &scenes, &params)?;
+    let run = RunFile { inputs: run.inputs.into_iter().chain(contents).collect(), ..run };
+    check(&args.judging, &run)?;
+    if let Some(path) = &args.events {
+        let absolute = |path: &Path| std::path::absolute(path).map_err(CliError::io(path));
+        let (file, folder) = (normal(&absolute(path)?), normal(&absolute(folder)?));
+        if file.starts_with(folder) {
+            return Err(CliError::Usage(format!(
+                "--events {}: a file outside the run folder expected; the folder may hold nothing but the run",
+                path.display()
+            )));
+        }
+        let scenes = run.scenes.iter().chain(&run.protocol.query_scene).map(String::as_str);
+        let scenes: Vec<&str> = scenes.collect();
+        output::refuse_to_replace("--events", path, &JSON_LINES, &scenes)?;
     }
     let events = args.events.as_deref().map(EventExport::after).transpose()?;
     let mut run_folder = if args.resume {
@@ -159,7 +196,7 @@ fn execute(
         events.clear()?;
     }
     let bar = terminal.bar(run.items().count() as u64);
-    bar.set_position(run_folder.done() as u64);
+    bar.set_position((run_folder.done() - run_folder.unread().len()) as u64);
     let interrupt = terminal.interrupt();
     let kept = if args.sweep.is_some() { 0 } else { KEPT_FAILURES };
     let kept = args.judging.keep_failures.unwrap_or(kept);
@@ -180,7 +217,7 @@ fn execute(
         Err(RunError::Cancelled(_)) if interrupt.is_raised() => {
             let (done, all) = (run_folder.done(), run.items().count());
             Err(CliError::Interrupted(format!(
-                "{done} of {all} queries are done; continue with: {}",
+                "{done} of {all} queries done; continue with: {}",
                 resuming()
             )))
         }
@@ -190,6 +227,22 @@ fn execute(
             Ok(Executed { run, scenes })
         }
     }
+}
+
+/// Refuses before the first query what would fail after the last.
+fn check(args: &JudgingArgs, run: &RunFile) -> Result<(), CliError> {
+    let methods = &run.protocol.methods;
+    if let Some(gate) = args.gate.iter().find(|gate| !methods.contains(&gate.method())) {
+        return Err(CliError::Usage(format!(
+            "--gate '{gate}' is about {}, which is not run; add it to --method",
+            gate.method()
+        )));
+    }
+    if let Some(baseline) = &args.baseline {
+        read_run(baseline)?;
+        read_rows(baseline)?;
+    }
+    Ok(())
 }
 
 /// The run that the arguments ask for, with all defaults filled in, at one value of a sweep.
@@ -233,13 +286,14 @@ fn plan(
         applied.map_err(|error| CliError::Usage(error.to_string()))?;
     }
     let draw = Draw { limit: protocol.limit, only: &args.query, seed: protocol.seed };
-    let pairs = pairs(&draw, &scenes)?;
+    let pairs = pairs(&draw, &scenes, &args.scenes, &protocol.query_scene)?;
     let run = RunFile {
         schema: RUN_SCHEMA.to_owned(),
         version: env!("CARGO_PKG_VERSION").to_owned(),
         scenes: args.scenes.clone(),
         shard: args.shard,
         inputs: inputs(&protocol)?,
+        paths: BTreeMap::new(),
         protocol,
         pairs,
         params: written(&params),
@@ -254,21 +308,18 @@ fn written(params: &Params) -> toml::Table {
 
 /// The command line that continues this run.
 fn resuming() -> String {
-    let mut words: Vec<String> = std::env::args().skip(1).collect();
+    let words = std::env::args_os().skip(1);
+    let mut words: Vec<String> = words.map(|word| word.to_string_lossy().into_owned()).collect();
     if !words.iter().any(|word| word == "--resume") {
         words.push("--resume".to_owned());
     }
     command_line(&words)
 }
 
-/// The indexes that ranked references need, one per scene.
-fn indices(
-    run: &RunFile,
-    scenes: &Scenes,
-    params: &Params,
-) -> Result<Vec<Box<dyn Ranking>>, CliError> {
+/// The indexes that ranked references need, one per scene, and the hashes of their files.
+fn indices(run: &RunFile, scenes: &Scenes, params: &Params) -> Result<Indices, CliError> {
     let Selection::Retrieved(_) = run.protocol.selection() else {
-        return Ok(Vec::new());
+        return Ok((Vec::new(), Vec::new()));
     };
     let (files, scenes) = (&run.protocol.index, &scenes.references);
     if !files.is_empty() && files.len() != scenes.len() {
@@ -278,24 +329,54 @@ fn indices(
             scenes.len()
         )));
     }
-    let named = scenes.iter().zip(&run.scenes);
-    named
-        .enumerate()
-        .map(|(number, (scene, argument))| {
-            let file = files.get(number).map(PathBuf::as_path);
-            let index = Retriever::find(file, scene.as_ref(), argument, params)?;
-            Ok(Box::new(index) as Box<dyn Ranking>)
-        })
-        .collect()
+    let (mut indices, mut contents) = (Vec::new(), Vec::new());
+    for (number, (scene, argument)) in scenes.iter().zip(&run.scenes).enumerate() {
+        let given = files.get(number).map(PathBuf::as_path);
+        let index = Retriever::find(given, scene.as_ref(), argument, params)?;
+        indices.push(Box::new(index) as Box<dyn Ranking>);
+        let used = || Retriever::default_path(scene.as_ref(), argument);
+        if let Some(path) = given.map(Path::to_owned).or_else(used) {
+            contents.push((format!("index of scene {number}"), content(&path)?));
+        }
+    }
+    Ok((indices, contents))
 }
 
-/// Every scene with itself, or every scene of references with every scene of queries.
-fn pairs(draw: &Draw<'_>, scenes: &Scenes) -> Result<Vec<ScenePair>, CliError> {
+/// Every scene with itself, or every scene of references with every scene of queries. `references` and `queries` are
+/// their arguments.
+fn pairs(
+    draw: &Draw<'_>,
+    scenes: &Scenes,
+    references: &[String],
+    queries: &[String],
+) -> Result<Vec<ScenePair>, CliError> {
+    let given: Vec<&str> = references.iter().chain(queries).map(String::as_str).collect();
+    let opened = scenes.references.iter().chain(&scenes.queries);
+    let named: Vec<_> = given.into_iter().zip(opened.map(|scene| scene.name())).collect();
+    let labels = labels(&named);
+    let (of_references, of_queries) = labels.split_at(references.len());
+    for (labels, arguments) in [(of_references, references), (of_queries, queries)] {
+        let twice = (1..labels.len()).find(|&at| labels[..at].contains(&labels[at]));
+        if let Some(twice) = twice {
+            return Err(CliError::Usage(format!(
+                "the scene {} is given twice, as {}; give it once",
+                labels[twice], arguments[twice]
+            )));
+        }
+    }
     let mut pairs = Vec::new();
-    for (index, references) in scenes.references.iter().enumerate() {
-        let itself = scenes.queries.is_empty().then_some(references);
-        for queries in itself.into_iter().chain(&scenes.queries) {
-            pairs.push(draw.pair(index, references.as_ref(), queries.as_ref())?);
+    for (scene_index, scene) in scenes.references.iter().enumerate() {
+        let label = &of_references[scene_index];
+        let itself = scenes.queries.is_empty().then_some((None, scene, label));
+        let others = scenes.queries.iter().zip(of_queries).enumerate();
+        let others = others.map(|(at, (queries, label))| (Some(at), queries, label));
+        for (query_index, queries, query_label) in itself.into_iter().chain(others) {
+            pairs.push(ScenePair {
+                query_index,
+                scene: label.clone(),
+                query_scene: query_label.clone(),
+                ..draw.pair(scene_index, scene.as_ref(), queries.as_ref())?
+            });
         }
     }
     Ok(pairs)
@@ -306,11 +387,12 @@ fn known_failures(args: &JudgingArgs) -> Result<KnownFailures, CliError> {
     Ok(read.transpose()?.unwrap_or_default())
 }
 
-/// The report of a run, and why it fails.
+/// The report of a run, why it fails, and the first of its files that could not be written.
 struct Judged {
     report: Report,
     known: KnownFailures,
     failures: Vec<String>,
+    written: Result<(), FolderError>,
 }
 
 impl Judged {
@@ -323,9 +405,9 @@ impl Judged {
         examined: &[Finding],
     ) -> Result<Self, CliError> {
         let known = known_failures(args)?;
-        let report = write_report(folder, run, examined, &args.gate, &known)?;
+        let (report, written) = write_report(folder, run, examined, &args.gate, &known)?;
         let before = args.baseline.as_deref().or(again);
-        write_html(folder, before, PICTURES, None)?;
+        let written = written.and(write_html(folder, before, PICTURES, None).map(drop));
         let failed = report.gate_results.iter().filter(|one| !one.passed);
         Ok(Self {
             failures: failed
@@ -333,6 +415,7 @@ impl Judged {
                 .collect(),
             report,
             known,
+            written,
         })
     }
 }
@@ -346,10 +429,12 @@ fn finish(
     examined: &[Finding],
     terminal: &Terminal,
 ) -> Result<(), CliError> {
-    let Judged { report, known, mut failures } = Judged::of(args, again, folder, run, examined)?;
+    let Judged { report, known, mut failures, written } =
+        Judged::of(args, again, folder, run, examined)?;
     if !terminal.is_quiet {
-        show(&report, run, terminal.width())?;
-        eprintln!("Run: {}", folder.display());
+        let results = read_rows(folder)?;
+        let text = ending(run, &report, &results, folder, terminal.width());
+        output::print(&text.trim_end())?;
     }
     let mut compared = None;
     if let Some(before) = args.baseline.as_deref().or(again) {
@@ -367,43 +452,44 @@ fn finish(
     }
     let summary = step_summary::of_run(run, folder, &report, compared.as_ref(), &failures);
     step_summary::append(&summary);
-    good_unless(&failures)
+    written?;
+    good_unless(report.unread.as_slice(), &failures)
 }
 
-/// An error if there are failures.
-fn good_unless(failures: &[String]) -> Result<(), CliError> {
+/// An error if there are failures, or queries whose files cannot be read.
+fn good_unless(unread: &[String], failures: &[String]) -> Result<(), CliError> {
+    if let Some(unread) = unread.first() {
+        let more = failures.iter().map(|failure| format!("; {failure}"));
+        let more: String = more.collect();
+        return Err(CliError::Unusable(format!(
+            "{unread}; replace the file and continue with --resume{more}"
+        )));
+    }
     if failures.is_empty() {
         return Ok(());
     }
     Err(CliError::NotGoodEnough(failures.join("; ")))
 }
 
-fn show(report: &Report, run: &RunFile, width: Option<usize>) -> Result<(), CliError> {
-    for finding in &report.findings {
-        let line = format!("Finding: {}", finding.text);
-        let wrapped = width.map_or(line.clone(), |width| wrapped(&line, width, "  "));
-        output::print(&wrapped.trim_end())?;
+/// An absolute path without `.` and `..`.
+fn normal(path: &Path) -> PathBuf {
+    let mut normal = PathBuf::new();
+    for part in path.components() {
+        match part {
+            Component::ParentDir => drop(normal.pop()),
+            Component::CurDir => {}
+            part => normal.push(part),
+        }
     }
-    // The summary of an experiment has a line for every combination: too long for a terminal.
-    let skipped = usize::from(run.protocol.preset.is_some());
-    for figures in report.tables.iter().skip(skipped) {
-        output::print(&table::figures(figures, width))?;
-    }
-    for one in &report.gate_results {
-        let verdict = if one.passed { "passed" } else { "FAILED" };
-        output::print(&format!("{verdict}: {}: {}", one.gate, one.found))?;
-    }
-    for line in report.known.lines() {
-        output::print(&line)?;
-    }
-    Ok(())
+    normal
 }
 
 /// The changes since an earlier run; `only_again` restricts them to the repeated queries.
 fn against(before: &Path, folder: &Path, only_again: bool) -> Result<RunComparison, CliError> {
     let (mut rows_before, rows) = (read_rows(before)?, read_rows(folder)?);
     if only_again {
-        let key = |row: &QueryResult| [row.scene.clone(), row.query.clone()];
+        let key =
+            |row: &QueryResult| (row.scene.clone(), row.query_scene.clone(), row.query.clone());
         let again: BTreeSet<_> = rows.iter().map(key).collect();
         rows_before.retain(|row| again.contains(&key(row)));
     }

@@ -8,10 +8,12 @@ use posescope::describe::ParamError;
 use posescope::lesson::{LessonError, SettingError};
 use posescope::localize::{ChoiceError, Selection};
 use posescope::run::{DrawError, FolderError, ProtocolError, RunError};
-use posescope::scene::{NoIndex, SceneError};
+use posescope::scene::{NoIndex, SceneError, is_decoding};
 use posescope::session::JobError;
 use posescope::sink::rerun::RecordError;
 use posescope::trace::Cancelled;
+
+use super::stderr::tell;
 
 pub const DONE: u8 = 0;
 const NOT_GOOD_ENOUGH: u8 = 1;
@@ -130,8 +132,19 @@ impl CliError {
             #[cfg(not(feature = "gpu"))]
             Self::NoGpu => NO_GPU,
             Self::Interrupted(_) => INTERRUPTED,
-            // All others are about files that cannot be read or written.
-            _ => BAD_DATA,
+            // What the arguments name is missing, unusable, or cannot be written.
+            Self::Scene(_)
+            | Self::Config { .. }
+            | Self::Io { .. }
+            | Self::Index(_)
+            | Self::Choice(_)
+            | Self::Folder(_)
+            | Self::Draw(_)
+            | Self::Record(_)
+            | Self::Job(_)
+            | Self::Lesson(_)
+            | Self::LessonSetting(_)
+            | Self::Unusable(_) => BAD_DATA,
         }
     }
 }
@@ -150,13 +163,16 @@ impl From<RunError> for CliError {
 /// Reports a panic, which is a bug, in one line with its location.
 pub fn report_panics_in_one_line() {
     std::panic::set_hook(Box::new(|panic| {
+        if is_decoding() {
+            return;
+        }
         let message = panic.payload_as_str().unwrap_or("no message").replace('\n', " ");
         let place = panic
             .location()
             .map(|location| format!("{}:{}", location.file(), location.line()))
             .unwrap_or_default();
-        eprintln!(
+        tell(&format!(
             "posescope: internal error at {place}: {message}; this is a bug, please report it"
-        );
+        ));
     }));
 }

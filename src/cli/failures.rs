@@ -6,6 +6,7 @@ use std::io::ErrorKind;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 
+use posescope::diagnosis::Code;
 use posescope::localize::{LocalizeError, LocalizeObserver, QueryResult};
 use posescope::params::Params;
 use posescope::run::{
@@ -73,7 +74,10 @@ impl<'a> FailureRecordings<'a> {
     fn record(&self, query: &FailedQuery<'_>, path: &Path) -> Result<(), RecordError> {
         let (references, queries) = (query.localizer.references(), query.localizer.queries());
         let frames = query.request.references.frames.iter();
+        let ScenePair { scene, query_scene, .. } = query.item.pair;
         let identity = Identity {
+            scene: scene.clone(),
+            query_scene: Some(query_scene.clone()).filter(|queries| queries != scene),
             queries: vec![query.item.query.to_owned()],
             references: frames.map(|&frame| references.frames()[frame].clone()).collect(),
             ..Identity::of(references, queries, self.params, self.protocol)
@@ -125,7 +129,9 @@ fn failures(folder: &Path, run: &RunFile) -> Result<Vec<String>, FolderError> {
     let several_pairs = run.pairs.len() > 1;
     for result in read_results::<QueryResult>(folder)? {
         let result = result?;
+        // Queries whose files cannot be read have no recording.
         if result.grade.is_failure()
+            && result.reason.as_ref().is_none_or(|reason| reason.code != Code::I1)
             && let Some(pair) = run.pair_of(&result)
         {
             let name = recording_name(pair, &result.query, result.method, several_pairs);

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::path::Path;
 
 use posescope::retrieval::{BuildError, BuildProgress, Index, IndexError};
-use posescope::run::read_run;
+use posescope::run::{ScenePair, is_same, read_run};
 use posescope::scene::{self, IndexOptions, NoIndex, Retriever, Scene};
 
 use super::args::IndexArgs;
@@ -21,7 +21,7 @@ pub fn index(args: &IndexArgs, terminal: &Terminal) -> Result<(), CliError> {
     };
     let options =
         IndexOptions { words: params.index.words, every: args.every.get(), seed: args.seed };
-    let without = left_out(scene.as_ref(), &args.without)?;
+    let without = left_out(scene.as_ref(), &args.scene, &args.without)?;
     let request = Retriever::request(scene.as_ref(), &options, &without, &params);
     if !args.force {
         let there = Index::open(&path, params.retrieval.checks);
@@ -72,8 +72,12 @@ pub fn index(args: &IndexArgs, terminal: &Terminal) -> Result<(), CliError> {
     Ok(())
 }
 
-/// The frames to leave out: the named ones, and the queries of runs.
-fn left_out(scene: &dyn Scene, named: &[String]) -> Result<BTreeSet<usize>, CliError> {
+/// The frames of the scene to leave out: the named ones, and the queries of runs. `argument` is the scene's.
+fn left_out(
+    scene: &dyn Scene,
+    argument: &str,
+    named: &[String],
+) -> Result<BTreeSet<usize>, CliError> {
     let mut frames = BTreeSet::new();
     for name in named {
         let folder = Path::new(name);
@@ -82,8 +86,12 @@ fn left_out(scene: &dyn Scene, named: &[String]) -> Result<BTreeSet<usize>, CliE
             continue;
         }
         let run = read_run(folder)?;
-        let pairs = run.pairs.iter();
-        for pair in pairs.filter(|pair| pair.query_scene == scene.name()) {
+        // A scene that is no folder here, as a built-in one, is known by its name.
+        let is_its = |pair: &&ScenePair| match run.query_argument(pair) {
+            Some(queries) if Path::new(queries).exists() => is_same(queries, argument),
+            _ => pair.query_scene == scene.name(),
+        };
+        for pair in run.pairs.iter().filter(is_its) {
             for query in pair.drawn.iter().chain(&pair.queries) {
                 frames.insert(scene.find(query)?);
             }

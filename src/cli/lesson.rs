@@ -17,6 +17,7 @@ use super::defaults;
 use super::failure::CliError;
 use super::observer::CliObserver;
 use super::output;
+use super::stderr::tell;
 use super::terminal::Terminal;
 
 /// Lists the lessons, or starts one.
@@ -69,7 +70,7 @@ fn save_instead(
     std::fs::create_dir_all(folder).map_err(CliError::io(folder))?;
     let stem = Path::new(&lesson.name).file_stem().unwrap_or_default();
     let path = folder.join(stem).with_extension("rrd");
-    eprintln!("posescope: {why}; recording {} instead", path.display());
+    tell(&format!("posescope: {why}; recording {} instead", path.display()));
     save(lesson, &path, terminal)
 }
 

@@ -17,6 +17,7 @@ use posescope::trace::{Cancelled, Record, Sink};
 use super::event_export::EventExport;
 use super::interrupt::Interrupt;
 use super::match_export::MatchExport;
+use super::stderr::tell;
 
 /// From this number of candidates, an index is worth building.
 const MANY: usize = 100;
@@ -151,10 +152,10 @@ impl LocalizeObserver for CliObserver {
         if candidates >= MANY
             && let Some(scene) = self.index_for.take()
         {
-            eprintln!(
+            tell(&format!(
                 "Comparing the query with {candidates} photos. An index is faster: run `posescope index {scene}`, then use \
                  --reference retrieve:1"
-            );
+            ));
         }
         self.bar.set_message("choosing references");
         self.bar.set_length(candidates as u64);

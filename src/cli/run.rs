@@ -20,6 +20,7 @@ use super::match_export::MatchExport;
 use super::observer::CliObserver;
 use super::opened::{self, OpenedTask};
 use super::output::{self, JsonLines};
+use super::stderr::tell;
 use super::story::story;
 use super::table;
 use super::terminal::Terminal;
@@ -33,6 +34,9 @@ struct Plan<'a> {
 
 /// One query, as its position in its scene, with its references.
 type PlannedQuery = (usize, References);
+
+/// The extensions of files with JSON lines.
+pub const JSON_LINES: [&str; 2] = ["json", "jsonl"];
 
 pub fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), CliError> {
     let OpenedTask { task, scenes, queries: wanted, size } =
@@ -48,6 +52,7 @@ pub fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), CliError> {
     let references = scenes.references.as_ref();
     let localizer = Localizer::new(references, queries, &task.params, task.protocol.seed);
     let plan = Plan { args, task: &task, localizer: task.protocol.configured(localizer)? };
+    plan.check_outputs()?;
     let wanted = if args.all { (0..queries.frames().len()).collect() } else { wanted };
     let interrupt = terminal.interrupt();
     let has_index = matches!(task.protocol.selection(), Selection::Retrieved(_));
@@ -89,7 +94,6 @@ pub fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), CliError> {
     observer.bar = terminal.bar(estimates_planned as u64);
     observer.recorder = plan.recorder(&tasks)?;
     if let Some(folder) = &args.export_matches {
-        plan.check_features()?;
         observer.export = Some(MatchExport::to(folder)?);
     }
     if let Some(path) = &args.events {
@@ -187,6 +191,26 @@ impl Plan<'_> {
         Ok(())
     }
 
+    /// Refuses outputs before the first of them is opened, which empties its file.
+    fn check_outputs(&self) -> Result<(), CliError> {
+        let scenes: Vec<&str> =
+            self.task.query_scene().into_iter().chain([self.task.scene.as_str()]).collect();
+        let files = [
+            ("--json", &self.args.json, &JSON_LINES[..]),
+            ("--events", &self.args.events, &JSON_LINES[..]),
+            ("--save", &self.args.recording.save, &["rrd"][..]),
+        ];
+        for (option, path, extensions) in files {
+            if let Some(path) = path {
+                output::refuse_to_replace(option, path, extensions, &scenes)?;
+            }
+        }
+        if self.args.export_matches.is_none() {
+            return Ok(());
+        }
+        self.check_features()
+    }
+
     /// Only FB has matches to write.
     fn check_features(&self) -> Result<(), CliError> {
         let mut methods = self.task.protocol.methods.iter().copied();
@@ -216,7 +240,7 @@ impl Plan<'_> {
         let table = table::results(results, width);
         let text = table + &story(results, width);
         if self.args.json.as_deref().is_some_and(output::is_stdout) {
-            eprint!("{text}");
+            tell(text.trim_end());
             return Ok(());
         }
         output::print(&text.trim_end())

@@ -10,6 +10,13 @@ use super::terminal::Terminal;
 use super::view;
 
 pub fn screenshot(args: &ViewArgs, out: &Path, terminal: &Terminal) -> Result<(), CliError> {
+    let format = image::ImageFormat::from_path(out).ok();
+    if !matches!(format, Some(image::ImageFormat::Png | image::ImageFormat::Jpeg)) {
+        return Err(CliError::Usage(format!(
+            "--screenshot {}: a file name that ends in .png or .jpg expected",
+            out.display()
+        )));
+    }
     let (setup, results) = view::setup(args)?;
     let options = &args.screenshot;
     let shot = Shot {

@@ -27,6 +27,7 @@ const CELL_PX: u32 = 3;
 
 pub fn surface(args: &RunArgs, out: &Path, terminal: &Terminal) -> Result<(), CliError> {
     let is_table = is_table(out)?;
+    output::refuse_to_replace("--surface", out, &["png", "csv"], &[&args.scene])?;
     let OpenedTask { task, scenes, queries, .. } =
         opened::open(&args.task, &args.scene, &args.query)?;
     let method = method(args.task.protocol.has("methods"), &task.protocol.methods)?;
@@ -132,7 +133,8 @@ fn fill(
 
 /// Whether a file is a table, and no picture, by its name.
 fn is_table(out: &Path) -> Result<bool, CliError> {
-    match out.extension().and_then(|ending| ending.to_str()) {
+    let ending = out.extension().map(|ending| ending.to_ascii_lowercase());
+    match ending.as_ref().and_then(|ending| ending.to_str()) {
         Some("csv") => Ok(true),
         Some("png") => Ok(false),
         _ => Err(CliError::Usage(format!(

@@ -1,14 +1,16 @@
 //! The terminal: progress and messages on stderr, results on stdout.
 
+use std::io::Write as _;
 use std::time::Duration;
 
 use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
 use indicatif_log_bridge::LogWrapper;
-use log::LevelFilter;
+use log::{Level, LevelFilter};
 
 use super::args::Everywhere;
 use super::host::Host;
 use super::interrupt::Interrupt;
+use super::stderr::{plain, tell};
 
 pub struct Terminal {
     bars: MultiProgress,
@@ -32,6 +34,14 @@ impl Terminal {
             level => level,
         };
         let logger = env_logger::Builder::new()
+            .format(|buffer, record| match record.level() {
+                Level::Error | Level::Warn => {
+                    let is_error = record.level() == Level::Error;
+                    let word = if is_error { "error" } else { "warning" };
+                    writeln!(buffer, "posescope: {word}: {}", plain(&record.args().to_string()))
+                }
+                level => writeln!(buffer, "{level} {}: {}", record.target(), record.args()),
+            })
             .filter_level(foreign)
             .filter_module("posescope", own)
             // They log errors if a driver is missing, which the window reports in one line.
@@ -61,7 +71,7 @@ impl Terminal {
     /// Prints a message on stderr unless `--quiet` is given.
     pub fn say(&self, message: impl FnOnce() -> String) {
         if !self.is_quiet {
-            eprintln!("{}", message());
+            tell(&message());
         }
     }
 

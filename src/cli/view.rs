@@ -7,7 +7,7 @@ use posescope::app::{self, KnownResults, Results, Setup, WindowError};
 use posescope::localize::QueryResult;
 use posescope::measure::StoredSummary;
 use posescope::run::{ScenePair, read_run, results_of_pair};
-use posescope::scene::{self, Scene};
+use posescope::scene::Scene;
 use posescope::session::{IndexFile, Job, RunMode, Task, TaskScenes};
 
 use super::args::{RunArgs, ViewArgs};
@@ -15,6 +15,7 @@ use super::defaults;
 use super::failure::CliError;
 use super::opened::{self, OpenedTask};
 use super::run;
+use super::stderr::tell;
 use super::terminal::Terminal;
 
 /// Opens the window, or without a display records the run.
@@ -32,9 +33,9 @@ pub fn view(args: &ViewArgs, terminal: &Terminal) -> Result<(), CliError> {
 /// Records the same run.
 fn record_instead(setup: &Setup, why: &WindowError, terminal: &Terminal) -> Result<(), CliError> {
     let query = setup.query_name();
-    let recording = setup.folder.join(format!("{query}.rrd"));
+    let recording = setup.folder.join(format!("{}.rrd", query.replace('/', "-")));
     std::fs::create_dir_all(&setup.folder).map_err(CliError::io(&setup.folder))?;
-    eprintln!("posescope: {why}; recording {} instead", recording.display());
+    tell(&format!("posescope: {why}; recording {} instead", recording.display()));
     let mut arguments = vec!["posescope".to_owned()];
     arguments.extend(setup.arguments());
     arguments.extend(["--save".to_owned(), recording.display().to_string()]);
@@ -62,11 +63,11 @@ fn results_of(folder: &Path, pair: &ScenePair, queries: &dyn Scene) -> Result<Re
     let (results, elsewhere) = results_of_pair(folder, pair, queries)?;
     if elsewhere > 0 {
         let (references, queries) = (&pair.scene, &pair.query_scene);
-        eprintln!(
+        tell(&format!(
             "posescope: {}: {elsewhere} results of other scenes are not shown; the window shows queries of \
              {queries} with references of {references}",
             folder.display()
-        );
+        ));
     }
     Ok(results)
 }
@@ -155,14 +156,8 @@ fn of_a_run(args: &ViewArgs, folder: &Path) -> Result<(Setup, KnownResults), Cli
     let scene_argument = file.scenes[pair.scene_index].clone();
     refuse_other_queries(args)?;
     let mut protocol = args.task.protocol.over(file.protocol.clone())?;
-    let format = protocol.format.as_deref();
-    let is_its = |argument: &&String| {
-        let scene = scene::open(argument, format);
-        scene.is_ok_and(|scene| scene.name() == pair.query_scene)
-    };
-    let other = protocol.query_scene.iter().find(is_its);
-    let other = other.filter(|_| pair.query_scene != pair.scene).cloned();
-    protocol.query_scene = other.into_iter().collect();
+    let other = pair.query_index.and_then(|_| file.query_argument(pair));
+    protocol.query_scene = other.map(str::to_owned).into_iter().collect();
     protocol.limit = None;
     protocol.preset = None;
     protocol.failure_radius_m = None;

@@ -67,13 +67,12 @@ impl RunComparison {
 
     /// Compares two runs. Changes of an error up to the tolerance are ignored.
     pub fn of(before: &[QueryResult], after: &[QueryResult], tolerance: &Tolerance) -> Self {
-        let key = |row: &QueryResult| format!("{:?}/{}/{}", Group::of(row), row.query, row.method);
         let mut others: BTreeMap<String, &QueryResult> =
-            after.iter().map(|row| (key(row), row)).collect();
+            after.iter().map(|row| (Self::key(row), row)).collect();
         let mut comparison = Self::default();
         let mut pairs = Vec::new();
         for row in before {
-            let Some(other) = others.remove(&key(row)) else {
+            let Some(other) = others.remove(&Self::key(row)) else {
                 comparison.only_before += 1;
                 continue;
             };
@@ -89,6 +88,11 @@ impl RunComparison {
         comparison.migrations.retain(Migration::is_change);
         comparison.differences.sort_by_key(|one| one.change);
         comparison
+    }
+
+    /// What a result has in common with that of another run, and with no other of its own.
+    pub fn key(row: &QueryResult) -> String {
+        format!("{:?}/{}/{}", Group::of(row), row.query, row.method)
     }
 
     /// The number of queries with this change.

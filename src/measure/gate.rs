@@ -1,5 +1,6 @@
 //! Gates: conditions on the figures of a run.
 
+use std::fmt;
 use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
@@ -66,6 +67,12 @@ impl GateResult {
             table.push([format!("`{}`", one.gate), passed.to_owned(), one.found.clone()]);
         }
         table
+    }
+}
+
+impl fmt::Display for Gate {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.text)
     }
 }
 

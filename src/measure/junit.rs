@@ -1,5 +1,7 @@
 //! `junit.xml`: one test case per query and method, for the test report of a CI service.
 
+use std::time::Duration;
+
 use quick_junit::{NonSuccessKind, Report, TestCase, TestCaseStatus, TestSuite};
 
 use super::gate::GateResult;
@@ -9,18 +11,19 @@ use super::metrics::Group;
 use crate::fusion::Fusion;
 use crate::localize::{QueryResult, Setting};
 
-/// The report as XML, without timestamps.
+/// The report as XML, without timestamps. `times` are those of the results \[s\], where they are known.
 ///
 /// # Errors
 /// A text that cannot be written as XML.
 pub fn junit(
     results: &[QueryResult],
+    times: &[Option<f64>],
     gate_results: &[GateResult],
     known: &KnownFailures,
 ) -> Result<String, quick_junit::SerializeError> {
     let mut report = Report::new("posescope");
     // Results are ordered by query; a suite has those of one method.
-    let cases = results.iter().map(|row| {
+    let cases = results.iter().zip(times).map(|(row, time)| {
         let suite = format!("{} {}", Group::of(row).scenes(), row.method);
         let words = row.grade.words(row.error.as_ref());
         let status = match (row.diagnosis.first(), &row.reason) {
@@ -30,7 +33,12 @@ pub fn junit(
             (None, Some(reason)) => failure(reason.code.name(), &reason.text),
             (None, None) => failure(row.grade.word(), &words),
         };
-        (suite, TestCase::new(case_name(&row.query, row.setting, row.fusion), status))
+        let mut case = TestCase::new(case_name(&row.query, row.setting, row.fusion), status);
+        case.set_classname(suite.clone());
+        if let Some(time) = time.and_then(|time| Duration::try_from_secs_f64(time).ok()) {
+            case.set_time(time);
+        }
+        (suite, case)
     });
     for (name, cases) in grouped(cases) {
         let mut suite = TestSuite::new(name);

@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 
 use super::findings::{Finding, findings};
 use super::groups::grouped;
-use crate::diagnosis::{Code, Grade};
+use super::metrics::median;
+use crate::diagnosis::{Code, Confidence, Grade};
 use crate::localize::QueryResult;
 
 /// What a run came to.
@@ -27,6 +28,12 @@ pub struct Bar {
     pub name: String,
     /// In the order of [`Grade::ALL`].
     pub counts: [usize; Grade::ALL.len()],
+    /// How many poses are trusted.
+    pub trusted: usize,
+    /// The median translation error of its poses \[m\].
+    pub median_m: Option<f64>,
+    /// The most frequent primary cause of its failures.
+    pub cause: Option<(Code, usize)>,
 }
 
 impl Bar {
@@ -45,10 +52,25 @@ impl Bar {
 impl Overview {
     /// Of the results of a run, and of what `posescope doctor` says of its scenes.
     pub fn of(results: &[&QueryResult], examined: &[Finding]) -> Self {
-        let bars = grouped(results.iter().map(|result| (label(result), result.grade)));
-        let bars = bars.into_iter().map(|(name, grades)| {
-            let of = |grade| grades.iter().filter(|one| **one == grade).count();
-            Bar { name, counts: Grade::ALL.map(of) }
+        let bars = grouped(results.iter().map(|result| (label(result), *result)));
+        let bars = bars.into_iter().map(|(name, results)| {
+            let of = |grade| results.iter().filter(|one| one.grade == grade).count();
+            let errors: Vec<f64> =
+                results.iter().filter_map(|one| Some(one.error?.translation_m)).collect();
+            let word = |one: &QueryResult| one.confidence.as_ref().map(|known| known.word);
+            let failed = results.iter().filter(|one| one.grade.is_failure());
+            // Of equally frequent ones the first.
+            let cause = causes(failed).into_iter().rev().max_by_key(|(_, times)| *times);
+            Bar {
+                name,
+                counts: Grade::ALL.map(of),
+                trusted: results
+                    .iter()
+                    .filter(|one| word(one) == Some(Confidence::Trusted))
+                    .count(),
+                median_m: median(&errors),
+                cause,
+            }
         });
         let bars: Vec<Bar> = bars.collect();
         let mut causes = causes(results.iter().filter(|result| result.grade.is_failure()));
@@ -57,6 +79,16 @@ impl Overview {
         let findings = findings(results, examined);
         Self { findings, headline: headline(results, &bars), bars, causes }
     }
+}
+
+/// The positions of the failures: wrong poses by their error, then those without a pose.
+pub fn worst_first(results: &[QueryResult]) -> Vec<usize> {
+    let failures = (0..results.len()).filter(|&at| results[at].grade.is_failure());
+    let mut failures: Vec<usize> = failures.collect();
+    let off_m =
+        |at: usize| results[at].error.map_or(f64::NEG_INFINITY, |error| error.translation_m);
+    failures.sort_by(|&one, &other| off_m(other).total_cmp(&off_m(one)));
+    failures
 }
 
 /// The method as people write it, with its fusion.

@@ -1,6 +1,7 @@
 //! The reports of a finished run: `summary.json` and `junit.xml`. But for what `posescope doctor` says of the scenes, both
 //! are derived from `run.toml` and `results.jsonl`.
 
+use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
 
@@ -14,6 +15,7 @@ use super::metrics::{Measures, measure};
 use super::results::{RunResults, read_rows};
 use super::tables::{brief, tables};
 use super::{junit, timings};
+use crate::diagnosis::Code;
 use crate::localize::QueryResult;
 use crate::run::{FolderError, RunFile};
 use crate::table::Table;
@@ -38,6 +40,8 @@ pub struct Report {
     pub known: KnownReport,
     /// The tables, the summary first.
     pub tables: Vec<Table>,
+    /// How many queries have files that cannot be read, and the first such file; `None` if there are none.
+    pub unread: Option<String>,
 }
 
 /// The most rows of a list on the page of a CI job.
@@ -135,20 +139,21 @@ impl StoredSummary {
     }
 }
 
-/// Measures a run and writes its reports. `examined` is what `posescope doctor` says of its scenes.
+/// Measures a run and writes its reports. `examined` is what `posescope doctor` says of its scenes. Also returns
+/// whether all files were written: one that cannot be written keeps no other from being tried.
 ///
 /// # Errors
-/// A result that cannot be read, or a file that cannot be written.
+/// A result that cannot be read.
 pub fn write_report(
     folder: &Path,
     run: &RunFile,
     examined: &[Finding],
     gates: &[Gate],
     known: &KnownFailures,
-) -> Result<Report, FolderError> {
+) -> Result<(Report, Result<(), FolderError>), FolderError> {
     let rows = read_rows(folder)?;
     let times = timings::read(folder, &rows)?;
-    let timed = rows.iter().zip(times);
+    let timed = rows.iter().zip(times.iter().copied());
     let measured = |timed: Vec<(&QueryResult, Option<f64>)>| {
         let mut measures = measure(timed.iter().map(|one| one.0), run.failure_radius_m());
         timings::add_medians(&mut measures, timed.into_iter());
@@ -172,19 +177,34 @@ pub fn write_report(
         doctor: &doctor,
     };
     let json = serde_json::to_vec_pretty(&summary);
-    let json = json.map_err(|error| FolderError::io(folder)(error.into()))?;
-    write(&folder.join(SUMMARY), &json)?;
-    let xml = junit::junit(&rows, &gate_results, known);
+    let json = json.map_err(|error| FolderError::io(folder)(error.into()));
+    let summarised = json.and_then(|json| write(&folder.join(SUMMARY), &json));
+    let xml = junit::junit(&rows, &times, &gate_results, known);
     let path = folder.join("junit.xml");
-    let xml = xml.map_err(|error| FolderError::io(&path)(std::io::Error::other(error)))?;
-    write(&path, xml.as_bytes())?;
+    let xml = xml.map_err(|error| FolderError::io(&path)(std::io::Error::other(error)));
+    let written = summarised.and(xml.and_then(|xml| write(&path, xml.as_bytes())));
     let results = RunResults { results: rows, measures, failure_radius_m: run.failure_radius_m() };
-    Ok(Report {
+    let report = Report {
         tables: tables(&results, run.protocol.preset.map(|one| one.name())),
+        unread: unread(&results.results),
         measures: results.measures,
         findings,
         gate_results,
         known: known_report,
+    };
+    Ok((report, written))
+}
+
+fn unread(rows: &[QueryResult]) -> Option<String> {
+    let reason = |row: &QueryResult| row.reason.clone().filter(|reason| reason.code == Code::I1);
+    let first = rows.iter().find_map(|row| Some((&row.query, reason(row)?.text)))?;
+    let queries: BTreeSet<_> = (rows.iter().filter(|row| reason(row).is_some()))
+        .map(|row| (&row.scene, &row.query_scene, &row.query))
+        .collect();
+    let (query, text) = first;
+    Some(match queries.len() {
+        1 => format!("query {query} was not localised: {text}"),
+        count => format!("{count} queries were not localised, the first is {query}: {text}"),
     })
 }
 

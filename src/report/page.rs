@@ -6,6 +6,8 @@ mod glance;
 mod results;
 mod words;
 
+pub use failures::repeat_command;
+
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use super::{Baseline, RunReport};

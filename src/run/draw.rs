@@ -85,6 +85,7 @@ impl Draw<'_> {
         };
         Ok(ScenePair {
             scene_index,
+            query_index: None,
             scene: references.name().to_owned(),
             query_scene: queries.name().to_owned(),
             camera,

@@ -68,11 +68,9 @@ impl Scenes {
 
     /// The scene of a pair's queries.
     pub fn of_queries(&self, pair: &ScenePair) -> &dyn Scene {
-        self.queries
-            .iter()
-            .find(|scene| scene.name() == pair.query_scene)
-            .unwrap_or(&self.references[pair.scene_index])
-            .as_ref()
+        // Degraded photos of the references' own scenes are query scenes too.
+        let queries = self.queries.get(pair.query_index.unwrap_or(pair.scene_index));
+        queries.unwrap_or(&self.references[pair.scene_index]).as_ref()
     }
 }
 
@@ -141,8 +139,8 @@ pub struct Execution<'a> {
 }
 
 impl Execution<'_> {
-    /// Localises the remaining queries of the run and appends their results. A query that panics gets failed
-    /// results, and the run continues.
+    /// Localises the remaining queries of the run, and again those whose files could not be read, and writes their
+    /// results. A query that panics, or whose files cannot be read, gets failed results, and the run continues.
     ///
     /// # Errors
     /// [`RunError`]. Finished queries are in the folder.
@@ -152,38 +150,32 @@ impl Execution<'_> {
         observer: &mut dyn RunObserver,
     ) -> Result<(), RunError> {
         let items: Vec<RunItem<'_>> = self.run.items().collect();
-        let mut rest = items.get(folder.done()..).unwrap_or_default();
+        let left = items.get(folder.done()..).unwrap_or_default();
+        let again = folder.unread().iter().filter_map(|&at| Some((Some(at), *items.get(at)?)));
+        let remaining: Vec<(Option<usize>, RunItem<'_>)> =
+            again.chain(left.iter().map(|item| (None, *item))).collect();
         // One localizer per pair of scenes, which caches its features.
-        while let Some(first) = rest.first() {
-            let same = |item: &&RunItem<'_>| std::ptr::eq(item.pair, first.pair);
-            let (now, later) = rest.split_at(rest.iter().take_while(same).count());
-            let references = self.scenes.references[first.pair.scene_index].as_ref();
-            let queries = self.scenes.of_queries(first.pair);
+        for of_pair in remaining.chunk_by(|(_, a), (_, b)| std::ptr::eq(a.pair, b.pair)) {
+            let Some((_, RunItem { pair, .. })) = of_pair.first().copied() else {
+                continue;
+            };
+            let references = self.scenes.references[pair.scene_index].as_ref();
+            let queries = self.scenes.of_queries(pair);
             let protocol = &self.run.protocol;
             let localizer = Localizer::new(references, queries, self.params, protocol.seed);
             let localizer = protocol.configured(localizer)?;
-            let left_out = self.left_out(first.pair, references)?;
-            for item in now {
+            let left_out = left_out(pair, &localizer)?;
+            for (place, item) in of_pair {
                 observer.begin(item);
                 let results = self.results(item, &localizer, &left_out, observer)?;
-                folder.append(&results)?;
+                match place {
+                    Some(place) => folder.replace(*place, &results)?,
+                    None => folder.append(&results)?,
+                }
                 observer.done(item);
             }
-            rest = later;
         }
         Ok(())
-    }
-
-    /// Frames of the references' scene that are queries, and must not be references.
-    fn left_out(
-        &self,
-        pair: &ScenePair,
-        references: &dyn Scene,
-    ) -> Result<BTreeSet<usize>, SceneError> {
-        if pair.scene != pair.query_scene {
-            return Ok(BTreeSet::new());
-        }
-        pair.drawn.iter().map(|name| references.find(name)).collect()
     }
 
     fn results(
@@ -196,7 +188,7 @@ impl Execution<'_> {
         let frame = localizer.queries().find(item.query)?;
         let mut results = Vec::new();
         let localized = catch_unwind(AssertUnwindSafe(|| -> Result<_, RunError> {
-            let requests = self.requests(localizer, frame, left_out)?;
+            let requests = self.requests(item.pair, localizer, frame, left_out)?;
             localizer.localize(
                 item.index,
                 frame,
@@ -204,13 +196,16 @@ impl Execution<'_> {
                 &self.run.protocol.methods,
                 observer.query_observer(),
                 |result, times| {
-                    results.push((result, times));
+                    results.push((in_pair(item.pair, result), times));
                     Ok::<(), RunError>(())
                 },
             )?;
             Ok(requests)
         }));
         match localized {
+            Ok(Err(RunError::Scene(error) | RunError::Choice(ChoiceError::Scene(error)))) => {
+                results = self.broken(item, &Failure::Unreadable { message: error.to_string() });
+            }
             Ok(requests) => {
                 let requests = requests?;
                 // One call per method that failed in any of the requests.
@@ -233,23 +228,23 @@ impl Execution<'_> {
                     }
                 }
             }
-            Err(panic) => results = self.broken(item, &crate::localize::words_of(panic.as_ref())),
+            Err(panic) => {
+                let message = crate::localize::words_of(panic.as_ref());
+                results = self.broken(item, &Failure::Internal { message });
+            }
         }
         Ok(results)
     }
 
     fn requests(
         &self,
+        pair: &ScenePair,
         localizer: &Localizer<'_>,
         frame: usize,
         left_out: &BTreeSet<usize>,
     ) -> Result<Vec<Request>, RunError> {
         let protocol = &self.run.protocol;
-        let index = localizer.references().name();
-        let index = (self.scenes.references.iter())
-            .position(|scene| scene.name() == index)
-            .and_then(|at| self.indices.get(at))
-            .map(|index| index.as_ref());
+        let index = self.indices.get(pair.scene_index).map(|index| index.as_ref());
         let choose = |radius_m: f64| {
             let chooser = protocol.chooser(localizer, radius_m, index);
             chooser.choose(frame, &|frame| left_out.contains(&frame), &mut NoObserver)
@@ -268,9 +263,8 @@ impl Execution<'_> {
         Ok(requests)
     }
 
-    /// The results of a query whose localisation panicked.
-    fn broken(&self, item: &RunItem<'_>, message: &str) -> Vec<(QueryResult, StageTimes)> {
-        let failure = Failure::Internal { message: message.to_owned() };
+    /// The results of a query that could not be localised at all.
+    fn broken(&self, item: &RunItem<'_>, failure: &Failure) -> Vec<(QueryResult, StageTimes)> {
         let pair = item.pair;
         let protocol = &self.run.protocol;
         let fusions: Vec<Option<Fusion>> = match protocol.fusions.as_slice() {
@@ -282,8 +276,6 @@ impl Execution<'_> {
             for setting in self.run.settings() {
                 for &fusion in &fusions {
                     let result = QueryResult {
-                        query_scene: (pair.scene != pair.query_scene)
-                            .then(|| pair.query_scene.clone()),
                         setting: Some(setting),
                         fusion,
                         ..QueryResult::new(
@@ -291,15 +283,27 @@ impl Execution<'_> {
                             item.query,
                             method,
                             protocol.seed,
-                            Err(&failure),
+                            Err(failure),
                             None,
                             protocol.right,
                         )
                     };
-                    results.push((result, StageTimes::default()));
+                    results.push((in_pair(pair, result), StageTimes::default()));
                 }
             }
         }
         results
     }
+}
+
+/// The result with the scenes as the run calls them.
+fn in_pair(pair: &ScenePair, result: QueryResult) -> QueryResult {
+    let (scene, queries) = (pair.scene.clone(), pair.query_scene.clone());
+    QueryResult { query_scene: (queries != scene).then_some(queries), scene, ..result }
+}
+
+/// Frames of the references' scene that are queries, and must not be references.
+fn left_out(pair: &ScenePair, localizer: &Localizer<'_>) -> Result<BTreeSet<usize>, SceneError> {
+    let drawn = if localizer.is_one_drive() { pair.drawn.as_slice() } else { &[] };
+    drawn.iter().map(|name| localizer.references().find(name)).collect()
 }

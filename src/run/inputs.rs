@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use xxhash_rust::xxh3::Xxh3;
 
 use super::protocol::Protocol;
+use super::run_file::CONTENT_OF;
 use super::run_folder::FolderError;
 
 /// One entry per file or folder of the protocol: its path and a hash of its content.
@@ -19,12 +20,15 @@ pub fn inputs(protocol: &Protocol) -> Result<BTreeMap<String, String>, FolderErr
     let others = protocol.matches.iter().chain(&protocol.gps);
     estimates
         .chain(others)
-        .map(|path| Ok((format!("content of {}", path.display()), content(path)?)))
+        .map(|path| Ok((format!("{CONTENT_OF}{}", path.display()), content(path)?)))
         .collect()
 }
 
 /// A hash of a file, or of the files of a folder with their names.
-fn content(path: &Path) -> Result<String, FolderError> {
+///
+/// # Errors
+/// A file that cannot be read.
+pub fn content(path: &Path) -> Result<String, FolderError> {
     let mut sum = Xxh3::new();
     for file in files(path).map_err(FolderError::io(path))? {
         sum.update(file.file_name().unwrap_or_default().as_encoded_bytes());

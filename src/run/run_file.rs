@@ -1,6 +1,8 @@
 //! `run.toml`: the request of an evaluation and its queries.
 
+use std::cell::RefCell;
 use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 use toml::de::{DeTable, DeValue};
@@ -8,6 +10,7 @@ use toml::de::{DeTable, DeValue};
 use super::preset::{Preset, default_failure_radius_m};
 use super::protocol::{Protocol, known};
 use super::scene_pair::{QueryCamera, ScenePair};
+use super::scene_paths;
 use crate::describe::ParamError;
 use crate::localize::{QueryResult, References, Request, Setting};
 use crate::method::Method;
@@ -15,6 +18,9 @@ use crate::params::Params;
 
 /// The version of the file format.
 pub const RUN_SCHEMA: &str = "posescope.run/1";
+
+/// What the name of an input file begins with.
+pub(super) const CONTENT_OF: &str = "content of ";
 
 /// One part of a run that is split over several processes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -71,6 +77,9 @@ pub struct RunFile {
     /// Hashes of the protocol's files and folders; see [`inputs`](super::inputs).
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub inputs: BTreeMap<String, String>,
+    /// The paths of scenes, files and folders relative to the run folder, by the arguments that name them.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub paths: BTreeMap<String, String>,
     /// The pairs of scenes, with the queries.
     #[serde(rename = "pair")]
     pub pairs: Vec<ScenePair>,
@@ -196,6 +205,82 @@ impl RunFile {
         self.protocol.failure_radius_m.unwrap_or_else(|| default_failure_radius_m(scene))
     }
 
+    /// The scene of a pair's queries, as an argument.
+    pub fn query_argument(&self, pair: &ScenePair) -> Option<&str> {
+        match pair.query_index {
+            Some(at) => self.protocol.query_scene.get(at).map(String::as_str),
+            None => self.scenes.get(pair.scene_index).map(String::as_str),
+        }
+    }
+
+    /// The description of this run in a folder.
+    pub(super) fn located_in(&self, folder: &Path) -> Self {
+        let arguments = RefCell::new(BTreeMap::new());
+        self.with_arguments(&|argument| {
+            if let Some(path) = scene_paths::relative_to(folder, argument) {
+                arguments.borrow_mut().insert(argument.to_owned(), path);
+            }
+            argument.to_owned()
+        });
+        Self { paths: arguments.into_inner(), ..self.clone() }
+    }
+
+    /// The run of a folder with arguments that find its scenes and files from the present working folder.
+    pub(super) fn found_from(self, folder: &Path) -> Self {
+        self.with_arguments(&|argument| match self.paths.get(argument) {
+            Some(path) => scene_paths::found_again(folder, path, argument),
+            None => argument.to_owned(),
+        })
+    }
+
+    /// The run with each path in one spelling: equal runs have equal ones.
+    pub(super) fn canonical(&self) -> Self {
+        let spelt = |argument: &str| {
+            scene_paths::canonical(argument).unwrap_or_else(|| argument.to_owned())
+        };
+        Self { paths: BTreeMap::new(), ..self.with_arguments(&spelt) }
+    }
+
+    /// The run with its scenes, files and folders as this function of their arguments.
+    fn with_arguments(&self, change: &dyn Fn(&str) -> String) -> Self {
+        let all = |arguments: &[String]| arguments.iter().map(|one| change(one)).collect();
+        let path = |path: &PathBuf| scene_paths::of_text(path, change);
+        let mut run = self.clone();
+        run.scenes = all(&run.scenes);
+        let protocol = &mut run.protocol;
+        protocol.query_scene = all(&protocol.query_scene);
+        protocol.index = protocol.index.iter().map(path).collect();
+        protocol.gps = protocol.gps.as_ref().map(path);
+        protocol.matches = protocol.matches.as_ref().map(path);
+        for file in &mut protocol.estimates {
+            file.path = path(&file.path);
+        }
+        let name = |name: String| match name.strip_prefix(CONTENT_OF) {
+            Some(argument) => format!("{CONTENT_OF}{}", change(argument)),
+            None => name,
+        };
+        let inputs = run.inputs.into_iter();
+        run.inputs = inputs.map(|(input, sum)| (name(input), sum)).collect();
+        run
+    }
+
+    /// The run with the numbers of its query scenes, which versions before did not write.
+    fn numbered(mut self) -> Self {
+        let (scenes, given) = (self.scenes.len(), self.protocol.query_scene.clone());
+        let are_all = self.pairs.len() == scenes * given.len();
+        for (at, pair) in self.pairs.iter_mut().enumerate() {
+            if pair.query_index.is_none() && !given.is_empty() {
+                // Every scene of references is paired with every scene of queries, or with those of failed queries.
+                let name = pair.query_scene.rsplit('/').next().unwrap_or_default();
+                let named =
+                    || given.iter().position(|one| one.trim_end_matches('/').ends_with(name));
+                pair.query_index =
+                    if are_all { Some(at % given.len()) } else { named().or(Some(0)) };
+            }
+        }
+        self
+    }
+
     /// The pair of scenes of a result.
     pub fn pair_of(&self, result: &QueryResult) -> Option<&ScenePair> {
         let queries = result.query_scene.as_ref().unwrap_or(&result.scene);
@@ -233,7 +318,7 @@ impl RunFile {
         let run: Self = toml::from_str(text).map_err(syntax)?;
         match invalid(&run) {
             Some((keys, message)) => Err(error_at(place(text, &keys).unwrap_or(0), message)),
-            None => Ok(run),
+            None => Ok(run.numbered()),
         }
     }
 
@@ -273,6 +358,7 @@ mod tests {
                 ..Protocol::default()
             },
             inputs: BTreeMap::new(),
+            paths: BTreeMap::new(),
             pairs: Vec::new(),
             params: Params::default().to_toml().parse().expect("a table"),
         };
@@ -282,5 +368,44 @@ mod tests {
         let error = RunFile::read(&text.replacen("seed = ", "sed = ", 1)).expect_err("unknown");
         assert_eq!(error.line, at);
         assert!(error.message.contains("`sed`"), "{}", error.message);
+    }
+
+    #[test]
+    fn query_scenes_of_older_folders_get_their_numbers() {
+        let camera = QueryCamera { width: 2, height: 1, fx: 1.0, fy: 1.0, cx: 0.5, cy: 0.0 };
+        let pair = |query_scene: &str| ScenePair {
+            scene_index: 0,
+            query_index: None,
+            scene: "map".to_owned(),
+            query_scene: query_scene.to_owned(),
+            camera,
+            cameras: Vec::new(),
+            drawn: Vec::new(),
+            queries: Vec::new(),
+            times_s: Vec::new(),
+        };
+        let numbers = |given: &[&str], pairs: &[&str]| -> Vec<Option<usize>> {
+            let run = RunFile {
+                schema: RUN_SCHEMA.to_owned(),
+                version: "1".to_owned(),
+                scenes: vec!["map".to_owned()],
+                shard: None,
+                protocol: Protocol {
+                    query_scene: given.iter().map(|one| (*one).to_owned()).collect(),
+                    ..Protocol::default()
+                },
+                inputs: BTreeMap::new(),
+                paths: BTreeMap::new(),
+                pairs: pairs.iter().map(|name| pair(name)).collect(),
+                params: toml::Table::new(),
+            };
+            let read = RunFile::read(&toml::to_string(&run).expect("TOML")).expect("our own");
+            read.pairs.iter().map(|pair| pair.query_index).collect()
+        };
+        let given = ["q/00", "street:night", "q/snow/"];
+        let all = numbers(&given, &["kitti/00", "street:night", "snow"]);
+        assert_eq!(all, [Some(0), Some(1), Some(2)]);
+        assert_eq!(numbers(&given, &["snow", "kitti/00"]), [Some(2), Some(0)]);
+        assert_eq!(numbers(&[], &["map"]), [None]);
     }
 }

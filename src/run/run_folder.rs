@@ -6,6 +6,7 @@
 use std::collections::{BTreeMap, HashMap};
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, BufRead as _, BufReader, Seek as _, SeekFrom, Write as _};
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
@@ -13,6 +14,7 @@ use serde::de::DeserializeOwned;
 
 use super::run_file::{RunFile, RunFileError};
 use super::scene_pair::ScenePair;
+use crate::diagnosis::Code;
 use crate::localize::{QueryResult, StageTimes};
 use crate::method::Method;
 use crate::params::Params;
@@ -98,7 +100,7 @@ pub enum FolderError {
     #[error("{}: another process is writing to this run; wait until it ends", .0.display())]
     InUse(PathBuf),
     /// Not all queries are done.
-    #[error("{}: {done} of {items} queries are done; finish the run with --resume first", path.display())]
+    #[error("{}: {done} of {items} queries done; finish the run with --resume first", path.display())]
     Incomplete {
         /// The folder.
         path: PathBuf,
@@ -124,6 +126,7 @@ pub struct RunFolder {
     results: File,
     timings: File,
     done: usize,
+    unread: Vec<usize>,
 }
 
 /// A line of `timings.jsonl`.
@@ -148,10 +151,15 @@ impl RunFolder {
             });
         }
         fs::create_dir_all(path).map_err(FolderError::io(path))?;
-        let text = toml_of(run);
+        let folder = Self::open(path)?;
         let file = path.join(RUN);
+        // Another process may have run in the meantime.
+        if file.exists() {
+            return Err(FolderError::NotEmpty { path: path.to_owned(), is_run: true });
+        }
+        let text = toml_of(&run.located_in(path));
         write_whole(&file, text.as_bytes()).map_err(FolderError::io(&file))?;
-        Self::open(path)
+        Ok(folder)
     }
 
     /// Continues the run in the folder, or starts it if the folder is new or empty.
@@ -167,14 +175,21 @@ impl RunFolder {
         if !file.exists() {
             return Err(FolderError::NotEmpty { path: path.to_owned(), is_run: false });
         }
-        same_run(path, &toml_of(&read_run(path)?), &toml_of(run))?;
-        sweep(path).map_err(FolderError::io(path))?;
+        same_run(path, &read_run(path)?, run)?;
         let mut folder = Self::open(path)?;
+        remove_temporary_files(path).map_err(FolderError::io(path))?;
         let results: Prefix = folder.prefix(RESULTS)?;
         let timings: Prefix = folder.prefix(TIMINGS)?;
         folder.check_order(run, &results, results_per_item)?;
         let whole = |prefix: &Prefix| prefix.ends.len() / results_per_item;
-        folder.done = whole(&results).min(whole(&timings));
+        let done = whole(&results).min(whole(&timings));
+        let is_unread = |query: &usize| {
+            let lines = query * results_per_item..(query + 1) * results_per_item;
+            results.unread[lines].contains(&true)
+        };
+        // The last queries are cut off and localised as if they had never been.
+        folder.done = (0..done).rfind(|query| !is_unread(query)).map_or(0, |last| last + 1);
+        folder.unread = (0..folder.done).filter(is_unread).collect();
         let lines = folder.done * results_per_item;
         for (file, prefix) in [(&mut folder.results, results), (&mut folder.timings, timings)] {
             let end = lines.checked_sub(1).map_or(0, |last| prefix.ends[last]);
@@ -196,7 +211,13 @@ impl RunFolder {
         if matches!(results.try_lock(), Err(TryLockError::WouldBlock)) {
             return Err(FolderError::InUse(path.to_owned()));
         }
-        Ok(Self { path: path.to_owned(), results, timings: open(TIMINGS)?, done: 0 })
+        Ok(Self {
+            path: path.to_owned(),
+            results,
+            timings: open(TIMINGS)?,
+            done: 0,
+            unread: Vec::new(),
+        })
     }
 
     /// The path of the folder.
@@ -209,22 +230,70 @@ impl RunFolder {
         self.done
     }
 
+    /// The done queries, by their positions among them, whose files could not be read.
+    pub fn unread(&self) -> &[usize] {
+        &self.unread
+    }
+
     /// Appends all results of the next query.
     ///
     /// # Errors
     /// When they cannot be written.
     pub fn append(&mut self, results: &[(QueryResult, StageTimes)]) -> Result<(), FolderError> {
+        let (lines, times) = self.lines(results)?;
+        // Results last: a query with results is complete.
+        (self.timings.write_all(&times)).map_err(FolderError::io(self.path.join(TIMINGS)))?;
+        (self.results.write_all(&lines)).map_err(FolderError::io(self.path.join(RESULTS)))?;
+        self.done += 1;
+        Ok(())
+    }
+
+    /// Replaces all results of a query that is done.
+    ///
+    /// # Errors
+    /// When they cannot be written. The files keep their content.
+    pub fn replace(
+        &mut self,
+        query: usize,
+        results: &[(QueryResult, StageTimes)],
+    ) -> Result<(), FolderError> {
+        let (lines, times) = self.lines(results)?;
+        let of_query = query * results.len()..(query + 1) * results.len();
+        self.timings = self.replaced(TIMINGS, of_query.clone(), &times)?;
+        self.results = self.replaced(RESULTS, of_query, &lines)?;
+        Ok(())
+    }
+
+    /// A file with other lines in the place of some, open and locked.
+    fn replaced(&self, name: &str, lines: Range<usize>, new: &[u8]) -> Result<File, FolderError> {
+        let path = self.path.join(name);
+        let replace = || {
+            let old = fs::read(&path)?;
+            let old: Vec<&[u8]> = old.split_inclusive(|byte| *byte == b'\n').collect();
+            let whole = [&old[..lines.start].concat(), new, &old[lines.end..].concat()].concat();
+            let temporary = self.path.join(format!("tmp-{name}"));
+            fs::write(&temporary, whole)?;
+            let file = OpenOptions::new().read(true).append(true).open(&temporary)?;
+            // The lock of the old file ends with it.
+            file.try_lock().ok();
+            fs::rename(temporary, &path)?;
+            Ok(file)
+        };
+        replace().map_err(FolderError::io(&path))
+    }
+
+    /// The lines of a query in both files.
+    fn lines(
+        &self,
+        results: &[(QueryResult, StageTimes)],
+    ) -> Result<(Vec<u8>, Vec<u8>), FolderError> {
         let (mut lines, mut times) = (Vec::new(), Vec::new());
         for (result, stages) in results {
             push_line(&mut lines, result).map_err(FolderError::io(&self.path))?;
             let timing = Timing { query: &result.query, method: result.method, stages };
             push_line(&mut times, &timing).map_err(FolderError::io(&self.path))?;
         }
-        // Results last: a query with results is complete.
-        (self.timings.write_all(&times)).map_err(FolderError::io(self.path.join(TIMINGS)))?;
-        (self.results.write_all(&lines)).map_err(FolderError::io(self.path.join(RESULTS)))?;
-        self.done += 1;
-        Ok(())
+        Ok((lines, times))
     }
 
     /// Complete lines of a file.
@@ -243,9 +312,23 @@ impl RunFolder {
                     end += length as u64;
                     prefix.ends.push(end);
                     prefix.queries.push(head.query);
+                    prefix
+                        .unread
+                        .push(head.reason.is_some_and(|reason| reason.code == Code::I1.name()));
                 }
-                // Lines after a torn one cannot be trusted.
-                _ => return Ok(prefix),
+                // What a killed process wrote last has no end.
+                _ if !line.ends_with(b"\n") => return Ok(prefix),
+                head => {
+                    let expected =
+                        head.err().map_or_else(String::new, |error| json_message(&error));
+                    return Err(FolderError::Damaged {
+                        path,
+                        line: prefix.ends.len() + 1,
+                        message: format!(
+                            "{expected}; remove this line and all below, and --resume localises their queries again"
+                        ),
+                    });
+                }
             }
         }
     }
@@ -275,13 +358,21 @@ impl RunFolder {
 #[derive(serde::Deserialize)]
 struct Head {
     query: String,
+    reason: Option<HeadReason>,
 }
 
-/// The complete lines at the beginning of a file: their ends \[bytes\] and queries.
+#[derive(serde::Deserialize)]
+struct HeadReason {
+    /// A text: another version may have other codes.
+    code: String,
+}
+
+/// The complete lines at the beginning of a file: their ends \[bytes\], queries, and whether files could not be read.
 #[derive(Default)]
 struct Prefix {
     ends: Vec<u64>,
     queries: Vec<String>,
+    unread: Vec<bool>,
 }
 
 fn push_line(bytes: &mut Vec<u8>, value: &impl Serialize) -> io::Result<()> {
@@ -296,7 +387,8 @@ fn toml_of(run: &RunFile) -> String {
     toml::to_string(run).unwrap_or_else(|error| unreachable!("{error}"))
 }
 
-fn same_run(path: &Path, there: &str, here: &str) -> Result<(), FolderError> {
+fn same_run(path: &Path, there: &RunFile, here: &RunFile) -> Result<(), FolderError> {
+    let [there, here] = [there, here].map(|run| toml_of(&run.canonical()));
     if there == here {
         return Ok(());
     }
@@ -306,7 +398,8 @@ fn same_run(path: &Path, there: &str, here: &str) -> Result<(), FolderError> {
     Err(FolderError::OtherRun { path: path.to_owned(), there: short(there), here: short(here) })
 }
 
-/// Whether the folder contains anything but unfinished temporary files.
+/// Whether the folder contains anything but what a process leaves that is killed before it describes its run:
+/// temporary and empty files.
 fn holds_anything(path: &Path) -> Result<bool, FolderError> {
     let entries = match fs::read_dir(path) {
         Ok(entries) => entries,
@@ -315,7 +408,10 @@ fn holds_anything(path: &Path) -> Result<bool, FolderError> {
     };
     for entry in entries {
         let entry = entry.map_err(FolderError::io(path))?;
-        if !entry.file_name().to_string_lossy().starts_with("tmp-") {
+        let is_temporary = entry.file_name().to_string_lossy().starts_with("tmp-");
+        let is_empty = [RESULTS, TIMINGS].iter().any(|name| entry.file_name() == *name)
+            && entry.metadata().is_ok_and(|file| file.len() == 0);
+        if !is_temporary && !is_empty {
             return Ok(true);
         }
     }
@@ -323,7 +419,7 @@ fn holds_anything(path: &Path) -> Result<bool, FolderError> {
 }
 
 /// Removes temporary files of a killed process.
-fn sweep(folder: &Path) -> io::Result<()> {
+fn remove_temporary_files(folder: &Path) -> io::Result<()> {
     for entry in fs::read_dir(folder)? {
         let entry = entry?;
         if entry.file_name().to_string_lossy().starts_with("tmp-") {
@@ -348,7 +444,7 @@ pub fn read_run(folder: &Path) -> Result<RunFile, FolderError> {
     let mut run = RunFile::read(&text)
         .map_err(|RunFileError { line, message }| FolderError::Damaged { path, line, message })?;
     run.params = completed(run.params);
-    Ok(run)
+    Ok(run.found_from(folder))
 }
 
 /// The parameters of a run, with defaults for those that its version did not know or write.
@@ -438,13 +534,14 @@ pub fn merge(shards: &[PathBuf], target: &Path) -> Result<RunFile, FolderError> 
     };
     let whole = first.whole();
     for (path, run) in &runs {
-        same_run(path, &toml_of(&run.whole()), &toml_of(&whole))?;
+        same_run(path, &run.whole(), &whole)?;
     }
     let per_item = whole.results_per_item();
     let mut sources = Vec::new();
     for (path, run) in &runs {
         let lines = (lines_of(path, RESULTS)?, lines_of(path, TIMINGS)?);
-        let complete = lines_of(path, RESULTS)?.count() / per_item;
+        let lines_in = |name: &str| Ok::<usize, FolderError>(lines_of(path, name)?.count());
+        let complete = lines_in(RESULTS)?.min(lines_in(TIMINGS)?) / per_item;
         let items = run.items().count();
         if complete != items {
             return Err(FolderError::Incomplete { path: (*path).clone(), done: complete, items });
@@ -482,7 +579,7 @@ fn copy_line(
     file: &mut File,
     target: &Path,
 ) -> Result<(), FolderError> {
-    let line = lines.next().unwrap_or_else(|| Ok(String::new()));
+    let Some(line) = lines.next() else { return Ok(()) };
     let written = line.and_then(|line| writeln!(file, "{line}"));
     written.map_err(FolderError::io(target))
 }

@@ -10,9 +10,12 @@ use crate::scene::Scene;
 pub struct ScenePair {
     /// Position of the references' scene among the scenes.
     pub scene_index: usize,
-    /// The name of the references' scene.
+    /// Position of the queries' scene among the query scenes; without one, the references' scene has the queries.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub query_index: Option<usize>,
+    /// The references' scene in results: its name, which no other scene of the run has.
     pub scene: String,
-    /// The name of the queries' scene.
+    /// The queries' scene in results.
     pub query_scene: String,
     /// The camera of the queries; that of the first query if they differ.
     pub camera: QueryCamera,

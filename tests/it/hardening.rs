@@ -135,7 +135,7 @@ fn an_evaluation_goes_on_once_a_full_or_locked_disk_is_writable_again() {
 }
 
 #[test]
-fn data_that_vanish_end_an_evaluation_with_what_is_done() {
+fn queries_whose_data_vanish_are_localised_once_the_data_are_back() {
     let sequence = SmallSequence::of(&(0..200).collect::<Vec<_>>());
     let line = eval(Path::new("run"));
     let child = background_in(sequence.path(), &line);
@@ -147,12 +147,12 @@ fn data_that_vanish_end_an_evaluation_with_what_is_done() {
     let moved = sequence.path().join("moved");
     fs::rename(sequence.folder(), &moved).expect("is there");
     let said = Said::of(&child.wait_with_output().expect("it ends"));
-    said.fails(3, "sequences/42 ~ No such file");
-    let done = lines(&results);
-    assert!((3..200).contains(&done), "{done}");
+    said.fails(3, "queries were not localised ~ sequences/42 ~ No such file ~ --resume");
+    assert_eq!(lines(&results), 200);
     fs::rename(&moved, sequence.folder()).expect("is there");
     sequence.run(&(line + " --resume")).ok();
-    assert_eq!(lines(&results), 200);
+    sequence.run(&eval(Path::new("whole"))).ok();
+    assert!(sequence.text("run/results.jsonl") == sequence.text("whole/results.jsonl"));
 }
 
 /// A whole recording ends with a footer, and that with its magic and a number.
@@ -178,4 +178,35 @@ fn a_viewer_that_goes_away_costs_nothing_but_what_it_would_have_shown() {
     has(&said.out, "000004 ~ 000005 ~ 000007");
     expect_whole_recording(&sequence.path().join("a.rrd"));
     drop(hanging_up);
+}
+
+#[test]
+fn files_that_are_something_else_are_kept() {
+    let sequence = SmallSequence::write();
+    let line = "run sequences/42 --query 5 --reference 4 --method mi";
+    for file in ["old.json", "old.rrd", "notes.txt", "sequences/42/times.json"] {
+        write(sequence.path().join(file), "0.0\n0.1\n");
+    }
+    refused(
+        sequence.path(),
+        &format!(
+            "
+            2 | {line} --json old.json --save old.rrd --export-matches m | --method fb
+            2 | {line} --save sequences/42/calib.txt | --save sequences/42/calib.txt ~ file of the scene
+            2 | {line} --json sequences/42/times.json | --json sequences/42/times.json ~ file of the scene
+            2 | {line} --events notes.txt | --events notes.txt ~ another kind
+            2 | doctor sequences/42 --picture sequences/42/image_0/000004.png | --picture ~ file of the scene
+            2 | eval sequences/42 --method mi --out r --events sequences/42/times.json | file of the scene
+            2 | eval sequences/42 --method mi --out r --events ./r/x/../e.jsonl | outside the run folder
+            "
+        ),
+    );
+    for file in ["old.json", "old.rrd", "notes.txt", "sequences/42/times.json"] {
+        assert_eq!(sequence.text(file), "0.0\n0.1\n", "{file}");
+    }
+    // Files of ours are replaced.
+    sequence
+        .run(&format!("{line} --json old.json --save old.rrd --events sequences/42/e.jsonl"))
+        .ok();
+    assert!(sequence.text("old.json").starts_with('{'));
 }

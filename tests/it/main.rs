@@ -43,8 +43,10 @@ mod results;
 mod retrieval;
 mod rgbd;
 mod robotcar;
+mod rough_handling;
 mod round_trips;
 mod scene_formats;
+mod scene_identity;
 mod scene_toml;
 mod search_views;
 mod session;
@@ -58,6 +60,7 @@ mod synth;
 mod tour;
 #[path = "../../crates/posescope-core/tests/it/two_walls.rs"]
 mod two_walls;
+mod unreadable;
 mod verdicts;
 mod view;
 #[path = "../../crates/posescope-core/tests/it/walls_scene.rs"]

@@ -168,7 +168,7 @@ pub fn run_text(
 pub fn summarise(py: Python<'_>, folder: PathBuf) -> PyResult<()> {
     let written = detached(py, None, |_| -> Result<(), FolderError> {
         let run = read_run(&folder)?;
-        write_report(&folder, &run, &[], &[], &KnownFailures::default())?;
+        write_report(&folder, &run, &[], &[], &KnownFailures::default())?.1?;
         write_html(&folder, None, PICTURES, None)?;
         Ok(())
     })?;

@@ -24,7 +24,7 @@ const THUMBNAIL: Vec2 = vec2(124.0, 38.0);
 /// The frames around a query, and which of them are its references.
 #[derive(Default)]
 pub struct ReferencesView {
-    /// Frames that could be references, for a query, a radius \[m\] and a scene. Looking for them in a long
+    /// Frames that could be references, for a query, a radius \[m\] and a scene's argument. Looking for them in a long
     /// scene at every frame would be too slow.
     nearby: Memo<(usize, f64, String), Vec<usize>>,
 }
@@ -37,7 +37,7 @@ impl View for ReferencesView {
         ui.separator();
         let setup = context.setup;
         let radius_m = setup.task.reach_m();
-        let key = (setup.query, radius_m, setup.references.name().to_owned());
+        let key = (setup.query, radius_m, setup.task.scene.clone());
         let frames = self.nearby.get(key, || setup.candidates(setup.query));
         // Those that were named may be farther away than the radius.
         let chosen = &setup.chosen.frames;

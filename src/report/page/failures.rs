@@ -106,7 +106,7 @@ fn details(report: &RunReport, one: &ReportedResult) -> Markup {
                         (format!("; the map covers {:.1} % of the photo", 100.0 * cost.coverage_best))
                     }
                 }
-                dt { "Repeat it" } dd { code { (again(&report.run, one)) } }
+                dt { "Repeat it" } dd { code { (repeat_command(&report.run, &one.result)) } }
                 @if let Some(recording) = &one.recording {
                     dt { "Recording" }
                     dd {
@@ -120,11 +120,12 @@ fn details(report: &RunReport, one: &ReportedResult) -> Markup {
     }
 }
 
-/// The command line that repeats the query as in the run.
-fn again(run: &RunFile, one: &ReportedResult) -> String {
-    let result = &one.result;
-    let place = run.pairs.iter().find(|pair| pair.scene == result.scene);
-    let scene = place.and_then(|pair| run.scenes.get(pair.scene_index));
+/// The command line that repeats the query of a result as in the run.
+pub fn repeat_command(run: &RunFile, result: &QueryResult) -> String {
+    let pair = run.pair_of(result);
+    let scene = pair.and_then(|pair| run.scenes.get(pair.scene_index));
+    let query_scene = pair.filter(|pair| pair.query_index.is_some());
+    let query_scene = query_scene.and_then(|pair| run.query_argument(pair)).map(str::to_owned);
     let mut protocol = Protocol {
         methods: vec![result.method],
         fusions: result.fusion.into_iter().collect(),
@@ -133,12 +134,12 @@ fn again(run: &RunFile, one: &ReportedResult) -> String {
         preset: None,
         failure_radius_m: None,
         index: Vec::new(),
+        query_scene: query_scene.into_iter().collect(),
         ..run.protocol.clone()
     };
     if let Some(setting) = result.setting {
         protocol.radii_m = vec![setting.radius_m];
     }
-    protocol.query_scene.truncate(usize::from(result.query_scene.is_some()));
     let task = Task {
         protocol,
         // A run of another version is repeated with the parameters that this one knows.

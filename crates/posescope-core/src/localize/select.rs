@@ -78,6 +78,9 @@ impl fmt::Display for Selection {
     }
 }
 
+/// The most references of a query.
+const MOST: usize = 1000;
+
 impl FromStr for Selection {
     type Err = UnknownWord;
 
@@ -85,12 +88,14 @@ impl FromStr for Selection {
         let read = || {
             let (how, count) = text.split_once(':')?;
             let (_, make) = WAYS.iter().find(|(name, _)| *name == how)?;
-            count.parse().ok().filter(|count| *count > 0).map(make)
+            count.parse().ok().filter(|count| (1..=MOST).contains(count)).map(make)
         };
         read().ok_or_else(|| UnknownWord {
             found: text.to_owned(),
             kind: "choice of references",
-            expected: "random:K, nearest:K, matches:K or retrieve:K with K from 1".to_owned(),
+            expected: format!(
+                "random:K, nearest:K, matches:K or retrieve:K with K from 1 to {MOST}"
+            ),
         })
     }
 }
