@@ -48,8 +48,8 @@ pub fn registered_cost(name: &str) -> Box<dyn Cost> {
 pub fn seen_by(cost: &dyn Cost) -> (Arc<FloatImage>, Arc<ColoredCloud>) {
     let (query, reference) = (PAIR.query(), PAIR.reference());
     let visible = reference.visible_cloud(&Params::default().render);
-    let cloud = visible.colored_by(cost.reference_channel(&reference.photo().gray));
-    (Arc::new(cost.query_channel(&query.photo().gray)), Arc::new(cloud))
+    let cloud = visible.colored_by(cost.reference_channel().of(&reference.photo().gray));
+    (Arc::new(cost.query_channel().of(&query.photo().gray)), Arc::new(cloud))
 }
 
 /// The cameras of the coarse search in a disc of 10 m.

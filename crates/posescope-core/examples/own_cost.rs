@@ -5,9 +5,8 @@ mod walls;
 
 use std::error::Error;
 
-use posescope_core::cost::{IntensityPair, Key, Statistic, key};
+use posescope_core::cost::{IntensityPair, QueryChannel, Statistic};
 use posescope_core::geometry::PoseError;
-use posescope_core::image::{FloatImage, GrayImage, gaussian_smoothed};
 use posescope_core::{
     Cloud, Cost, Direct, Params, Photo, Pose, Problem, Query, ReferenceTuple, Trace, localize_by,
 };
@@ -19,12 +18,8 @@ struct CrossCorrelation;
 
 impl Cost for CrossCorrelation {
     /// It looks at the query slightly smoothed, and at the reference as it is.
-    fn query_channel(&self, photo: &GrayImage) -> FloatImage {
-        gaussian_smoothed(photo, 1.0)
-    }
-
-    fn query_channel_key(&self) -> Key {
-        key("smoothed by 1 px")
+    fn query_channel(&self) -> QueryChannel<'_> {
+        QueryChannel::smoothed(1.0)
     }
 
     /// It looks at each pair.

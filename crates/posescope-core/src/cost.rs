@@ -1,6 +1,6 @@
 //! Costs of the direct methods: how badly a synthetic view fits the query. Lower is better, always.
 //!
-//! A cost says what it wants to see of a photo, a [channel](Cost::query_channel), and compares the
+//! A cost says what it wants to see of a photo, a [channel](QueryChannel), and compares the
 //! query's with the synthetic view's pixel by pixel where the view exists. It knows no pose. What is
 //! too little to judge has no cost, which is not the same as a high one.
 //!
@@ -8,6 +8,7 @@
 //! the same name, reachable from the command line, the window and the recordings: a direct estimator
 //! is a cost with a search.
 
+mod channel;
 mod entry;
 mod information_distance;
 mod joint_histogram;
@@ -20,6 +21,7 @@ use rand::SeedableRng as _;
 use rand::seq::SliceRandom as _;
 use rand_pcg::Pcg64;
 
+pub use channel::{QueryChannel, ReferenceChannel, ValueAt};
 pub use information_distance::InformationDistance;
 pub use joint_histogram::{Entropies, JointHistogram};
 pub use mutual_information::MutualInformation;
@@ -35,9 +37,6 @@ pub(crate) use joint_histogram::{MAX_BYTE_BINS, MIN_ENTROPY};
 pub use joint_histogram::{bin, byte_bin, count_pairs};
 #[doc(hidden)]
 pub use lesser_half::{LesserHalf, LesserHalfFinder};
-
-use crate::image::{FloatImage, GrayImage, cubic_interpolated};
-pub use crate::memo::{Key, key};
 
 /// What the query and the synthetic view show at one covered pixel.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -75,26 +74,12 @@ pub(crate) fn shuffled<T: Copy>(pairs: &[Pair<T>], seed: u64) -> Vec<Pair<T>> {
 
 /// A robust dissimilarity of two images over the pixels they share.
 pub trait Cost: Send + Sync {
-    /// What the cost looks at in the query, each pixel 0 … 255.
-    fn query_channel(&self, photo: &GrayImage) -> FloatImage;
+    /// What the cost looks at in the query.
+    fn query_channel(&self) -> QueryChannel<'_>;
 
-    /// What [`Self::query_channel`] makes: all that it depends on beside the photo.
-    fn query_channel_key(&self) -> Key;
-
-    /// What the cloud is coloured with before views of it are rendered: the value 0 … 255 at a place
-    /// between the pixels of the reference photo \[px\]. Its grey values by cubic convolution, unless
-    /// the cost wants something else.
-    fn reference_channel<'a>(
-        &self,
-        photo: &'a GrayImage,
-    ) -> Box<dyn Fn(f32, f32) -> f32 + Sync + 'a> {
-        Box::new(|x, y| cubic_interpolated(photo, x, y))
-    }
-
-    /// What [`Self::reference_channel`] makes: all that it depends on beside the photo. Costs of equal
-    /// keys share one coloured cloud.
-    fn reference_channel_key(&self) -> Key {
-        key("grey")
+    /// What the cloud is coloured with: grey values, unless the cost wants something else.
+    fn reference_channel(&self) -> ReferenceChannel<'_> {
+        ReferenceChannel::grey()
     }
 
     /// What decides the cost of the covered pixels, and how. What scores the poses, on

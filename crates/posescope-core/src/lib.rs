@@ -100,19 +100,15 @@
 //! | [`Sink`] | another observer |
 //!
 //! ```
-//! use posescope_core::cost::{IntensityPair, Key, Statistic, key};
-//! use posescope_core::image::{FloatImage, GrayImage, gaussian_smoothed};
+//! use posescope_core::cost::{IntensityPair, QueryChannel, Statistic};
 //! use posescope_core::{Cost, Direct, Params};
 //!
 //! /// The mean difference of grey values.
 //! struct MeanDifference;
 //!
 //! impl Cost for MeanDifference {
-//!     fn query_channel(&self, photo: &GrayImage) -> FloatImage {
-//!         gaussian_smoothed(photo, 1.0)
-//!     }
-//!     fn query_channel_key(&self) -> Key {
-//!         key("smoothed by 1 px")
+//!     fn query_channel(&self) -> QueryChannel<'_> {
+//!         QueryChannel::smoothed(1.0)
 //!     }
 //!     fn statistic(&self) -> Statistic<'_> {
 //!         Statistic::of_pairs(|pairs: &[IntensityPair]| {

@@ -47,12 +47,12 @@ fn main() -> Result<(), Box<dyn Error>> {
             let entry = cost::ALL.iter().find(|entry| entry.name == name);
             let entry = entry.ok_or("a registered cost")?;
             let cost = params.costs.of(entry).ok_or("its parameters")?.cost.boxed();
-            let channel = cost.reference_channel(&reference.photo().gray);
+            let channel = cost.reference_channel().of(&reference.photo().gray);
             let visible = reference.visible_cloud(&params.render);
             let colored = visible.colored_by(channel);
             let points = resized(&colored.points, count);
             let cloud = Arc::new(ColoredCloud { points, ..colored });
-            let channel = Arc::new(cost.query_channel(&query.photo().gray));
+            let channel = Arc::new(cost.query_channel().of(&query.photo().gray));
             let scorer = || {
                 let (cloud, channel) = (Arc::clone(&cloud), Arc::clone(&channel));
                 Scorer::new(cloud, channel, query.intrinsics(), 1, cost.as_ref())

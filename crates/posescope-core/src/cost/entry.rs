@@ -2,8 +2,9 @@
 
 use std::fmt;
 
-use super::{ALL, Cost, ExplanationKind, key};
+use super::{ALL, Cost, ExplanationKind};
 use crate::describe::{About, Choice as _, Describe, Field, Place, choice};
+use crate::memo::key;
 
 /// How a direct method finds the pose of least cost.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -3,10 +3,8 @@
 //! Pascoe, Maddern, Tanner, Piniés, Newman, *NID-SLAM: Robust Monocular SLAM using Normalised
 //! Information Distance*, CVPR 2017, equation 3.
 
-use super::{Cost, CostEntry, Entropies, MIN_ENTROPY, Similarity, Statistic};
+use super::{Cost, CostEntry, Entropies, MIN_ENTROPY, QueryChannel, Similarity, Statistic};
 use crate::describe::parameters;
-use crate::image::{FloatImage, GrayImage, gaussian_smoothed};
-use crate::memo::{Key, key};
 
 /// NID among all costs.
 pub(super) const ENTRY: CostEntry = CostEntry {
@@ -29,12 +27,8 @@ parameters! {
 }
 
 impl Cost for InformationDistance {
-    fn query_channel(&self, photo: &GrayImage) -> FloatImage {
-        gaussian_smoothed(photo, self.sigma_px)
-    }
-
-    fn query_channel_key(&self) -> Key {
-        key(("grey", self.sigma_px))
+    fn query_channel(&self) -> QueryChannel<'_> {
+        QueryChannel::smoothed(self.sigma_px)
     }
 
     fn statistic(&self) -> Statistic<'_> {

@@ -1,9 +1,7 @@
 //! 1 − normalised mutual information, the cost of MI (paper, section 2.3).
 
-use super::{Cost, CostEntry, Entropies, Similarity, Statistic};
+use super::{Cost, CostEntry, Entropies, QueryChannel, Similarity, Statistic};
 use crate::describe::parameters;
-use crate::image::{FloatImage, GrayImage, gaussian_smoothed};
-use crate::memo::{Key, key};
 
 /// MI's cost among all costs.
 pub(super) const ENTRY: CostEntry = CostEntry {
@@ -28,12 +26,8 @@ parameters! {
 }
 
 impl Cost for MutualInformation {
-    fn query_channel(&self, photo: &GrayImage) -> FloatImage {
-        gaussian_smoothed(photo, self.sigma_px)
-    }
-
-    fn query_channel_key(&self) -> Key {
-        key(("grey", self.sigma_px))
+    fn query_channel(&self) -> QueryChannel<'_> {
+        QueryChannel::smoothed(self.sigma_px)
     }
 
     fn statistic(&self) -> Statistic<'_> {

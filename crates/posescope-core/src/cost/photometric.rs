@@ -1,9 +1,7 @@
 //! The robust photometric error of PM (paper, appendix B, "direct photometric matching").
 
-use super::{Cost, CostEntry, Power, Statistic};
+use super::{Cost, CostEntry, Power, QueryChannel, Statistic};
 use crate::describe::parameters;
-use crate::image::{FloatImage, GrayImage, gaussian_smoothed};
-use crate::memo::{Key, key};
 
 /// PM's cost among all costs.
 pub(super) const ENTRY: CostEntry = CostEntry {
@@ -27,12 +25,8 @@ parameters! {
 }
 
 impl Cost for Photometric {
-    fn query_channel(&self, photo: &GrayImage) -> FloatImage {
-        gaussian_smoothed(photo, self.sigma_px)
-    }
-
-    fn query_channel_key(&self) -> Key {
-        key(("grey", self.sigma_px))
+    fn query_channel(&self) -> QueryChannel<'_> {
+        QueryChannel::smoothed(self.sigma_px)
     }
 
     fn statistic(&self) -> Statistic<'_> {

@@ -173,10 +173,9 @@ impl Direct {
     pub(super) fn colored(&self, problem: &Problem) -> Recalled<ColoredCloud> {
         let reference = &problem.reference;
         let bytes = |cloud: &ColoredCloud| size_of_val(cloud.points.as_slice());
-        let inputs = (&self.render, self.cost.reference_channel_key());
-        reference.memo.recall(inputs, bytes, || {
-            let value = self.cost.reference_channel(&reference.photo.gray);
-            reference.visible_cloud(&self.render).colored_by(value)
+        let channel = self.cost.reference_channel();
+        reference.memo.recall((&self.render, channel.key), bytes, || {
+            reference.visible_cloud(&self.render).colored_by(channel.of(&reference.photo.gray))
         })
     }
 
@@ -184,12 +183,11 @@ impl Direct {
     pub(super) fn scorer_of(&self, problem: &Problem, cloud: Arc<ColoredCloud>) -> Scorer<'_> {
         let query = &problem.query;
         let bytes = |image: &FloatImage| size_of_val(image.as_raw().as_slice());
-        let channel = query.memo.recall(self.cost.query_channel_key(), bytes, || {
-            self.cost.query_channel(&query.photo.gray)
-        });
+        let channel = self.cost.query_channel();
+        let image = query.memo.recall(channel.key, bytes, || channel.of(&query.photo.gray));
         Scorer::new(
             cloud,
-            channel.value,
+            image.value,
             &query.intrinsics,
             self.render.splat_px,
             self.cost.as_ref(),

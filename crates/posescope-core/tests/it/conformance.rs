@@ -8,7 +8,7 @@ use image::{GrayImage, Luma};
 use nalgebra::Point3;
 use posescope_core::cloud::Cloud;
 use posescope_core::cost::{
-    self, Cost, Entropies, IntensityPair, Key, Photometric, Statistic, key,
+    self, Cost, Entropies, IntensityPair, Photometric, QueryChannel, Statistic,
 };
 use posescope_core::diagnosis::Code;
 use posescope_core::estimator::{self, Family, Outcome};
@@ -19,7 +19,7 @@ use posescope_core::event::{
 use posescope_core::features::FeatureState;
 use posescope_core::geometry::Pose;
 use posescope_core::history::History;
-use posescope_core::image::{FloatImage, gaussian_smoothed};
+use posescope_core::image::gaussian_smoothed;
 use posescope_core::method::Method;
 use posescope_core::params::Params;
 use posescope_core::problem::{Problem, Query, ReferenceTuple};
@@ -86,11 +86,8 @@ pub fn on_many_threads<T: Send>(work: impl FnOnce() -> T + Send) -> T {
 struct Own<F>(F);
 
 impl<F: Fn(&[IntensityPair]) -> Option<f64> + Send + Sync> Cost for Own<F> {
-    fn query_channel(&self, photo: &GrayImage) -> FloatImage {
-        gaussian_smoothed(photo, 0.0)
-    }
-    fn query_channel_key(&self) -> Key {
-        key("grey")
+    fn query_channel(&self) -> QueryChannel<'_> {
+        QueryChannel::smoothed(0.0)
     }
     fn statistic(&self) -> Statistic<'_> {
         Statistic::of_pairs(&self.0)
@@ -127,11 +124,8 @@ fn what_is_scored_at_a_time_is_bounded_and_scored_once() {
 struct ManyBins(usize);
 
 impl Cost for ManyBins {
-    fn query_channel(&self, photo: &GrayImage) -> FloatImage {
-        gaussian_smoothed(photo, 1.0)
-    }
-    fn query_channel_key(&self) -> Key {
-        key("smooth")
+    fn query_channel(&self) -> QueryChannel<'_> {
+        QueryChannel::smoothed(1.0)
     }
     fn statistic(&self) -> Statistic<'_> {
         let cost = Entropies::normalized_mutual_information;
@@ -161,9 +155,9 @@ fn what_the_search_scores_is_what_the_view_shows() {
         (0..9).map(|i| Pose::translation(0.1 * f64::from(i), 0.0, 0.3 * f64::from(i))).collect();
     for cost in registered.chain(many).chain(own) {
         let visible = reference.visible_cloud(&Params::default().render);
-        let cloud = visible.colored_by(cost.reference_channel(&reference.photo().gray));
-        let (cloud, query) =
-            (Arc::new(cloud), Arc::new(cost.query_channel(&problem.query().photo().gray)));
+        let cloud = visible.colored_by(cost.reference_channel().of(&reference.photo().gray));
+        let query = cost.query_channel().of(&problem.query().photo().gray);
+        let (cloud, query) = (Arc::new(cloud), Arc::new(query));
         for splat_px in [1, 3] {
             let (cloud, query) = (Arc::clone(&cloud), Arc::clone(&query));
             let scorer = Scorer::new(cloud, query, &CAMERA, splat_px, cost.as_ref());

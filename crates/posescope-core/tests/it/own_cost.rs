@@ -1,8 +1,7 @@
 //! The ways of a library's user: one call for one query, a cost of one's own.
 
-use posescope_core::cost::{IntensityPair, Key, Statistic, key};
+use posescope_core::cost::{IntensityPair, QueryChannel, Statistic};
 use posescope_core::event::{Stage, StageEnded, ViewRendered};
-use posescope_core::image::{FloatImage, GrayImage, gaussian_smoothed};
 use posescope_core::{
     Cost, Direct, Failure, History, Method, Params, Problem, Trace, estimator, localize,
     localize_by, localize_traced,
@@ -11,36 +10,33 @@ use posescope_core::{
 use crate::conformance::remembering;
 use crate::two_walls::solvable;
 
-/// The mean of some function of each pair.
-struct Mean(fn(&IntensityPair) -> f64);
+/// The mean of some function of each pair, of a smoothed query.
+#[derive(Clone, Copy)]
+struct Mean {
+    of: fn(&IntensityPair) -> f64,
+    sigma_px: f64,
+}
 
 impl Cost for Mean {
-    fn query_channel(&self, photo: &GrayImage) -> FloatImage {
-        gaussian_smoothed(photo, 0.0)
-    }
-
-    fn query_channel_key(&self) -> Key {
-        key("grey")
+    fn query_channel(&self) -> QueryChannel<'_> {
+        QueryChannel::smoothed(self.sigma_px)
     }
 
     fn statistic(&self) -> Statistic<'_> {
         Statistic::of_pairs(|pairs| {
-            let sum: f64 = pairs.iter().map(self.0).sum();
+            let sum: f64 = pairs.iter().map(self.of).sum();
             (!pairs.is_empty()).then(|| sum / pairs.len() as f64)
         })
     }
 }
 
-fn difference(pair: &IntensityPair) -> f64 {
-    f64::from((pair.query - pair.synthetic).abs())
-}
+const DIFFERENCE: Mean =
+    Mean { of: |pair| f64::from((pair.query - pair.synthetic).abs()), sigma_px: 0.0 };
 
-fn brightness(pair: &IntensityPair) -> f64 {
-    f64::from(pair.synthetic)
-}
+const BRIGHTNESS: Mean = Mean { of: |pair| f64::from(pair.synthetic), ..DIFFERENCE };
 
-fn outcome(cost: fn(&IntensityPair) -> f64, problem: &Problem) -> estimator::Outcome {
-    let estimator = Direct::searching("mine", Box::new(Mean(cost)), &Params::default());
+fn outcome(cost: Mean, problem: &Problem) -> estimator::Outcome {
+    let estimator = Direct::searching("mine", Box::new(cost), &Params::default());
     localize_by(&estimator, problem, &mut Trace::off()).expect("nobody cancels")
 }
 
@@ -63,7 +59,7 @@ fn one_call_gives_what_the_estimator_gives() {
 #[test]
 fn a_cost_of_ones_own_is_searched_and_told_like_any_other() {
     let problem = solvable();
-    let estimator = Direct::searching("mine", Box::new(Mean(difference)), &Params::default());
+    let estimator = Direct::searching("mine", Box::new(DIFFERENCE), &Params::default());
     let mut history = History::default();
     let outcome = localize_by(&estimator, &problem, &mut Trace::to(&mut history));
     let pose = outcome.expect("nobody cancels").pose.expect("textured");
@@ -80,7 +76,7 @@ fn a_cost_of_ones_own_is_searched_and_told_like_any_other() {
 fn what_is_remembered_of_one_cost_is_not_taken_for_another_of_the_same_name() {
     let problem = remembering(&solvable());
     for _ in 0..2 {
-        for cost in [difference, brightness] {
+        for cost in [DIFFERENCE, BRIGHTNESS, Mean { sigma_px: 3.0, ..DIFFERENCE }] {
             assert_eq!(outcome(cost, &problem), outcome(cost, &solvable()));
         }
     }
@@ -88,7 +84,7 @@ fn what_is_remembered_of_one_cost_is_not_taken_for_another_of_the_same_name() {
 
 #[test]
 fn a_panic_in_a_cost_is_an_outcome() {
-    let panicking = outcome(|_| panic!("no\nidea"), &solvable());
+    let panicking = outcome(Mean { of: |_| panic!("no\nidea"), ..DIFFERENCE }, &solvable());
     let message = "no idea".to_owned();
     assert_eq!(panicking.pose, Err(Failure::Internal { message }));
 }
