@@ -361,13 +361,13 @@ pub fn entry(method: Method) -> &'static Entry {
     find(method).unwrap_or_else(|| panic!("{method} is in no registry"))
 }
 
-/// Reads the name of a method in a registry, or of another system that was named before.
+/// Reads the name of a method in the registry, or of another system that was declared.
 impl FromStr for Method {
     type Err = UnknownWord;
 
     fn from_str(text: &str) -> Result<Self, UnknownWord> {
         let ours = methods().find(|method| method.name() == text);
-        let found = ours.or_else(|| Method::known(text));
+        let found = ours.or_else(|| Method::declared(text));
         found.ok_or_else(|| UnknownWord::among(text, "method", methods().map(Method::name)))
     }
 }

@@ -7,8 +7,10 @@ use std::sync::{Mutex, PoisonError};
 
 /// A method by its short name, which is the same on the command line, in results and in recordings.
 ///
-/// [`methods`](crate::methods) lists those that this crate has; `"fb2".parse()` reads one. Any other
-/// name is another system's ([`Self::called`]).
+/// There is one way for each origin of a name. A name in the program is a constant ([`Self::named`]). A name
+/// that a user gives to another system is declared once ([`Self::called`]). A name in a file or on the command
+/// line is parsed: those of [`methods`](crate::methods) and the declared ones are known, and any other is an
+/// error.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Method(&'static str);
 
@@ -26,7 +28,7 @@ impl Method {
     /// command.
     pub const PAPER: [Self; 4] = [Self::FB, Self::PM, Self::MI, Self::HY];
 
-    /// The method of a name that a registry gives.
+    /// The method of a name in the program.
     pub const fn named(name: &'static str) -> Self {
         Self(name)
     }
@@ -41,7 +43,7 @@ impl Method {
         if !starts_well || !name.chars().all(is_plain) || name.len() > MAX_NAME {
             return Err(MethodNameError(name.chars().take(MAX_NAME).collect()));
         }
-        if let Some(known) = Self::known(name) {
+        if let Ok(known) = name.parse() {
             return Ok(known);
         }
         let kept: &'static str = Box::leak(name.into());
@@ -50,8 +52,8 @@ impl Method {
         Ok(Self(kept))
     }
 
-    /// The method of a name that [`Self::called`] was given before.
-    pub(crate) fn known(name: &str) -> Option<Self> {
+    /// The method of a name that [`Self::called`] declared.
+    pub(crate) fn declared(name: &str) -> Option<Self> {
         let names = NAMES.lock().unwrap_or_else(PoisonError::into_inner);
         names.get(name).copied().map(Self)
     }
@@ -128,7 +130,12 @@ mod tests {
     fn another_system_goes_by_any_plain_name() {
         let method = Method::called("superglue-2").expect("a plain name");
         assert_eq!(method, Method::named("superglue-2"));
-        assert_eq!(Method::called("mi"), Ok(Method::MI));
+        // A name is kept once, and those of the registry are not kept again.
+        for method in [method, Method::MI, Method::named("robust")] {
+            let read = Method::called(method.name()).expect("a plain name");
+            let known: Method = method.name().parse().expect("a known name");
+            assert!(read == method && std::ptr::eq(read.name(), known.name()), "{method}");
+        }
         assert_eq!(serde_json::from_str::<Method>("\"superglue-2\"").ok(), Some(method));
         let long = "x".repeat(25);
         for wrong in ["", "Mi", "2d", "a b", "a/b", "a@b", "a,b", "é", &long] {
