@@ -1,3 +1,5 @@
+//! For posescope's own crates: may change in any version.
+//!
 //! The pinhole camera.
 
 use nalgebra::{Point2, Point3, Unit, Vector3};

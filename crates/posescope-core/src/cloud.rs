@@ -1,3 +1,5 @@
+//! For posescope's own crates: may change in any version.
+//!
 //! LiDAR clouds.
 
 use nalgebra::Point3;

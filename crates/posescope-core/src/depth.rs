@@ -1,3 +1,5 @@
+//! For posescope's own crates: may change in any version.
+//!
 //! Depth of image positions from the projected cloud (paper, appendix A, "2D-3D correspondences").
 
 use kiddo::{ImmutableKdTree, SquaredEuclidean};

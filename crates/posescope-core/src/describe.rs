@@ -1,3 +1,5 @@
+//! For posescope's own crates: may change in any version.
+//!
 //! How parameters describe themselves: name, unit, range, meaning.
 //!
 //! `parameters!` declares a struct of parameters, which knows nothing of the other structs; [`crate::params`] puts

@@ -1,3 +1,5 @@
+//! For posescope's own crates: may change in any version.
+//!
 //! What a result is worth, and why it is wrong or missing.
 //!
 //! An [`Assessment`] is made once for each result, from its pose, the truth where that is known, and the

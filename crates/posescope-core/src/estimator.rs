@@ -1,3 +1,5 @@
+//! For posescope's own crates: may change in any version.
+//!
 //! The estimators. Each is a straight-line function from a [`Problem`] to an [`Outcome`] that emits
 //! what it does to a [`Trace`].
 //!

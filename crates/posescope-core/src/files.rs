@@ -1,3 +1,5 @@
+//! For posescope's own crates: may change in any version.
+//!
 //! Writing files that are whole or not there.
 
 use std::fs::File;

@@ -1,3 +1,5 @@
+//! For posescope's own crates: may change in any version.
+//!
 //! Answers of other systems: poses of queries, and matches of photos.
 //!
 //! Poses become a method ([`Foreign::with_estimates`]) that runs nothing, and is measured, diagnosed and

@@ -1,3 +1,5 @@
+//! For posescope's own crates: may change in any version.
+//!
 //! Keeps the events of a run.
 
 use crate::event::{DebugEvent, Event};

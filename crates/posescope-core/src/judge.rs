@@ -1,3 +1,5 @@
+//! For posescope's own crates: may change in any version.
+//!
 //! One judge for the poses of all methods: what a pose costs where grey values alone do not say it.
 //!
 //! The cost of MI compares grey values, and light changes them. Two more channels of the same photos hold where grey

@@ -1,3 +1,5 @@
+//! For posescope's own crates: may change in any version.
+//!
 //! Localising queries: choosing references, estimating, fusing, and measuring the outcome against the
 //! ground truth, which no problem and no estimator sees.
 

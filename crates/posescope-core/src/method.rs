@@ -1,3 +1,5 @@
+//! For posescope's own crates: may change in any version.
+//!
 //! The methods that are compared, by their names.
 
 use std::cmp::Ordering;

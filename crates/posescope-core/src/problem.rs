@@ -1,3 +1,5 @@
+//! For posescope's own crates: may change in any version.
+//!
 //! The input of an estimator: one query photo, one reference tuple, and no ground truth.
 
 use std::borrow::Cow;

@@ -1,3 +1,5 @@
+//! For posescope's own crates: may change in any version.
+//!
 //! The values used last, in memory.
 
 use std::borrow::Borrow;

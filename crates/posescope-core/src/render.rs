@@ -1,3 +1,5 @@
+//! For posescope's own crates: may change in any version.
+//!
 //! Synthetic views: the reference cloud, coloured by the reference photo and splatted into a camera
 //! elsewhere (paper, appendix B, "generation of synthetic views").
 

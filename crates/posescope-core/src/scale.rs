@@ -1,3 +1,5 @@
+//! For posescope's own crates: may change in any version.
+//!
 //! How large a scene is, compared with the streets of the paper.
 
 use serde::{Deserialize, Serialize};

@@ -1,3 +1,5 @@
+//! For posescope's own crates: may change in any version.
+//!
 //! Scenes: anything that yields frames (photo, intrinsics, perhaps a pose, perhaps a cloud).
 
 mod degraded;

@@ -1,3 +1,5 @@
+//! For posescope's own crates: may change in any version.
+//!
 //! Searches for the pose of least cost that need no lattice. Each takes what poses cost as a function, and knows nothing
 //! of images.
 //!

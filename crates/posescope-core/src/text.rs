@@ -1,3 +1,5 @@
+//! For posescope's own crates: may change in any version.
+//!
 //! Words on the command line, in files and in tables.
 
 use std::fmt;

@@ -1,3 +1,5 @@
+//! For posescope's own crates: may change in any version.
+//!
 //! The contract between an estimator and its observers.
 //!
 //! An estimator is a straight-line function that emits what it does:

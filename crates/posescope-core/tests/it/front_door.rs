@@ -64,6 +64,24 @@ fn the_public_names_are_those_on_the_list() {
     );
 }
 
+#[test]
+fn a_hidden_module_says_first_that_it_may_change() {
+    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    let lib = fs::read_to_string(source.join("lib.rs")).expect("readable");
+    let hidden = lib.split("#[doc(hidden)]\npub mod ").skip(1);
+    let names: Vec<&str> = hidden.filter_map(|rest| rest.split(';').next()).collect();
+    assert!(names.contains(&"camera"), "{names:?}");
+    for name in names {
+        let module = fs::read_to_string(source.join(format!("{name}.rs"))).expect("readable");
+        let first = module.lines().next();
+        assert_eq!(
+            first,
+            Some("//! For posescope's own crates: may change in any version."),
+            "{name}"
+        );
+    }
+}
+
 /// Notes how many threads a run has.
 #[derive(Default)]
 struct Threads(BTreeSet<usize>);
