@@ -160,7 +160,8 @@
 //!
 //! # What is stable
 //!
-//! The interface is what this documentation shows. Other modules and items are public only for
+//! The interface is what this documentation shows, with the types of [`arrayvec`], of the `image` crate
+//! (here [`image_crate`]), of [`nalgebra`] and of [`rayon`]. Other modules and items are public only for
 //! posescope's own crates, hidden here, and may change in any version.
 
 pub mod cost;
@@ -221,6 +222,8 @@ mod input;
 mod memo;
 mod stats;
 
+pub use ::image as image_crate;
+pub use arrayvec;
 pub use nalgebra;
 pub use rayon;
 

@@ -1,10 +1,10 @@
 //! A small world: two textured walls, seen by two cameras one behind the other.
 
-use image::{GrayImage, Luma};
 use posescope_core::camera::Intrinsics;
 use posescope_core::cloud::Cloud;
 use posescope_core::geometry::Pose;
 use posescope_core::image::Photo;
+use posescope_core::image_crate::{GrayImage, Luma};
 use posescope_core::problem::{Problem, Query, ReferenceTuple};
 
 pub const CAMERA: Intrinsics =
