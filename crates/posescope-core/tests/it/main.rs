@@ -4,7 +4,6 @@ mod conformance;
 mod data;
 mod decisions;
 mod diagnosis;
-mod every_name;
 mod front_door;
 mod memory;
 mod methods;
