@@ -185,13 +185,7 @@ impl Direct {
         let bytes = |image: &FloatImage| size_of_val(image.as_raw().as_slice());
         let channel = self.cost.query_channel();
         let image = query.memo.recall(channel.key, bytes, || channel.of(&query.photo.gray));
-        Scorer::new(
-            cloud,
-            image.value,
-            &query.intrinsics,
-            self.render.splat_px,
-            self.cost.as_ref(),
-        )
+        Scorer::new(cloud, image.value, &query.intrinsics, self.render.splat_px, self.cost.as_ref())
     }
 }
 
