@@ -68,13 +68,22 @@ fn a_lecture_shows_no_cause_and_inspect_shows_it_again() {
 
 #[test]
 fn a_click_on_the_words_of_another_finding_opens_it() {
-    let mut window = grey();
-    send(&mut window, |app| app.app_state_mut().show_outcome(Part::Reference(Method::FB, 0)));
-    let words = "Too few true matches: 0 of 0";
-    assert!(!is_said(&window, words));
-    window.get_by_label("Too few true matches").click();
+    let mut setup = setup();
+    setup.task.params.assign("surf.max_keypoints=5").expect("a parameter");
+    let mut window = finished(setup);
+    let fb = Part::Reference(Method::FB, 0);
+    send(&mut window, move |app| app.app_state_mut().show_outcome(fb));
+    let run = app(&window).run();
+    let result = run.span_of(fb).and_then(|span| span.result.clone()).expect("FB ran");
+    let [_, other, ..] = result.diagnosis.as_slice() else {
+        panic!("one finding: {:?}", result.diagnosis);
+    };
+    assert!(!is_said(&window, &other.text));
+    let title = other.code.title();
+    let title = format!("{}{}", title[..1].to_uppercase(), &title[1..]);
+    window.get_by_label(&title).click();
     window.run_steps(10);
-    assert!(is_said(&window, words));
+    assert!(is_said(&window, &other.text));
 }
 
 #[test]

@@ -24,11 +24,10 @@ use rand_pcg::Pcg64;
 pub use channel::{QueryChannel, ReferenceChannel, ValueAt};
 pub use information_distance::InformationDistance;
 pub use joint_histogram::{Entropies, JointHistogram};
+pub use lesser_half::Power;
 pub use mutual_information::MutualInformation;
 pub use photometric::Photometric;
-pub use statistic::{
-    CostOfPairs, Explanation, ExplanationKind, PhotometricWeights, Power, Statistic,
-};
+pub use statistic::{CostOfPairs, Explanation, ExplanationKind, PhotometricWeights, Statistic};
 
 #[doc(hidden)]
 pub use entry::{CostEntry, CostSetting, CostSettings, RegisteredCost, SearchRule, Similarity};

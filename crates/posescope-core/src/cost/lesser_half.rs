@@ -2,7 +2,14 @@
 
 use fearless_simd::{Level, Simd, SimdBase as _, SimdFloat as _, dispatch, f32x8, i32x8};
 
-use super::Power;
+/// The power of the errors E in a mean.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Power {
+    /// E itself.
+    One,
+    /// E².
+    Two,
+}
 
 /// Number and sum of the errors up to their median.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::lesser_half::{lower_median, mean_of_lesser_half};
+use super::lesser_half::{Power, lower_median, mean_of_lesser_half};
 use super::{Entropies, IntensityPair, JointHistogram};
 
 /// What of the covered pixels decides a cost, and how.
@@ -25,15 +25,6 @@ pub enum Statistic<'a> {
     /// All pairs, in the order of the synthetic view's pixels; `None` where they decide nothing. Such a cost is
     /// the slowest: the threads draw every view the plain way.
     Pairs(CostOfPairs<'a>),
-}
-
-/// The power of the errors E in a mean.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Power {
-    /// E itself.
-    One,
-    /// E².
-    Two,
 }
 
 /// The cost of pairs.
