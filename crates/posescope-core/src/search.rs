@@ -5,13 +5,12 @@
 //!
 //! | file | what |
 //! |---|---|
-//! | [`pattern`] | from a start to the minimum near it, by steps that shrink |
-//! | [`cross_entropy`] | from a start to the deep minimum near it, by samples that gather |
+//! | `pattern` | from a start to the minimum near it, by steps that shrink |
+//! | `cross_entropy` | from a start to the deep minimum near it, by samples that gather |
 //! | `compass` | from a start downhill along axes of any number, for the diagnosis |
 //! | `descent` | from a start downhill by the derivatives of a smooth cost |
 //!
-//! This module is hidden from the docs and may change in any version. The lattices of the paper's search are in
-//! [`grid`](crate::grid).
+//! The lattices of the paper's search are in [`grid`](crate::grid).
 
 pub(crate) mod compass;
 pub mod cross_entropy;
