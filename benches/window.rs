@@ -194,6 +194,7 @@ impl ManyResults {
         let camera = scene.intrinsics(0);
         let pair = ScenePair {
             scene_index: 0,
+            query_index: None,
             scene: scene.name().to_owned(),
             query_scene: scene.name().to_owned(),
             camera: camera.into(),

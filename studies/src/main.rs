@@ -1,5 +1,6 @@
 //! The studies behind the published numbers: `cargo run -p posescope-studies -- STUDY`.
 
+mod answered;
 mod believed;
 mod calibration;
 mod cases;
@@ -34,6 +35,7 @@ enum Study {
     Methods(methods::Options),
     Fusions(fusions::Options),
     Planted(planted::Options),
+    Answered(answered::Options),
     Believed(believed::Options),
     Calibration(calibration::Options),
     Scenes(scene_statistics::Options),
@@ -50,6 +52,7 @@ fn main() -> ExitCode {
         Study::Methods(options) => methods::run(&options),
         Study::Fusions(options) => fusions::run(&options),
         Study::Planted(options) => planted::run(&options),
+        Study::Answered(options) => answered::run(&options),
         Study::Believed(options) => believed::run(&options),
         Study::Calibration(options) => calibration::run(&options),
         Study::Scenes(options) => scene_statistics::run(&options),

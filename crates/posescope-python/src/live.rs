@@ -148,8 +148,10 @@ pub fn run_text(
             ..Protocol::default().at_size(&size)
         },
         inputs: BTreeMap::new(),
+        paths: BTreeMap::new(),
         pairs: vec![ScenePair {
             scene_index: 0,
+            query_index: Some(0),
             scene: scene.opened.scene.name().to_owned(),
             query_scene: query_scene.to_owned(),
             camera: QueryCamera::from(camera.intrinsics),
