@@ -331,7 +331,7 @@ fn nothing_is_said_of_matches_that_were_never_sought() {
     let params = with(&["surf.threshold=1000000"]);
     let found = verdicts(&problem, Method::FB, &params, Some(&truth(&problem)));
     assert_eq!(codes(&found), [Code::R2], "{found:?}");
-    // Where the ratio test leaves none, that is said, and nothing of their depths.
+    // The ratio test leaves no match: R3 says so, and R4 does not speak of depths.
     let found = verdicts(&problem, Method::FB, &with(&["fb.ratio=0.1"]), Some(&truth(&problem)));
     assert_eq!(primary(&found), Some(Code::R3), "{found:?}");
     assert!(!codes(&found).contains(&Code::R4), "{found:?}");
