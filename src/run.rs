@@ -4,7 +4,7 @@
 mod arguments;
 mod draw;
 mod estimates_file;
-mod execute;
+mod evaluate;
 mod inputs;
 mod limit;
 mod preset;
@@ -14,13 +14,14 @@ mod run_file;
 mod run_folder;
 mod scene_pair;
 mod scene_paths;
+mod scenes;
 mod sweep;
 
 #[cfg(feature = "cli")]
 pub use arguments::{degradations, method, positive, probability};
 pub use draw::{Draw, DrawError};
 pub use estimates_file::EstimatesFile;
-pub use execute::{Execution, FailedQuery, RunError, RunObserver, Scenes};
+pub use evaluate::{Execution, FailedQuery, RunError, RunObserver};
 pub use inputs::{content, inputs};
 pub use limit::Limit;
 pub use preset::{Preset, default_failure_radius_m};
@@ -33,4 +34,5 @@ pub use run_folder::{
 };
 pub use scene_pair::{QueryCamera, ScenePair, is_called};
 pub use scene_paths::{is_same, labels};
+pub use scenes::Scenes;
 pub use sweep::{Sweep, SweepError};
