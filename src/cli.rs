@@ -7,11 +7,7 @@ mod defaults;
 mod demo;
 mod doctor;
 mod eval;
-mod event_export;
 mod failure;
-mod failures;
-mod host;
-mod hosted;
 mod index;
 mod interrupt;
 mod lesson;
@@ -46,9 +42,8 @@ use args::{Arguments, Command, Everywhere};
 use failure::CliError;
 use stderr::tell;
 
+pub use compute::{Compute, ComputeError, with as with_compute};
 pub use doctor::report as examination_in_words;
-pub use host::Host;
-pub use hosted::{CommandError, evaluate};
 
 /// Parses the arguments, of which the first is the program's name, runs the command and prints an error in one
 /// line. Returns the exit code.

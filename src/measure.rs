@@ -41,7 +41,7 @@ pub use paper::scene as paper_scene;
 #[cfg(feature = "cli")]
 pub use plots::Plot;
 #[cfg(feature = "cli")]
-pub use report::{Report, SUMMARY_SCHEMA, StoredSummary, plain, write_report};
+pub use report::{Report, SUMMARY_SCHEMA, StoredSummary, plain};
 pub use results::{RunResults, read_rows};
 #[cfg(feature = "cli")]
 pub use sweep::{SweptRun, write_sweep};

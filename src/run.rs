@@ -2,13 +2,20 @@
 
 #[cfg(feature = "cli")]
 mod arguments;
+mod config;
 mod draw;
 mod estimates_file;
 mod evaluate;
 mod inputs;
+#[cfg(feature = "rerun")]
+mod judge;
 mod limit;
+mod outputs;
+mod plan;
 mod preset;
 mod protocol;
+#[cfg(feature = "rerun")]
+mod publish;
 mod reference;
 mod run_file;
 mod run_folder;
@@ -19,13 +26,20 @@ mod sweep;
 
 #[cfg(feature = "cli")]
 pub use arguments::{degradations, method, positive, probability};
+pub use config::{ConfigError, with_config};
 pub use draw::{Draw, DrawError};
 pub use estimates_file::EstimatesFile;
-pub use evaluate::{Execution, FailedQuery, RunError, RunObserver};
+pub use evaluate::{Evaluation, FailedQuery, RunError, RunObserver};
 pub use inputs::{content, inputs};
+#[cfg(feature = "rerun")]
+pub use judge::{Judgement, examine};
 pub use limit::Limit;
+pub use outputs::{JSON_LINES, OutputError, refuse_in_folder, refuse_to_replace};
+pub use plan::{EvaluationRequest, Judging, Plan, PlanError, Refusal, failed_queries};
 pub use preset::{Preset, default_failure_radius_m};
 pub use protocol::{Protocol, ProtocolError, defaults, known};
+#[cfg(feature = "rerun")]
+pub use publish::{append_step_summary, publish, step_summary};
 pub use reference::Reference;
 pub use run_file::{RUN_SCHEMA, RunFile, RunItem, Shard};
 pub use run_folder::{

@@ -3,5 +3,9 @@
 mod events;
 #[cfg(feature = "rerun")]
 pub mod rerun;
+#[cfg(feature = "rerun")]
+mod run_records;
 
-pub use events::{SceneNames, write_event};
+pub use events::{EventExport, SceneNames, write_event};
+#[cfg(feature = "rerun")]
+pub use run_records::{Follower, KEPT_FAILURES, RunRecords, merge_failures};

@@ -15,8 +15,9 @@ use std::path::PathBuf;
 
 use clap::{ArgAction, Args, CommandFactory as _, Parser, Subcommand, ValueEnum as _};
 use posescope::params::Params;
+use posescope::run::{ConfigError, with_config};
 
-pub use eval::{EvalArgs, EvalCommand, JudgingArgs};
+pub use eval::{EvalArgs, EvalCommand, MergeArgs};
 pub use given::Given;
 pub use lesson::LessonArgs;
 pub use look::{CompareArgs, Form, ResultsArgs};
@@ -28,7 +29,6 @@ pub use task::ViewArgs;
 pub use task::{RunArgs, TaskArgs};
 
 use super::compute::Compute;
-use super::failure::CliError;
 
 /// See why a camera pose estimate fails.
 #[derive(Debug, Parser)]
@@ -175,25 +175,13 @@ pub struct ConfigArgs {
 
 impl ConfigArgs {
     /// The parameters that the arguments describe.
-    pub fn resolve(&self) -> Result<Params, CliError> {
+    pub fn resolve(&self) -> Result<Params, ConfigError> {
         self.over(Params::default())
     }
 
     /// These parameters with the changes of the arguments.
-    pub fn over(&self, mut params: Params) -> Result<Params, CliError> {
-        if let Some(path) = &self.config {
-            let text = match path.to_str() {
-                Some("paper") => include_str!("../../assets/paper.toml").to_owned(),
-                _ => std::fs::read_to_string(path).map_err(CliError::io(path))?,
-            };
-            params
-                .merge_toml(&text)
-                .map_err(|source| CliError::Config { path: path.clone(), source })?;
-        }
-        for assignment in &self.assignments {
-            params.assign(assignment)?;
-        }
-        Ok(params)
+    pub fn over(&self, params: Params) -> Result<Params, ConfigError> {
+        with_config(params, self.config.as_deref(), &self.assignments)
     }
 }
 

@@ -2,6 +2,7 @@
 
 use posescope::doctor::{Agreement, Examination, Remark, examine};
 use posescope::measure::paper_scene;
+use posescope::run::refuse_to_replace;
 use posescope::scene::{self, Scene};
 use posescope::sink::rerun::{Targets, record_checkup};
 use posescope::table::wrapped;
@@ -41,7 +42,7 @@ fn examine_scene(
         [("--picture", &args.picture, "png"), ("--save", &args.save, "rrd")]
     {
         if let Some(path) = path {
-            output::refuse_to_replace(option, path, &[extension], &[argument])?;
+            refuse_to_replace(option, path, &[extension], [argument])?;
         }
     }
     let found = examine(scene.as_ref())?;

@@ -4,15 +4,17 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use image::ImageError;
-use posescope::describe::ParamError;
 use posescope::lesson::{LessonError, SettingError};
 use posescope::localize::{ChoiceError, Selection};
-use posescope::run::{DrawError, FolderError, ProtocolError, RunError};
+use posescope::run::{
+    ConfigError, DrawError, FolderError, OutputError, PlanError, ProtocolError, Refusal, RunError,
+};
 use posescope::scene::{NoIndex, SceneError, is_decoding};
 use posescope::session::JobError;
 use posescope::sink::rerun::RecordError;
 use posescope::trace::Cancelled;
 
+use super::compute::ComputeError;
 use super::stderr::tell;
 
 pub const DONE: u8 = 0;
@@ -45,13 +47,15 @@ pub enum CliError {
     #[error(transparent)]
     Arguments(#[from] clap::Error),
     #[error(transparent)]
-    Param(#[from] ParamError),
+    Config(#[from] ConfigError),
+    #[error(transparent)]
+    Output(#[from] OutputError),
+    #[error(transparent)]
+    Refused(#[from] Refusal),
     #[error(transparent)]
     Protocol(#[from] ProtocolError),
     #[error("{0}{hint}", hint = about_choosing(.0))]
     Scene(#[from] SceneError),
-    #[error("{}: {source}", .path.display())]
-    Config { path: PathBuf, source: ParamError },
     #[error("{}: {source}", .path.display())]
     Io { path: PathBuf, source: io::Error },
     #[error(transparent)]
@@ -70,14 +74,8 @@ pub enum CliError {
     Lesson(#[from] LessonError),
     #[error(transparent)]
     LessonSetting(#[from] SettingError),
-    #[cfg(feature = "gpu")]
     #[error(transparent)]
-    Gpu(#[from] posescope_gpu::GpuError),
-    #[cfg(not(feature = "gpu"))]
-    #[error(
-        "--compute gpu needs a posescope that is built with the feature `gpu`; use --compute cpu"
-    )]
-    NoGpu,
+    Gpu(#[from] ComputeError),
     /// A gate or a comparison failed.
     #[error("{0}")]
     NotGoodEnough(String),
@@ -117,7 +115,9 @@ impl CliError {
             Self::NotGoodEnough(_) => NOT_GOOD_ENOUGH,
             Self::Usage(_)
             | Self::Arguments(_)
-            | Self::Param(_)
+            | Self::Config(ConfigError::Param(_))
+            | Self::Output(_)
+            | Self::Refused(_)
             | Self::Protocol(_)
             | Self::Index(NoIndex::NoFolder)
             | Self::Choice(ChoiceError::UnknownPosition { .. } | ChoiceError::NoIndex)
@@ -127,14 +127,11 @@ impl CliError {
             )
             | Self::Lesson(LessonError::Unknown { .. })
             | Self::Scene(SceneError::UnknownFormat { .. }) => USAGE,
-            #[cfg(feature = "gpu")]
             Self::Gpu(_) => NO_GPU,
-            #[cfg(not(feature = "gpu"))]
-            Self::NoGpu => NO_GPU,
             Self::Interrupted(_) => INTERRUPTED,
             // What the arguments name is missing, unusable, or cannot be written.
             Self::Scene(_)
-            | Self::Config { .. }
+            | Self::Config(_)
             | Self::Io { .. }
             | Self::Index(_)
             | Self::Choice(_)
@@ -156,6 +153,21 @@ impl From<RunError> for CliError {
             RunError::Choice(error) => error.into(),
             RunError::Cancelled(cancelled) => Self::Stopped(cancelled),
             RunError::Folder(error) => error.into(),
+        }
+    }
+}
+
+impl From<PlanError> for CliError {
+    fn from(error: PlanError) -> Self {
+        match error {
+            PlanError::Protocol(error) => error.into(),
+            PlanError::Config(error) => error.into(),
+            PlanError::Scene(error) => error.into(),
+            PlanError::Draw(error) => error.into(),
+            PlanError::Folder(error) => error.into(),
+            PlanError::Index(error) => error.into(),
+            PlanError::Output(error) => error.into(),
+            PlanError::Refused(error) => error.into(),
         }
     }
 }

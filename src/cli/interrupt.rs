@@ -18,7 +18,7 @@ pub struct Interrupt {
 impl Interrupt {
     /// Handles Ctrl-C from now on. If the system refuses the handler, Ctrl-C kills the process as usual.
     pub fn listen() -> Self {
-        let Self { raised, attention } = Self::silent();
+        let [raised, attention] = [(); 2].map(|()| Arc::new(AtomicBool::new(false)));
         let heard = flag::register_conditional_default(SIGINT, Arc::clone(&raised))
             .and_then(|_| flag::register(SIGINT, Arc::clone(&raised)))
             .and_then(|_| flag::register(SIGINT, Arc::clone(&attention)));
@@ -26,18 +26,6 @@ impl Interrupt {
             log::info!("Ctrl-C kills the process: {error}");
         }
         Self { raised, attention }
-    }
-
-    /// Hears no signal: only [`Self::raise`] raises it.
-    pub fn silent() -> Self {
-        let [raised, attention] = [(); 2].map(|()| Arc::new(AtomicBool::new(false)));
-        Self { raised, attention }
-    }
-
-    /// What Ctrl-C does.
-    pub fn raise(&self) {
-        self.raised.store(true, Ordering::Relaxed);
-        self.attention.store(true, Ordering::Relaxed);
     }
 
     pub fn is_raised(&self) -> bool {

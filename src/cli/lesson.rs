@@ -15,6 +15,7 @@ use posescope::table::Table;
 use super::args::LessonArgs;
 use super::defaults;
 use super::failure::CliError;
+use super::interrupt::Interrupt;
 use super::observer::CliObserver;
 use super::output;
 use super::stderr::tell;
@@ -76,7 +77,7 @@ fn save_instead(
 
 /// Localises the settings of the pages one after the other, and records runs and pages.
 fn save(lesson: &Lesson, path: &Path, terminal: &Terminal) -> Result<(), CliError> {
-    let interrupt = terminal.interrupt();
+    let interrupt = Interrupt::listen();
     let groups = lesson.groups();
     let mut scenes: BTreeMap<String, Arc<dyn Scene>> = BTreeMap::new();
     let mut jobs: Vec<Job> = Vec::new();

@@ -11,10 +11,10 @@ use posescope::localize::{LocalizeObserver, QueryResult, StageTimes};
 use posescope::method::Method;
 use posescope::problem::Problem;
 use posescope::session::{Explaining, StopAtBreakpoint};
+use posescope::sink::EventExport;
 use posescope::sink::rerun::Recorder;
 use posescope::trace::{Cancelled, Record, Sink};
 
-use super::event_export::EventExport;
 use super::interrupt::Interrupt;
 use super::match_export::MatchExport;
 use super::stderr::tell;

@@ -52,42 +52,6 @@ fn print_to(writer: &mut dyn Write, text: &dyn Display, path: &Path) -> Result<(
     })
 }
 
-/// Refuses to write to a file that is something else: an existing one with another extension than these, or one that
-/// belongs to a scene.
-///
-/// # Errors
-/// A usage error that names the option.
-pub fn refuse_to_replace(
-    option: &str,
-    path: &Path,
-    extensions: &[&str],
-    scenes: &[&str],
-) -> Result<(), CliError> {
-    // Devices and pipes are no files.
-    if !path.is_file() {
-        return Ok(());
-    }
-    let extension = path.extension().unwrap_or_default();
-    let is_ours = extensions.iter().any(|ours| extension.eq_ignore_ascii_case(ours));
-    let whole = path.canonicalize().map_err(CliError::io(path))?;
-    let folders = scenes.iter().filter_map(|scene| Path::new(scene).canonicalize().ok());
-    let folders = folders.map(|scene| match scene.parent() {
-        Some(folder) if scene.is_file() => folder.to_owned(),
-        _ => scene,
-    });
-    // No scene has recordings.
-    let is_data = !extension.eq_ignore_ascii_case("rrd")
-        && folders.into_iter().any(|folder| whole.starts_with(folder));
-    if is_ours && !is_data {
-        return Ok(());
-    }
-    let why = if is_data { "is a file of the scene" } else { "is another kind of file" };
-    Err(CliError::Usage(format!(
-        "{option} {}: the file exists and {why}; name another, or remove it first",
-        path.display()
-    )))
-}
-
 /// Whether `-` was given.
 pub fn is_stdout(path: &Path) -> bool {
     path == Path::new("-")

@@ -8,14 +8,15 @@ use posescope::localize::{
     ChoiceError, Chooser, Localizer, QueryResult, Ranking, References, Request, Selection,
 };
 use posescope::method::Method;
+use posescope::run::{JSON_LINES, refuse_to_replace};
 use posescope::scene::{Retriever, Scene, frame_range};
 use posescope::session::{Breakpoints, StopAtBreakpoint, Task};
-use posescope::sink::SceneNames;
 use posescope::sink::rerun::{Identity, Recorder, Targets};
+use posescope::sink::{EventExport, SceneNames};
 
 use super::args::RunArgs;
-use super::event_export::EventExport;
 use super::failure::CliError;
+use super::interrupt::Interrupt;
 use super::match_export::MatchExport;
 use super::observer::CliObserver;
 use super::opened::{self, OpenedTask};
@@ -35,9 +36,6 @@ struct Plan<'a> {
 /// One query, as its position in its scene, with its references.
 type PlannedQuery = (usize, References);
 
-/// The extensions of files with JSON lines.
-pub const JSON_LINES: [&str; 2] = ["json", "jsonl"];
-
 pub fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), CliError> {
     let OpenedTask { task, scenes, queries: wanted, size } =
         opened::open(&args.task, &args.scene, &args.query)?;
@@ -54,7 +52,7 @@ pub fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), CliError> {
     let plan = Plan { args, task: &task, localizer: task.protocol.configured(localizer)? };
     plan.check_outputs()?;
     let wanted = if args.all { (0..queries.frames().len()).collect() } else { wanted };
-    let interrupt = terminal.interrupt();
+    let interrupt = Interrupt::listen();
     let has_index = matches!(task.protocol.selection(), Selection::Retrieved(_));
     let mut observer = CliObserver::new(terminal.bar(0), interrupt.clone());
     observer.index_for = Some(args.scene.clone()).filter(|_| !has_index && !terminal.is_quiet);
@@ -202,7 +200,7 @@ impl Plan<'_> {
         ];
         for (option, path, extensions) in files {
             if let Some(path) = path {
-                output::refuse_to_replace(option, path, extensions, &scenes)?;
+                refuse_to_replace(option, path, extensions, scenes.iter().copied())?;
             }
         }
         if self.args.export_matches.is_none() {

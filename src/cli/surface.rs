@@ -15,6 +15,7 @@ use posescope::method::Method;
 use posescope::picture;
 use posescope::problem::Problem;
 use posescope::render::Scorer;
+use posescope::run::refuse_to_replace;
 
 use super::args::RunArgs;
 use super::failure::CliError;
@@ -27,7 +28,7 @@ const CELL_PX: u32 = 3;
 
 pub fn surface(args: &RunArgs, out: &Path, terminal: &Terminal) -> Result<(), CliError> {
     let is_table = is_table(out)?;
-    output::refuse_to_replace("--surface", out, &["png", "csv"], &[&args.scene])?;
+    refuse_to_replace("--surface", out, &["png", "csv"], [args.scene.as_str()])?;
     let OpenedTask { task, scenes, queries, .. } =
         opened::open(&args.task, &args.scene, &args.query)?;
     let method = method(args.task.protocol.has("methods"), &task.protocol.methods)?;

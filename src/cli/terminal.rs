@@ -8,16 +8,12 @@ use indicatif_log_bridge::LogWrapper;
 use log::{Level, LevelFilter};
 
 use super::args::Everywhere;
-use super::host::Host;
-use super::interrupt::Interrupt;
 use super::stderr::{plain, tell};
 
 pub struct Terminal {
     bars: MultiProgress,
     /// Whether only errors and requested results are printed.
     pub is_quiet: bool,
-    /// The program that runs the command within itself.
-    host: Option<Host>,
 }
 
 impl Terminal {
@@ -55,17 +51,7 @@ impl Terminal {
         if LogWrapper::new(bars.clone(), logger).try_init().is_ok() {
             log::set_max_level(level);
         }
-        Self { bars, is_quiet: everywhere.quiet, host: None }
-    }
-
-    /// Prints nothing: another program runs the command.
-    pub fn hosted(host: Host) -> Self {
-        Self { bars: MultiProgress::new(), is_quiet: true, host: Some(host) }
-    }
-
-    /// What stops the command: Ctrl-C, or the program that runs it.
-    pub fn interrupt(&self) -> Interrupt {
-        self.host.as_ref().map_or_else(Interrupt::listen, |host| host.interrupt.clone())
+        Self { bars, is_quiet: everywhere.quiet }
     }
 
     /// Prints a message on stderr unless `--quiet` is given.
@@ -88,10 +74,6 @@ impl Terminal {
 
     /// A progress bar over `steps` steps, hidden if stderr is not a terminal.
     pub fn bar(&self, steps: u64) -> ProgressBar {
-        if let Some(host) = &self.host {
-            host.bar.set_length(steps);
-            return host.bar.clone();
-        }
         if self.is_quiet {
             return ProgressBar::hidden();
         }

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use posescope::app::{self, KnownResults, Results, Setup, WindowError};
 use posescope::localize::QueryResult;
 use posescope::measure::StoredSummary;
-use posescope::run::{ScenePair, read_run, results_of_pair};
+use posescope::run::{ConfigError, ScenePair, read_run, results_of_pair};
 use posescope::scene::Scene;
 use posescope::session::{IndexFile, Job, RunMode, Task, TaskScenes};
 
@@ -168,7 +168,7 @@ fn of_a_run(args: &ViewArgs, folder: &Path) -> Result<(Setup, KnownResults), Cli
     let (references, queries) = (scenes.references.as_ref(), scenes.queries.as_ref());
     let params = file
         .params()
-        .map_err(|source| CliError::Config { path: folder.join("run.toml"), source })?;
+        .map_err(|source| ConfigError::File { path: folder.join("run.toml"), source })?;
     task.params = args.task.config.over(params)?;
     let results_of = |folder: &Path| -> Result<Results, CliError> {
         let mut results = results_of(folder, pair, queries)?;

@@ -1,9 +1,9 @@
-//! The reports of a finished run: `summary.json` and `junit.xml`. But for what `posescope doctor` says of the scenes, both
-//! are derived from `run.toml` and `results.jsonl`.
+//! The figures of a finished run, in `summary.json` and `junit.xml`. But for what `posescope doctor` says of the scenes,
+//! both are derived from `run.toml` and `results.jsonl`.
 
 use std::collections::BTreeSet;
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
@@ -12,7 +12,7 @@ use super::findings::{Finding, failing_scenes, findings};
 use super::gate::{Gate, GateResult};
 use super::known::{KnownFailures, KnownReport};
 use super::metrics::{Measures, measure};
-use super::results::{RunResults, read_rows};
+use super::results::RunResults;
 use super::tables::{brief, tables};
 use super::{junit, timings};
 use crate::diagnosis::Code;
@@ -30,8 +30,8 @@ const SUMMARY: &str = "summary.json";
 /// The figures of a run.
 #[derive(Clone, Debug)]
 pub struct Report {
-    /// The figures by group and method.
-    pub measures: Vec<Measures>,
+    /// The results with their figures.
+    pub results: RunResults,
     /// The mistakes of whole scenes.
     pub findings: Vec<Finding>,
     /// The outcomes of the gates.
@@ -42,6 +42,11 @@ pub struct Report {
     pub tables: Vec<Table>,
     /// How many queries have files that cannot be read, and the first such file; `None` if there are none.
     pub unread: Option<String>,
+    /// The time of each result \[s\].
+    times: Vec<Option<f64>>,
+    /// What `posescope doctor` says of the scenes.
+    doctor: Vec<Finding>,
+    known_failures: KnownFailures,
 }
 
 /// The most rows of a list on the page of a CI job.
@@ -58,7 +63,7 @@ impl Report {
             text += &format!("**{}**\n\n", plain(&finding.text));
         }
         let verdicts = self.tables.iter().find(|table| table.name == "verdicts");
-        for mut table in brief(&self.measures).into_iter().chain(verdicts.cloned()) {
+        for mut table in brief(&self.results.measures).into_iter().chain(verdicts.cloned()) {
             table.rows.truncate(2 * ROWS);
             for row in &mut table.rows {
                 row[0] = plain(&row[0]);
@@ -69,8 +74,8 @@ impl Report {
         let differences = since.iter().flat_map(|since| &since.differences);
         let broken = differences.filter(|one| one.change == Change::Broken);
         lines.extend(broken.map(|one| {
-            let worth = |row: &QueryResult| row.grade.words(row.error.as_ref());
-            let (before, after) = (worth(&one.before), worth(&one.after));
+            let [before, after] =
+                [&one.before, &one.after].map(|row| row.grade.words(row.error.as_ref()));
             let query = &one.before.query;
             format!("broken: {query} {}, {before} → {after}", one.before.method)
         }));
@@ -137,62 +142,91 @@ impl StoredSummary {
             message: json_message(&error),
         })
     }
+
+    /// What `posescope doctor` says in the summaries of parts of a run, once each.
+    ///
+    /// # Errors
+    /// A summary that cannot be read.
+    pub fn examined_in(parts: &[PathBuf]) -> Result<Vec<Finding>, FolderError> {
+        let mut examined: Vec<Finding> = Vec::new();
+        for part in parts {
+            let said = Self::read(part)?.doctor.into_iter();
+            examined.extend(said.filter(|one| !examined.contains(one)).collect::<Vec<_>>());
+        }
+        Ok(examined)
+    }
 }
 
-/// Measures a run and writes its reports. `examined` is what `posescope doctor` says of its scenes. Also returns
-/// whether all files were written: one that cannot be written keeps no other from being tried.
-///
-/// # Errors
-/// A result that cannot be read.
-pub fn write_report(
-    folder: &Path,
-    run: &RunFile,
-    examined: &[Finding],
-    gates: &[Gate],
-    known: &KnownFailures,
-) -> Result<(Report, Result<(), FolderError>), FolderError> {
-    let rows = read_rows(folder)?;
-    let times = timings::read(folder, &rows)?;
-    let timed = rows.iter().zip(times.iter().copied());
-    let measured = |timed: Vec<(&QueryResult, Option<f64>)>| {
-        let mut measures = measure(timed.iter().map(|one| one.0), run.failure_radius_m());
-        timings::add_medians(&mut measures, timed.into_iter());
-        measures
-    };
-    let measures = measured(timed.clone().collect());
-    let gated = measured(timed.filter(|(row, _)| !known.has(row)).collect());
-    let gate_results: Vec<GateResult> = gates.iter().map(|gate| gate.check(&gated)).collect();
-    let known_report = known.report(&rows);
-    let of_run: Vec<&QueryResult> = rows.iter().collect();
-    let findings = findings(&of_run, examined);
-    let failing = failing_scenes(&of_run);
-    let is_kept = |one: &&Finding| run.shard.is_some() || failing.contains(&one.of);
-    let doctor: Vec<Finding> = examined.iter().filter(is_kept).cloned().collect();
-    let summary = Summary {
-        schema: SUMMARY_SCHEMA,
-        failure_radius_m: run.failure_radius_m(),
-        groups: &measures,
-        gates: &gate_results,
-        findings: &findings,
-        doctor: &doctor,
-    };
-    let json = serde_json::to_vec_pretty(&summary);
-    let json = json.map_err(|error| FolderError::io(folder)(error.into()));
-    let summarised = json.and_then(|json| write(&folder.join(SUMMARY), &json));
-    let xml = junit::junit(&rows, &times, &gate_results, known);
-    let path = folder.join("junit.xml");
-    let xml = xml.map_err(|error| FolderError::io(&path)(std::io::Error::other(error)));
-    let written = summarised.and(xml.and_then(|xml| write(&path, xml.as_bytes())));
-    let results = RunResults { results: rows, measures, failure_radius_m: run.failure_radius_m() };
-    let report = Report {
-        tables: tables(&results, run.protocol.preset.map(|one| one.name())),
-        unread: unread(&results.results),
-        measures: results.measures,
-        findings,
-        gate_results,
-        known: known_report,
-    };
-    Ok((report, written))
+impl Report {
+    /// Measures the results of a run. `examined` is what `posescope doctor` says of its scenes.
+    ///
+    /// # Errors
+    /// Timings that cannot be read.
+    pub fn of(
+        folder: &Path,
+        run: &RunFile,
+        rows: Vec<QueryResult>,
+        examined: &[Finding],
+        gates: &[Gate],
+        known: &KnownFailures,
+    ) -> Result<Self, FolderError> {
+        let times = timings::read(folder, &rows)?;
+        let failure_radius_m = run.failure_radius_m();
+        let timed = rows.iter().zip(times.iter().copied());
+        let measured = |timed: Vec<(&QueryResult, Option<f64>)>| {
+            let mut measures = measure(timed.iter().map(|one| one.0), failure_radius_m);
+            timings::add_medians(&mut measures, timed.into_iter());
+            measures
+        };
+        let measures = measured(timed.clone().collect());
+        let gated = measured(timed.filter(|(row, _)| !known.has(row)).collect());
+        let of_run: Vec<&QueryResult> = rows.iter().collect();
+        let failing = failing_scenes(&of_run);
+        let is_kept = |one: &&Finding| run.shard.is_some() || failing.contains(&one.of);
+        let findings = findings(&of_run, examined);
+        let results = RunResults { results: rows, measures, failure_radius_m };
+        Ok(Self {
+            findings,
+            gate_results: gates.iter().map(|gate| gate.check(&gated)).collect(),
+            known: known.report(&results.results),
+            tables: tables(&results, run.protocol.preset.map(|one| one.name())),
+            unread: unread(&results.results),
+            doctor: examined.iter().filter(is_kept).cloned().collect(),
+            known_failures: known.clone(),
+            results,
+            times,
+        })
+    }
+
+    /// Writes `summary.json`.
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    pub fn write_summary(&self, folder: &Path) -> Result<(), FolderError> {
+        let summary = Summary {
+            schema: SUMMARY_SCHEMA,
+            failure_radius_m: self.results.failure_radius_m,
+            groups: &self.results.measures,
+            gates: &self.gate_results,
+            findings: &self.findings,
+            doctor: &self.doctor,
+        };
+        let json = serde_json::to_vec_pretty(&summary);
+        let json = json.map_err(|error| FolderError::io(folder)(error.into()))?;
+        write(&folder.join(SUMMARY), &json)
+    }
+
+    /// Writes `junit.xml`.
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    pub fn write_junit(&self, folder: &Path) -> Result<(), FolderError> {
+        let rows = &self.results.results;
+        let xml = junit::junit(rows, &self.times, &self.gate_results, &self.known_failures);
+        let path = folder.join("junit.xml");
+        let xml = xml.map_err(|error| FolderError::io(&path)(std::io::Error::other(error)))?;
+        write(&path, xml.as_bytes())
+    }
 }
 
 fn unread(rows: &[QueryResult]) -> Option<String> {

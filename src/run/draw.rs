@@ -79,7 +79,7 @@ impl Draw<'_> {
         };
         let (camera, cameras) = cameras_of(queries, &chosen);
         // If every frame is a query, all other frames may be its references.
-        let left_out = match self.limit {
+        let excluded = match self.limit {
             Some(Limit::Percent(percent)) if percent < 100.0 => &drawn[..],
             _ => &[],
         };
@@ -90,7 +90,7 @@ impl Draw<'_> {
             query_scene: queries.name().to_owned(),
             camera,
             cameras,
-            drawn: names(left_out),
+            drawn: names(excluded),
             queries: names(&chosen),
             times_s: times_of(queries, &chosen),
         })

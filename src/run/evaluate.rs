@@ -3,18 +3,17 @@
 use std::collections::BTreeSet;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-use super::run_file::{RunFile, RunItem};
+use super::plan::Plan;
+use super::run_file::RunItem;
 use super::run_folder::{FolderError, RunFolder};
 use super::scene_pair::ScenePair;
-use super::scenes::Scenes;
 use crate::estimator::Failure;
 use crate::fusion::Fusion;
 use crate::localize::{
-    ChoiceError, LocalizeObserver, Localizer, NoObserver, QueryResult, Ranking, References,
-    Request, StageTimes,
+    ChoiceError, LocalizeObserver, Localizer, NoObserver, QueryResult, References, Request,
+    StageTimes,
 };
 use crate::method::Method;
-use crate::params::Params;
 use crate::scene::SceneError;
 use crate::trace::Cancelled;
 
@@ -69,31 +68,25 @@ pub trait RunObserver {
     fn done(&mut self, _item: &RunItem<'_>) {}
 }
 
-/// A run with its opened scenes and indexes.
-pub struct Execution<'a> {
-    /// The run.
-    pub run: &'a RunFile,
-    /// Its scenes.
-    pub scenes: &'a Scenes,
-    /// Its parameters, as in the description.
-    pub params: &'a Params,
-    /// The indexes for [`Selection::Retrieved`](crate::localize::Selection::Retrieved), by the position of the
-    /// references' scene.
-    pub indices: &'a [Box<dyn Ranking>],
+/// An evaluation: the queries of a plan are localised one after the other.
+pub struct Evaluation<'a> {
+    plan: &'a Plan,
 }
 
-impl Execution<'_> {
-    /// Localises the remaining queries of the run, and again those whose files could not be read, and writes their
-    /// results. A query that panics, or whose files cannot be read, gets failed results, and the run continues.
+impl<'a> Evaluation<'a> {
+    /// Localises the remaining queries of the plan, and again those whose files could not be read, and writes their
+    /// results. A query that panics, or whose files cannot be read, gets failed results, and the evaluation continues.
     ///
     /// # Errors
     /// [`RunError`]. Finished queries are in the folder.
-    pub fn run_remaining(
-        &self,
+    pub fn run(
+        plan: &'a Plan,
         folder: &mut RunFolder,
         observer: &mut dyn RunObserver,
     ) -> Result<(), RunError> {
-        let items: Vec<RunItem<'_>> = self.run.items().collect();
+        let evaluation = Self { plan };
+        let Plan { run, scenes, params, .. } = plan;
+        let items: Vec<RunItem<'_>> = run.items().collect();
         let left = items.get(folder.done()..).unwrap_or_default();
         let again = folder.unread().iter().filter_map(|&at| Some((Some(at), *items.get(at)?)));
         let remaining: Vec<(Option<usize>, RunItem<'_>)> =
@@ -103,15 +96,15 @@ impl Execution<'_> {
             let Some((_, RunItem { pair, .. })) = of_pair.first().copied() else {
                 continue;
             };
-            let references = self.scenes.references[pair.scene_index].as_ref();
-            let queries = self.scenes.of_queries(pair);
-            let protocol = &self.run.protocol;
-            let localizer = Localizer::new(references, queries, self.params, protocol.seed);
+            let references = scenes.references[pair.scene_index].as_ref();
+            let queries = scenes.of_queries(pair);
+            let protocol = &run.protocol;
+            let localizer = Localizer::new(references, queries, params, protocol.seed);
             let localizer = protocol.configured(localizer)?;
-            let left_out = left_out(pair, &localizer)?;
+            let excluded = excluded(pair, &localizer)?;
             for (place, item) in of_pair {
                 observer.begin(item);
-                let results = self.results(item, &localizer, &left_out, observer)?;
+                let results = evaluation.results(item, &localizer, &excluded, observer)?;
                 match place {
                     Some(place) => folder.replace(*place, &results)?,
                     None => folder.append(&results)?,
@@ -126,18 +119,18 @@ impl Execution<'_> {
         &self,
         item: &RunItem<'_>,
         localizer: &Localizer<'_>,
-        left_out: &BTreeSet<usize>,
+        excluded: &BTreeSet<usize>,
         observer: &mut dyn RunObserver,
     ) -> Result<Vec<(QueryResult, StageTimes)>, RunError> {
         let frame = localizer.queries().find(item.query)?;
         let mut results = Vec::new();
         let localized = catch_unwind(AssertUnwindSafe(|| -> Result<_, RunError> {
-            let requests = self.requests(item.pair, localizer, frame, left_out)?;
+            let requests = self.requests(item.pair, localizer, frame, excluded)?;
             localizer.localize(
                 item.index,
                 frame,
                 &requests,
-                &self.run.protocol.methods,
+                &self.plan.run.protocol.methods,
                 observer.query_observer(),
                 |result, times| {
                     results.push((in_pair(item.pair, result), times));
@@ -153,7 +146,7 @@ impl Execution<'_> {
             Ok(requests) => {
                 let requests = requests?;
                 // One call per method that failed in any of the requests.
-                for &method in &self.run.protocol.methods {
+                for &method in &self.plan.run.protocol.methods {
                     let mut results = results.iter().map(|(result, _)| result);
                     let request = results
                         .find(|result| result.method == method && result.grade.is_failure())
@@ -185,23 +178,23 @@ impl Execution<'_> {
         pair: &ScenePair,
         localizer: &Localizer<'_>,
         frame: usize,
-        left_out: &BTreeSet<usize>,
+        excluded: &BTreeSet<usize>,
     ) -> Result<Vec<Request>, RunError> {
-        let protocol = &self.run.protocol;
-        let index = self.indices.get(pair.scene_index).map(|index| index.as_ref());
+        let protocol = &self.plan.run.protocol;
+        let index = self.plan.indices.get(pair.scene_index).map(|index| index.as_ref());
         let choose = |radius_m: f64| {
             let chooser = protocol.chooser(localizer, radius_m, index);
-            chooser.choose(frame, &|frame| left_out.contains(&frame), &mut NoObserver)
+            chooser.choose(frame, &|frame| excluded.contains(&frame), &mut NoObserver)
         };
         let mut requests = Vec::new();
         let mut last: Option<(f64, References)> = None;
-        for setting in self.run.settings() {
+        for setting in self.plan.run.settings() {
             let radius = protocol.reach_m(setting.radius_m);
             let chosen = match last.take() {
                 Some((known, chosen)) if known == radius => chosen,
                 _ => choose(radius)?,
             };
-            requests.push(self.run.request(setting, &chosen));
+            requests.push(self.plan.run.request(setting, &chosen));
             last = Some((radius, chosen));
         }
         Ok(requests)
@@ -210,14 +203,14 @@ impl Execution<'_> {
     /// The results of a query that could not be localised at all.
     fn broken(&self, item: &RunItem<'_>, failure: &Failure) -> Vec<(QueryResult, StageTimes)> {
         let pair = item.pair;
-        let protocol = &self.run.protocol;
+        let protocol = &self.plan.run.protocol;
         let fusions: Vec<Option<Fusion>> = match protocol.fusions.as_slice() {
             [] => vec![None],
             fusions => fusions.iter().copied().map(Some).collect(),
         };
         let mut results = Vec::new();
         for &method in &protocol.methods {
-            for setting in self.run.settings() {
+            for setting in self.plan.run.settings() {
                 for &fusion in &fusions {
                     let result = QueryResult {
                         setting: Some(setting),
@@ -247,7 +240,7 @@ fn in_pair(pair: &ScenePair, result: QueryResult) -> QueryResult {
 }
 
 /// Frames of the references' scene that are queries, and must not be references.
-fn left_out(pair: &ScenePair, localizer: &Localizer<'_>) -> Result<BTreeSet<usize>, SceneError> {
+fn excluded(pair: &ScenePair, localizer: &Localizer<'_>) -> Result<BTreeSet<usize>, SceneError> {
     let drawn = if localizer.is_one_drive() { pair.drawn.as_slice() } else { &[] };
     drawn.iter().map(|name| localizer.references().find(name)).collect()
 }

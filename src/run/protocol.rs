@@ -274,6 +274,9 @@ const LISTS: [&str; 3] = ["method", "fusion", "radius"];
 /// Why a protocol is invalid.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ProtocolError {
+    /// An option that does not exist, or another value than it takes.
+    #[error("{0}")]
+    Option(String),
     /// A method that is neither built in nor defined by `--estimates`.
     #[error("{0}, or a name defined by --estimates")]
     UnknownMethod(UnknownWord),
@@ -319,6 +322,15 @@ impl Protocol {
         let is_frame = |one: &Reference| matches!(one, Reference::Frame(_));
         if self.references.len() > 1 && !self.references.iter().all(is_frame) {
             return Err(ProtocolError::References);
+        }
+        let lengths = self.radii_m.iter().chain(&self.prior_m).chain(&self.failure_radius_m);
+        if let Some(length) = lengths.copied().find(|length| !(*length > 0.0 && length.is_finite()))
+        {
+            return Err(ProtocolError::Option(format!("{length}: a length above 0 expected")));
+        }
+        if let Some(probability) = self.min_confidence.filter(|p| !(*p > 0.0 && *p <= 1.0)) {
+            let expected = "a probability above 0 and up to 1 expected";
+            return Err(ProtocolError::Option(format!("{probability}: {expected}")));
         }
         let ours = estimator::methods().filter(|method| self.methods.contains(method));
         self.methods = ours.chain(others).collect();

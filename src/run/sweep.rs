@@ -54,22 +54,24 @@ impl Sweep {
         row.map_or("", |row| row.about.unit)
     }
 
-    /// Sets the swept setting to one of its values.
+    /// The assignment of a parameter; `None` if a degradation is swept.
+    pub fn assignment(&self, value: &str) -> Option<String> {
+        self.key.contains('.').then(|| format!("{}={value}", self.key))
+    }
+
+    /// Sets the step of a degradation to one of the values; nothing if a parameter is swept.
     ///
     /// # Errors
-    /// An unknown setting, or a value out of its range; parsing has checked them all.
-    pub fn apply(
+    /// An unknown step, or a strength out of its range; parsing has checked them all.
+    pub fn degrade(
         &self,
         value: &str,
         degradation: &mut Degradation,
-        params: &mut Params,
-    ) -> Result<(), SweepError> {
-        if self.key.contains('.') {
-            params.set(&self.key, value)?;
-        } else {
-            degradation.set(&self.key, value)?;
+    ) -> Result<(), DegradationError> {
+        match self.assignment(value) {
+            Some(_) => Ok(()),
+            None => degradation.set(&self.key, value),
         }
-        Ok(())
     }
 }
 
@@ -99,7 +101,10 @@ impl FromStr for Sweep {
         let sweep =
             Self { key: key.trim().to_owned(), values: (0..=steps as usize).map(value).collect() };
         for value in &sweep.values {
-            sweep.apply(value, &mut Degradation::default(), &mut Params::default())?;
+            if let Some(assignment) = sweep.assignment(value) {
+                Params::default().assign(&assignment)?;
+            }
+            sweep.degrade(value, &mut Degradation::default())?;
         }
         Ok(sweep)
     }

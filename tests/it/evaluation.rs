@@ -13,11 +13,11 @@ use posescope::measure::{Plot, RunResults, TableName};
 use posescope::method::Method;
 use posescope::params::Params;
 use posescope::run::{
-    Draw, Execution, Limit, Protocol, RUN_SCHEMA, Reference, RunFile, RunFolder, RunObserver,
-    Scenes, read_results, read_run,
+    Draw, Evaluation, Limit, Plan, Protocol, RUN_SCHEMA, Reference, RunFile, RunFolder,
+    RunObserver, Scenes, read_results, read_run,
 };
 use posescope::scene::street::{Size, Street};
-use posescope::scene::{Scene, SceneError};
+use posescope::scene::{Scene, SceneError, SceneSize};
 use tempfile::TempDir;
 
 use crate::binary::{background_in, has, lines, objects, refused, run_in, text, write};
@@ -397,10 +397,14 @@ fn a_query_that_panics_is_a_failed_result_and_the_rest_goes_on() {
     };
     let out = sequence.path().join("run");
     let mut folder = RunFolder::create(&out, &run).expect("a new folder");
-    let execution =
-        Execution { run: &run, scenes: &scenes, params: &Params::default(), indices: &[] };
-    execution
-        .run_remaining(&mut folder, &mut NoRunObserver(NoObserver))
+    let plan = Plan {
+        run,
+        scenes,
+        params: Params::default(),
+        indices: Vec::new(),
+        size: SceneSize::PAPER,
+    };
+    Evaluation::run(&plan, &mut folder, &mut NoRunObserver(NoObserver))
         .expect("a panic is a result");
     let results = read_results(&out).expect("results");
     let results: Vec<QueryResult> = results.map(|one| one.expect("a result")).collect();

@@ -1,23 +1,18 @@
 //! The commands: all of them for the program, and some that return what they find.
 
 use std::ffi::OsString;
-use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
-use posescope::cli::{self, CommandError, Host};
+use posescope::cli;
 use posescope::doctor::{Examination, Remark, examine};
 use posescope::report::{PICTURES, write_html};
 use pyo3::exceptions::PyOSError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
-use crate::detached::{Stop, detached, detached_with};
+use crate::detached::detached;
 use crate::scene::Scene;
 use crate::{arrays, errors};
-
-/// Exit codes of the program.
-const NOT_GOOD_ENOUGH: u8 = 1;
-const USAGE: u8 = 2;
 
 /// Runs the command `posescope` with these arguments, the program's name first, and returns its exit code.
 #[pyfunction]
@@ -26,51 +21,6 @@ pub fn main(py: Python<'_>, arguments: Vec<OsString>) -> u8 {
     // The program prints panics; those of later calls are exceptions again.
     errors::keep_panics_silent();
     code
-}
-
-/// Runs `posescope eval`. Returns the run folder, and why the run is not good enough.
-///
-/// `progress` is called with the number of queries that are done, and of all.
-#[pyfunction]
-pub fn evaluate(
-    py: Python<'_>,
-    arguments: Vec<OsString>,
-    threads: Option<NonZeroUsize>,
-    progress: Option<Py<PyAny>>,
-) -> PyResult<(Option<PathBuf>, Option<String>)> {
-    let host = Host::default();
-    let mut shown = (0, 0);
-    let tick = |py: Python<'_>| {
-        let now = host.progress();
-        if let Some(progress) = progress.as_ref().filter(|_| now != shown) {
-            shown = now;
-            progress.call1(py, now)?;
-        }
-        Ok(())
-    };
-    let run = detached_with(py, threads, &Stop::command(&host), tick, |_| {
-        cli::evaluate(arguments, &host)
-    })?;
-    if let Some(progress) = &progress {
-        progress.call1(py, host.progress())?;
-    }
-    match run {
-        Ok(folder) => Ok((Some(folder), None)),
-        Err(CommandError { exit_code: NOT_GOOD_ENOUGH, message, .. }) => Ok((None, Some(message))),
-        Err(error) => Err(raised(&error)),
-    }
-}
-
-/// The exception of a command that failed.
-fn raised(error: &CommandError) -> PyErr {
-    match &error.scene {
-        Some(scene) => errors::scene(scene),
-        None if error.exit_code == USAGE => errors::value(error),
-        None => {
-            let (file, expected) = error.message.split_once(": ").unwrap_or(("", &error.message));
-            errors::input(file, "", expected)
-        }
-    }
 }
 
 /// What `posescope doctor` finds: whether the scene is broken, its remarks, the mistake with its remedy, the text and

@@ -8,7 +8,6 @@ use std::sync::mpsc::{RecvTimeoutError, sync_channel};
 use std::thread;
 use std::time::Duration;
 
-use posescope::cli::Host;
 use posescope::localize::{LocalizeObserver, QueryResult, StageTimes, words_of};
 use posescope_core::event::KindSet;
 use posescope_core::{Cancelled, Method, Pose, Problem, Record, Sink};
@@ -22,26 +21,21 @@ const PATIENCE: Duration = Duration::from_millis(10);
 /// Whether the work was asked to stop.
 #[derive(Debug, Default)]
 pub struct Stop {
-    /// The command that is asked, too.
-    host: Option<Host>,
     raised: AtomicBool,
     /// Lowered by a trace once it has checked.
     attention: Arc<AtomicBool>,
 }
 
 impl Stop {
-    /// Stops a command.
-    pub fn command(host: &Host) -> Self {
-        Self { host: Some(host.clone()), ..Self::default() }
-    }
-
     /// Asks the work to stop.
     pub fn raise(&self) {
-        if let Some(host) = &self.host {
-            host.stop();
-        }
         self.raised.store(true, Ordering::Relaxed);
         self.attention.store(true, Ordering::Relaxed);
+    }
+
+    /// The flag that a trace looks at between its steps.
+    pub fn attention(&self) -> Arc<AtomicBool> {
+        Arc::clone(&self.attention)
     }
 
     /// Cancels the caller once it was asked to stop.
@@ -168,6 +162,6 @@ impl<O: LocalizeObserver> LocalizeObserver for Stoppable<'_, O> {
     }
 
     fn attention(&self) -> Option<Arc<AtomicBool>> {
-        Some(Arc::clone(&self.stop.attention))
+        Some(self.stop.attention())
     }
 }

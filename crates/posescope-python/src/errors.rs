@@ -3,8 +3,9 @@
 use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 
-use posescope::localize::LocalizeError;
-use posescope::scene::SceneError;
+use posescope::localize::{ChoiceError, LocalizeError};
+use posescope::run::{ConfigError, DrawError, FolderError, PlanError, RunError};
+use posescope::scene::{NoIndex, SceneError};
 use posescope_core::InputError;
 use pyo3::exceptions::{PyKeyboardInterrupt, PyValueError};
 use pyo3::prelude::*;
@@ -66,11 +67,75 @@ pub fn scene(error: &SceneError) -> PyErr {
             &format!("frame {frame}"),
             &format!("a reference has a cloud; {hint}"),
         ),
-        other => {
-            let text = other.to_string();
-            let (file, expected) = text.split_once(": ").unwrap_or(("", &text));
-            input(file, "", expected)
+        SceneError::NotFound { argument } => input(
+            argument,
+            "",
+            "no such file or folder; a path expected, or the built-in scene street",
+        ),
+        SceneError::NotRecognized { argument, known, hint } => {
+            input(argument, "", &format!("one of the formats {known} expected; {hint}"))
         }
+        SceneError::UnknownCondition { argument, known } => {
+            input(argument, "", &format!("one of the conditions {known} expected after street:"))
+        }
+        // A wrong argument.
+        SceneError::UnknownFormat { .. } => value(error),
+        other => input("", "", &other.to_string()),
+    }
+}
+
+/// An error of a run folder or another file of an evaluation.
+pub fn folder(error: &FolderError) -> PyErr {
+    let shown = |path: &Path| path.display().to_string();
+    match error {
+        FolderError::NotEmpty { .. } | FolderError::OtherRun { .. } | FolderError::InUse(_) => {
+            value(error)
+        }
+        FolderError::Io { path, source } => input(&shown(path), "", &source.to_string()),
+        FolderError::Damaged { path, line, message } => {
+            input(&shown(path), &format!("line {line}"), message)
+        }
+        FolderError::NoRun(path) => input(&shown(path), "", "a run folder with run.toml expected"),
+        FolderError::Incomplete { path, done, items } => {
+            input(&shown(path), "", &format!("{items} queries expected, {done} are done"))
+        }
+    }
+}
+
+/// An error before the first query of an evaluation.
+pub fn plan(error: &PlanError) -> PyErr {
+    let shown = |path: &Path| path.display().to_string();
+    match error {
+        PlanError::Scene(error) | PlanError::Draw(DrawError::Scene(error)) => scene(error),
+        PlanError::Folder(error) => folder(error),
+        PlanError::Config(ConfigError::Io { path, source }) => {
+            input(&shown(path), "", &source.to_string())
+        }
+        PlanError::Config(ConfigError::File { path, source }) => {
+            input(&shown(path), "", &source.to_string())
+        }
+        PlanError::Draw(DrawError::NoPose(scene)) => input(
+            scene,
+            "",
+            "a frame with a known pose expected; `posescope.doctor` says what is missing",
+        ),
+        PlanError::Index(error @ NoIndex::Unusable { .. }) => input("", "", &error.to_string()),
+        PlanError::Protocol(_)
+        | PlanError::Config(ConfigError::Param(_))
+        | PlanError::Draw(DrawError::NotDrawn { .. })
+        | PlanError::Index(NoIndex::NoFolder)
+        | PlanError::Output(_)
+        | PlanError::Refused(_) => value(error),
+    }
+}
+
+/// An error of an evaluation.
+pub fn run(error: &RunError) -> PyErr {
+    match error {
+        RunError::Scene(error) | RunError::Choice(ChoiceError::Scene(error)) => scene(error),
+        RunError::Folder(error) => folder(error),
+        RunError::Cancelled(_) => PyKeyboardInterrupt::new_err(()),
+        RunError::Choice(error) => value(error),
     }
 }
 

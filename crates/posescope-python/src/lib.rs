@@ -9,6 +9,7 @@ mod camera;
 mod command;
 mod detached;
 mod errors;
+mod evaluate;
 mod frames;
 mod held;
 mod job;
@@ -34,7 +35,7 @@ fn extension(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(localize::diagnose, module)?)?;
     module.add_function(wrap_pyfunction!(localize::methods, module)?)?;
     module.add_function(wrap_pyfunction!(command::main, module)?)?;
-    module.add_function(wrap_pyfunction!(command::evaluate, module)?)?;
+    module.add_function(wrap_pyfunction!(evaluate::evaluate, module)?)?;
     module.add_function(wrap_pyfunction!(command::doctor, module)?)?;
     module.add_function(wrap_pyfunction!(command::write_report, module)?)?;
     module.add_function(wrap_pyfunction!(detached::panic, module)?)?;

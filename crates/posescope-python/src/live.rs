@@ -6,11 +6,9 @@ use std::path::PathBuf;
 use nalgebra::Point3;
 use posescope::estimator::Failure;
 use posescope::localize::{QueryResult, frames_within};
-use posescope::measure::{KnownFailures, write_report};
-use posescope::report::{PICTURES, write_html};
 use posescope::run::{
-    EstimatesFile, FolderError, Protocol, QueryCamera, RUN_SCHEMA, Reference, RunFile, ScenePair,
-    read_run,
+    EstimatesFile, FolderError, Judgement, Judging, Protocol, QueryCamera, RUN_SCHEMA, Reference,
+    RunFile, ScenePair, publish, read_run,
 };
 use posescope::scene::write_matches;
 use posescope_core::features::FoundMatches;
@@ -170,9 +168,8 @@ pub fn run_text(
 pub fn summarise(py: Python<'_>, folder: PathBuf) -> PyResult<()> {
     let written = detached(py, None, |_| -> Result<(), FolderError> {
         let run = read_run(&folder)?;
-        write_report(&folder, &run, &[], &[], &KnownFailures::default())?.1?;
-        write_html(&folder, None, PICTURES, None)?;
-        Ok(())
+        let judgement = Judgement::of(&folder, &run, &Judging::default(), |_| Vec::new())?;
+        publish(&folder, &judgement)
     })?;
     written.map_err(|error| PyOSError::new_err(error.to_string()))
 }

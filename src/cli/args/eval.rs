@@ -1,10 +1,10 @@
 //! The arguments of `posescope eval`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand};
-use posescope::measure::Gate;
-use posescope::run::{Shard, Sweep};
+use posescope::measure::{Gate, KnownFailures};
+use posescope::run::{FolderError, Judging, Preset, Shard, Sweep};
 
 use super::{ConfigArgs, Given};
 
@@ -105,4 +105,58 @@ pub struct JudgingArgs {
     #[arg(long, value_name = "N")]
     #[arg(help_heading = "Output", hide_short_help = true)]
     pub keep_failures: Option<usize>,
+}
+
+impl EvalArgs {
+    /// The run folder: `--out`, or a folder below `runs`, named after scenes and options.
+    pub fn folder(&self, preset: Option<Preset>) -> PathBuf {
+        if let Some(out) = &self.out {
+            return out.clone();
+        }
+        let scenes: Vec<String> = self.scenes.iter().map(|scene| plain_name(scene)).collect();
+        let mut name = scenes.join("-");
+        if let Some(preset) = preset {
+            name = format!("{name}-{preset}").to_lowercase();
+        }
+        if let Some(failed) = &self.rerun_failed {
+            let run = failed.file_name().unwrap_or_default().to_string_lossy();
+            name = format!("{run}-failed");
+        }
+        if let Some(sweep) = &self.sweep {
+            name = format!("{name}-{}", sweep.key());
+        }
+        if let Some(shard) = self.shard {
+            name = format!("{name}-{}-of-{}", shard.number, shard.of);
+        }
+        Path::new("runs").join(name)
+    }
+}
+
+/// A scene's argument as the name of a folder. `.` and `..` have the names of their folders.
+fn plain_name(argument: &str) -> String {
+    let path = Path::new(argument);
+    let folder = path.canonicalize().ok().filter(|_| path.file_name().is_none());
+    let own = folder.as_deref().and_then(Path::file_name).map(|name| name.to_string_lossy());
+    let name = own.as_deref().unwrap_or(argument);
+    let plain: String = name.chars().map(|c| if c.is_alphanumeric() { c } else { '-' }).collect();
+    match plain.trim_matches('-') {
+        "" => "scene".to_owned(),
+        plain => plain.to_owned(),
+    }
+}
+
+impl JudgingArgs {
+    /// How a run is judged that repeats failed queries of another, or does not.
+    ///
+    /// # Errors
+    /// A list of known failures that cannot be read.
+    pub fn judging(&self, rerun_failed: Option<&Path>) -> Result<Judging, FolderError> {
+        let known = self.known_failures.as_deref().map(KnownFailures::read).transpose()?;
+        Ok(Judging {
+            gates: self.gate.clone(),
+            known: known.unwrap_or_default(),
+            before: self.baseline.as_deref().or(rerun_failed).map(Path::to_owned),
+            only_repeated: rerun_failed.is_some(),
+        })
+    }
 }

@@ -1,9 +1,7 @@
 //! The options of a protocol that were given on the command line.
 
 use clap::{ArgMatches, Args, Command, FromArgMatches};
-use posescope::run::Protocol;
-
-use crate::cli::failure::CliError;
+use posescope::run::{Protocol, ProtocolError};
 
 /// The given options of a protocol, which override another protocol.
 #[derive(Clone, Debug)]
@@ -32,11 +30,11 @@ impl Args for Given {
 
 impl Given {
     /// The given options, and `defaults` for the rest.
-    pub fn over(&self, defaults: Protocol) -> Result<Protocol, CliError> {
+    pub fn over(&self, defaults: Protocol) -> Result<Protocol, ProtocolError> {
         let mut protocol = defaults;
         let updated = protocol.update_from_arg_matches(&self.0);
-        updated.map_err(|error| CliError::Usage(error.to_string()))?;
-        Ok(protocol.checked()?)
+        updated.map_err(|error| ProtocolError::Option(error.to_string()))?;
+        protocol.checked()
     }
 
     /// Whether the option of this field was given.

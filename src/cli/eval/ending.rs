@@ -17,18 +17,12 @@ const WIDEST: usize = 100;
 const WORST: usize = 3;
 
 /// The text, in lines that fit a terminal of this width.
-pub fn ending(
-    run: &RunFile,
-    report: &Report,
-    results: &[QueryResult],
-    folder: &Path,
-    width: Option<usize>,
-) -> String {
+pub fn ending(run: &RunFile, report: &Report, folder: &Path, width: Option<usize>) -> String {
+    let results = &report.results.results;
     let width = width.unwrap_or(WIDEST).min(WIDEST);
     let lines = |text: &str| wrapped(text, width, "  ");
     let overview = Overview::of(&results.iter().collect::<Vec<_>>(), &[]);
-    let unit = results.first().map(|result| result.unit).unwrap_or_default();
-    let table = methods(&overview.bars).in_words_of(unit);
+    let table = methods(&overview.bars).in_words_of(report.results.unit());
     let mut text = lines(&overview.headline) + "\n" + &table.to_text(Some(width)) + "\n";
     for Finding { text: found, .. } in &report.findings {
         text += &lines(&format!("Finding: {found}"));

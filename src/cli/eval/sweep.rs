@@ -3,9 +3,10 @@
 use std::path::Path;
 
 use posescope::measure::{SweptRun, write_sweep};
-use posescope::run::Sweep;
+use posescope::run::{Judging, Sweep, append_step_summary, publish};
 
-use super::{Executed, Judged, examined, execute, good_unless, step_summary};
+use super::good_unless;
+use super::one::{Evaluated, evaluate};
 use crate::cli::args::EvalArgs;
 use crate::cli::failure::CliError;
 use crate::cli::stderr::tell;
@@ -16,30 +17,29 @@ use crate::cli::{output, table::figures};
 pub fn sweep(
     args: &EvalArgs,
     sweep: &Sweep,
+    judging: &Judging,
     folder: &Path,
     terminal: &Terminal,
 ) -> Result<(), CliError> {
-    let mut runs = Vec::new();
-    let (mut failures, mut unread) = (Vec::new(), Vec::new());
-    let mut written = Ok(());
+    let (mut runs, mut failures, mut unread) = (Vec::new(), Vec::new(), Vec::new());
+    let mut published = Ok(());
     for value in sweep.values() {
         let name = format!("{}={value}", sweep.key());
         let path = folder.join(&name);
-        let Executed { run, scenes } = execute(args, Some((sweep, value)), &path, terminal)?;
-        let examined = examined(&run, &scenes, &path)?;
-        let judged = Judged::of(&args.judging, None, &path, &run, &examined)?;
-        let of_run = judged.failures.iter();
-        failures.extend(of_run.map(|failure| format!("{name}: {failure}")));
-        unread.extend(judged.report.unread.map(|unread| format!("{name}: {unread}")));
-        written = written.and(judged.written);
-        runs.push(SweptRun { value: value.clone(), measures: judged.report.measures });
+        let swept = Some((sweep, value.as_str()));
+        let Evaluated { judgement, .. } = evaluate(args, swept, judging, &path, terminal)?;
+        published = published.and(publish(&path, &judgement));
+        failures.extend(judgement.failures.iter().map(|failure| format!("{name}: {failure}")));
+        let report = judgement.report;
+        unread.extend(report.unread.map(|unread| format!("{name}: {unread}")));
+        runs.push(SweptRun { value: value.clone(), measures: report.results.measures });
     }
     let table = write_sweep(folder, sweep, &runs)?;
-    step_summary::append(&format!("{}\n", table.to_markdown()));
+    append_step_summary(&format!("{}\n", table.to_markdown()));
     if !terminal.is_quiet {
         output::print(&figures(&table, terminal.width()))?;
         tell(&format!("Runs and curves: {}", folder.display()));
     }
-    written?;
+    published?;
     good_unless(&unread, &failures)
 }

@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 import os
 from dataclasses import dataclass
-from typing import Any, Callable, List, Optional, Sequence, Tuple, Union
+from typing import Any, Callable, Dict, List, Optional, Sequence, Tuple, Union
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,8 +33,9 @@ def evaluate(
         threads: The number of threads; by default one per core.
         progress: Whether to show a progress bar of tqdm. By default where tqdm is installed.
         options: The options of ``posescope eval`` with ``_`` for ``-``, such as ``limit=40``, ``method="fb,mi"``,
-            ``query_scene="street:night"``, ``gate=["right@fb >= 0.6"]`` or ``set=["fb.ratio=0.7"]``. A list repeats
-            an option; True gives one without a value. ``posescope eval --help`` explains them.
+            ``query_scene="street:night"``, ``gate=["right@fb >= 0.6"]`` or ``set=["fb.ratio=0.7"]``, but for ``sweep``
+            and ``rerun_failed``. A list repeats an option; True gives one without a value. ``posescope eval --help``
+            explains them.
 
     Returns:
         The run.
@@ -46,25 +47,23 @@ def evaluate(
         InternalError: A bug of posescope.
     """
     place = scene.path if isinstance(scene, Scene) else os.fspath(scene)
-    arguments = [place, "--out", os.fspath(out), *_options(options)]
     show = _progress_bar(progress)
-    _, failed = _posescope.evaluate(arguments, threads, show)
+    failed = _posescope.evaluate(place, os.fspath(out), _options(options), threads, show)
     run = Run.open(out)
     if failed is not None:
         raise GateError(failed, run)
     return run
 
 
-def _options(options: "dict[str, _Option]") -> List[str]:
-    """Options as words of a command line."""
-    words: List[str] = []
+def _options(options: "dict[str, _Option]") -> Dict[str, List[str]]:
+    """Each option with its values as text; one without a value has none."""
+    texts: Dict[str, List[str]] = {}
     for name, value in options.items():
-        option = "--" + name.rstrip("_").replace("_", "-")
         if value is None or value is False:
             continue
         values: Sequence[Any] = value if isinstance(value, (list, tuple)) else [value]
-        words += [option if one is True else f"{option}={one}" for one in values]
-    return words
+        texts[name.rstrip("_").replace("_", "-")] = [str(one) for one in values if one is not True]
+    return texts
 
 
 def _progress_bar(wanted: Optional[bool]) -> "Optional[Callable[[int, int], None]]":

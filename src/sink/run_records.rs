@@ -5,70 +5,98 @@ use std::fs;
 use std::io::ErrorKind;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
-use posescope::diagnosis::Code;
-use posescope::localize::{LocalizeError, LocalizeObserver, QueryResult};
-use posescope::params::Params;
-use posescope::run::{
-    FAILURES, FailedQuery, FolderError, Protocol, RunError, RunFile, RunFolder, RunItem,
-    RunObserver, ScenePair, read_results, recording_name,
+use super::events::{EventExport, SceneNames};
+use super::rerun::{Identity, RecordError, Recorder, Targets};
+use crate::diagnosis::Code;
+use crate::event::KindSet;
+use crate::geometry::Pose;
+use crate::localize::{LocalizeError, LocalizeObserver, QueryResult};
+use crate::method::Method;
+use crate::problem::Problem;
+use crate::run::{
+    FAILURES, FailedQuery, FolderError, Plan, RunError, RunFile, RunFolder, RunItem, RunObserver,
+    ScenePair, read_results, recording_name,
 };
-use posescope::sink::SceneNames;
-use posescope::sink::rerun::{Identity, RecordError, Recorder, Targets};
+use crate::trace::{Cancelled, Record, Sink};
 
-use super::event_export::EventExport;
-use super::failure::CliError;
-use super::interrupt::Interrupt;
-use super::observer::CliObserver;
+/// Recorded failures by default.
+pub const KEPT_FAILURES: usize = 20;
 
-/// Observes a run: shows progress, records the first failures and writes events if requested.
+/// Who waits for a run: sees its progress, and can stop it.
+pub trait Follower: Send {
+    /// A query is done.
+    fn done(&mut self, query: &str);
+
+    /// Cancels the run once it shall stop.
+    ///
+    /// # Errors
+    /// [`Cancelled`].
+    fn check(&self) -> Result<(), Cancelled>;
+
+    /// A flag that asks for a call of [`Self::check`] even without an event.
+    fn attention(&self) -> Arc<AtomicBool>;
+}
+
+/// Observes a run: tells its follower, records the first failures and writes events if requested.
 ///
 /// A failed query is localised again to be recorded. Most queries succeed, so this costs less than recording
 /// every query.
-pub struct FailureRecordings<'a> {
+pub struct RunRecords<'a> {
     folder: PathBuf,
+    plan: &'a Plan,
     /// How many more failures to record.
     left: usize,
     missed: usize,
-    params: &'a Params,
-    protocol: &'a Protocol,
-    several_pairs: bool,
-    bar: indicatif::ProgressBar,
-    observer: CliObserver,
+    events: Option<EventExport>,
+    follower: &'a mut dyn Follower,
+    problems: Vec<Problem>,
+    /// The current problem and method.
+    current: Option<(usize, Method)>,
 }
 
-impl<'a> FailureRecordings<'a> {
+impl<'a> RunRecords<'a> {
     /// For a new or a resumed run.
+    ///
+    /// # Errors
+    /// A folder that cannot be written, or results that cannot be read.
     pub fn new(
         kept: usize,
         folder: &RunFolder,
-        run: &'a RunFile,
-        params: &'a Params,
-        bar: indicatif::ProgressBar,
-        interrupt: Interrupt,
+        plan: &'a Plan,
         events: Option<EventExport>,
-    ) -> Result<Self, CliError> {
+        follower: &'a mut dyn Follower,
+    ) -> Result<Self, FolderError> {
         let path = folder.path().join(FAILURES);
         fs::create_dir_all(&path).map_err(FolderError::io(&path))?;
-        let failures = failures(folder.path(), run)?;
-        let mut observer = CliObserver::new(indicatif::ProgressBar::hidden(), interrupt);
-        observer.events = events;
+        let failures = failures(folder.path(), &plan.run)?;
         Ok(Self {
             folder: path,
+            plan,
             left: kept.saturating_sub(failures.len()),
             missed: failures.len().saturating_sub(kept),
-            params,
-            protocol: &run.protocol,
-            several_pairs: run.pairs.len() > 1,
-            bar,
-            observer,
+            events,
+            follower,
+            problems: Vec::new(),
+            current: None,
         })
     }
 
-    /// Reports unrecorded failures, and an error of the events file.
-    pub fn close(self) -> Result<(), CliError> {
+    /// Reports unrecorded failures.
+    ///
+    /// # Errors
+    /// The first error of the events' file.
+    pub fn close(self) -> Result<(), FolderError> {
         warn_of_missed(self.missed);
-        self.observer.events.map_or(Ok(()), EventExport::close)
+        self.events.map_or(Ok(()), EventExport::close)
+    }
+
+    fn recording(&self, item: &RunItem<'_>, method: Method) -> PathBuf {
+        let several_pairs = self.plan.run.pairs.len() > 1;
+        let name = recording_name(item.pair, item.query, method, several_pairs);
+        self.folder.join(format!("{name}.rrd"))
     }
 
     fn record(&self, query: &FailedQuery<'_>, path: &Path) -> Result<(), RecordError> {
@@ -80,7 +108,7 @@ impl<'a> FailureRecordings<'a> {
             query_scene: Some(query_scene.clone()).filter(|queries| queries != scene),
             queries: vec![query.item.query.to_owned()],
             references: frames.map(|&frame| references.frames()[frame].clone()).collect(),
-            ..Identity::of(references, queries, self.params, self.protocol)
+            ..Identity::of(references, queries, &self.plan.params, &self.plan.run.protocol)
         };
         let mut recorder = Recorder::open(&Targets::file(path), &identity, &[query.method])?;
         // The query's result reports the panic already; here it only ends the recording.
@@ -102,7 +130,10 @@ impl<'a> FailureRecordings<'a> {
 }
 
 /// Copies the recordings of the first failures of the whole run from the folders of its parts.
-pub fn merge(
+///
+/// # Errors
+/// A file that cannot be read or written.
+pub fn merge_failures(
     parts: &[PathBuf],
     target: &Path,
     kept: usize,
@@ -144,13 +175,50 @@ fn failures(folder: &Path, run: &RunFile) -> Result<Vec<String>, FolderError> {
     Ok(names)
 }
 
-impl RunObserver for FailureRecordings<'_> {
+impl Sink for RunRecords<'_> {
+    fn wanted(&self) -> KindSet {
+        if self.events.is_some() { KindSet::ALL } else { KindSet::NONE }
+    }
+
+    fn accept(&mut self, record: &Record) -> Result<(), Cancelled> {
+        if let (Some(events), Some((problem, method))) = (&mut self.events, self.current)
+            && let Some(problem) = self.problems.get(problem)
+        {
+            events.accept(record, problem, method);
+        }
+        self.follower.check()
+    }
+
+    fn attend(&mut self) -> Result<(), Cancelled> {
+        self.follower.check()
+    }
+}
+
+impl LocalizeObserver for RunRecords<'_> {
+    fn begin_query(&mut self, _index: usize, problems: &[Problem], _truth: Option<&Pose>) {
+        self.problems = problems.to_vec();
+    }
+
+    fn begin_method(&mut self, problem: usize, method: Method) {
+        self.current = Some((problem, method));
+    }
+
+    fn begin_fusion(&mut self, method: Method) {
+        self.current = Some((0, method));
+    }
+
+    fn attention(&self) -> Option<Arc<AtomicBool>> {
+        Some(self.follower.attention())
+    }
+}
+
+impl RunObserver for RunRecords<'_> {
     fn query_observer(&mut self) -> &mut dyn LocalizeObserver {
-        &mut self.observer
+        self
     }
 
     fn begin(&mut self, item: &RunItem<'_>) {
-        if let Some(events) = &mut self.observer.events {
+        if let Some(events) = &mut self.events {
             let ScenePair { scene, query_scene, .. } = item.pair;
             events.name_scenes(SceneNames {
                 references: scene.clone(),
@@ -160,9 +228,7 @@ impl RunObserver for FailureRecordings<'_> {
     }
 
     fn failed(&mut self, query: &FailedQuery<'_>) -> Result<(), RunError> {
-        let name =
-            recording_name(query.item.pair, query.item.query, query.method, self.several_pairs);
-        let path = self.folder.join(format!("{name}.rrd"));
+        let path = self.recording(&query.item, query.method);
         match fs::remove_file(&path) {
             Err(error) if error.kind() != ErrorKind::NotFound => {
                 return Err(FolderError::io(&path)(error).into());
@@ -183,11 +249,10 @@ impl RunObserver for FailureRecordings<'_> {
     }
 
     fn done(&mut self, item: &RunItem<'_>) {
-        if let Some(events) = &mut self.observer.events {
+        if let Some(events) = &mut self.events {
             events.end_query();
         }
-        self.bar.set_message(item.query.to_owned());
-        self.bar.inc(1);
+        self.follower.done(item.query);
     }
 }
 
