@@ -27,6 +27,7 @@ mod pose_text;
 mod retriever;
 mod robotcar;
 mod seven_scenes;
+mod time_unit;
 mod trajectory;
 mod tum;
 mod view_crop;

@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 
 pub(super) use self::camera::ModelCamera;
 use self::model::ModelImage;
-pub(super) use self::text::{camera as camera_of_line, image_lines};
+pub(super) use self::text::{camera as camera_of_line, image_of_line, lines_of_images};
 use super::file_scene::{Clouds, FileScene, Frame};
 use super::folder::{folder_name, within};
 use super::frame_names::names_of;

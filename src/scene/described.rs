@@ -62,8 +62,7 @@ struct Description {
     images: Spanned<String>,
     /// The file with the poses. Without it, all frames are queries.
     poses: Option<Spanned<String>>,
-    #[serde(default)]
-    pose: PoseMeaning,
+    pose: Option<Spanned<PoseMeaning>>,
     camera: Spanned<CameraDescription>,
     /// One cloud for all frames.
     cloud: Option<Spanned<String>>,
@@ -71,10 +70,9 @@ struct Description {
     clouds: Option<CloudsDescription>,
 }
 
-#[derive(Clone, Copy, Default, Deserialize, PartialEq)]
+#[derive(Clone, Copy, Deserialize, PartialEq)]
 #[serde(rename_all = "snake_case")]
 enum PoseMeaning {
-    #[default]
     WorldFromCamera,
     CameraFromWorld,
 }
@@ -182,13 +180,21 @@ fn open(path: &Path) -> Result<Box<dyn Scene>, SceneError> {
     let file_names: Vec<String> =
         file_names.map(|name| name.to_string_lossy().into_owned()).collect();
     let names = names_of(&file_names);
-    let poses = match &description.poses {
+    let (poses, is_inverted) = match &description.poses {
         Some(name) => poses::read(&source.file(name)?, &names)?,
         None => {
             warn_without_poses(path, "poses");
-            vec![FramePoses::default(); photos.len()]
+            (vec![FramePoses::default(); photos.len()], false)
         }
     };
+    let meaning = description.pose.as_ref().map(Spanned::get_ref);
+    if let (true, Some(PoseMeaning::WorldFromCamera), Some(pose)) =
+        (is_inverted, meaning, &description.pose)
+    {
+        let expected = "`camera_from_world` or no `pose` expected, since the format of the poses has this direction";
+        return Err(source.error(pose, expected));
+    }
+    let invert = meaning == Some(&PoseMeaning::CameraFromWorld) && !is_inverted;
     let clouds = clouds(&source, &description, &photos)?;
     let name = match &description.name {
         Some(name) if !name.get_ref().trim().is_empty() => name.get_ref().clone(),
@@ -202,10 +208,7 @@ fn open(path: &Path) -> Result<Box<dyn Scene>, SceneError> {
         .map(|((photo, FramePoses { pose, time_s }), name)| Frame {
             name,
             develop: develop.clone(),
-            world_from_camera: match description.pose {
-                PoseMeaning::WorldFromCamera => pose,
-                PoseMeaning::CameraFromWorld => pose.map(|pose| pose.inverse()),
-            },
+            world_from_camera: pose.map(|pose| if invert { pose.inverse() } else { pose }),
             time_s,
             ..Frame::new(photo, intrinsics)
         })

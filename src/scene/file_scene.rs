@@ -14,6 +14,8 @@ use crate::image::Photo;
 pub(super) struct Frame {
     /// Its name in results and recordings.
     pub name: String,
+    /// Another name by which other programs call it: the path of its photo without extension.
+    pub other_name: Option<String>,
     pub photo: PathBuf,
     /// The camera of the developed photo.
     pub intrinsics: Intrinsics,
@@ -29,6 +31,7 @@ impl Frame {
     pub fn new(photo: PathBuf, intrinsics: Intrinsics) -> Self {
         Self {
             name: stem(&photo),
+            other_name: None,
             photo,
             intrinsics,
             develop: None,
@@ -111,6 +114,10 @@ impl<C: Clouds> Scene for FileScene<C> {
 
     fn frames(&self) -> &[String] {
         &self.names
+    }
+
+    fn other_name(&self, frame: usize) -> Option<&str> {
+        self.frames[frame].other_name.as_deref()
     }
 
     fn intrinsics(&self, frame: usize) -> Intrinsics {

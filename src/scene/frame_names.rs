@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use posescope_core::scene::{stem, without_extension};
+use posescope_core::scene::{stem, without_extension, without_kind};
 
 use super::Scene;
 use super::lines::excerpt_of;
@@ -41,11 +41,13 @@ pub(super) struct FrameNames<'a> {
     stems: BTreeMap<&'a str, Option<usize>>,
     /// By number; `None` if several share one.
     numbers: BTreeMap<u64, Option<usize>>,
+    /// By other names.
+    others: OtherNames,
 }
 
 impl<'a> FrameNames<'a> {
     pub fn new(scene: &'a dyn Scene) -> Self {
-        Self::of(scene.name(), scene.frames())
+        Self { others: OtherNames::of(scene), ..Self::of(scene.name(), scene.frames()) }
     }
 
     /// The frames of a scene that is not complete yet.
@@ -61,12 +63,8 @@ impl<'a> FrameNames<'a> {
             whole,
             stems: unique(named().map(|(at, name)| (stem(name), at))),
             numbers: unique(numbers),
+            others: OtherNames::default(),
         }
-    }
-
-    /// The frame that a name means, if it is the only one in its file.
-    pub fn find_alone(&self, name: &str) -> Option<usize> {
-        self.find_whole(name).or_else(|| self.find_stem(name)).or_else(|| self.find_number(name))
     }
 
     /// The frames that all names of a file mean.
@@ -78,7 +76,8 @@ impl<'a> FrameNames<'a> {
         let find = |name: &str| {
             let is_only = of_stem.get(stem(name)).is_some_and(|names| names.len() == 1);
             let by_stem = || self.find_stem(name).filter(|_| is_only);
-            self.find_whole(name).or_else(by_stem).or_else(|| self.find_number(name))
+            let by_path = || self.find_whole(name).or_else(|| self.others.find(name));
+            by_path().or_else(by_stem).or_else(|| self.find_number(name))
         };
         names.map(find).collect()
     }
@@ -123,6 +122,40 @@ impl<'a> FrameNames<'a> {
             excerpt_of(called, 60)
         )
     }
+}
+
+/// The frames of a scene by what other programs call their photos.
+#[derive(Default)]
+pub(super) struct OtherNames {
+    /// By the whole other name.
+    whole: BTreeMap<String, Option<usize>>,
+    /// By each end of it, with `-` in place of `/`; `None` if several share one.
+    ends: BTreeMap<String, Option<usize>>,
+}
+
+impl OtherNames {
+    pub fn of(scene: &dyn Scene) -> Self {
+        let others = (0..scene.frames().len()).filter_map(|at| Some((scene.other_name(at)?, at)));
+        let others: Vec<(&str, usize)> = others.collect();
+        let ends =
+            others.iter().flat_map(|&(name, at)| ends_of(name).map(move |end| (flat(end), at)));
+        Self {
+            whole: unique(others.iter().map(|&(name, at)| (name.to_owned(), at))),
+            ends: unique(ends),
+        }
+    }
+
+    /// The frame whose other name this is, or the end of it, or the end of this.
+    pub fn find(&self, name: &str) -> Option<usize> {
+        let name = without_kind(without_extension(name));
+        let by_end = self.ends.get(&flat(name)).copied().flatten();
+        by_end.or_else(|| ends_of(name).find_map(|end| self.whole.get(end).copied().flatten()))
+    }
+}
+
+/// A path, and what is left of it without its first folders.
+pub(super) fn ends_of(path: &str) -> impl Iterator<Item = &str> {
+    std::iter::successors(Some(path), |path| Some(path.split_once('/')?.1))
 }
 
 /// Whether two names may mean one photo: one has no folder, or its path is the end of the other.

@@ -2,10 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use nalgebra::{Matrix3x4, Quaternion, Translation3, UnitQuaternion};
+use nalgebra::{Quaternion, Translation3, UnitQuaternion};
 
 use super::SceneError;
-use crate::geometry::{Pose, pose_from_matrix};
+use crate::geometry::Pose;
 
 pub(super) struct TextFile {
     path: PathBuf,
@@ -17,7 +17,7 @@ pub(super) struct TextFile {
 pub(super) struct Line<'a> {
     path: &'a Path,
     /// Counted from 1.
-    number: usize,
+    pub number: usize,
     /// Without white space at both ends.
     pub text: &'a str,
 }
@@ -103,12 +103,6 @@ impl<'a> Line<'a> {
 
     pub fn number(&self, word: &str) -> Result<f64, SceneError> {
         number(word).map_err(|expected| self.error(expected))
-    }
-
-    /// The pose of a line with a 3 × 4 matrix, row by row.
-    pub fn matrix_pose(&self) -> Result<Pose, SceneError> {
-        let matrix = Matrix3x4::from_row_slice(&self.numbers::<12>()?);
-        pose_from_matrix(&matrix).map_err(|error| self.error(error.to_string()))
     }
 
     /// The pose of a position and a quaternion, whose parts are in the order x y z w.

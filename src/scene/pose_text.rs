@@ -1,24 +1,42 @@
-//! Text files of poses. The first line determines the format:
+//! Text files of poses, read by what their lines say.
 //!
-//! - TUM: `time x y z qx qy qz qw`, camera to world, in any order;
-//! - KITTI: twelve numbers of `[R|t]`, camera to world, a line per frame;
-//! - visuallocalization.net: `name qw qx qy qz x y z`, world to camera;
-//! - `images.txt` of a COLMAP model: world to camera;
-//! - a header with the columns `name` or `time`, and `x y z qx qy qz qw`, in any order: camera to world.
+//! A header names the columns ([`table`]): the first line, or a comment above it as in EuRoC's files. Without a header,
+//! the format is the one of [`formats`] that fits every line.
+
+mod formats;
+mod table;
+
+use std::collections::BTreeMap;
 
 use posescope_core::scene::trailing_number;
 
+use self::formats::{Format, KITTI, TUM};
 use super::SceneError;
-use super::colmap::image_lines;
 use super::frame_names::FrameNames;
-use super::lines::{Line, NAMES, TextFile};
+use super::lines::{Line, TextFile};
+use super::time_unit::TimeUnit;
 use crate::geometry::Pose;
+
+/// A file of poses.
+pub(super) struct PoseFile<'a> {
+    pub poses: PoseText<'a>,
+    /// Whether the format says that its poses are `camera_from_world`. They are inverted already.
+    pub is_camera_from_world: bool,
+}
 
 /// The poses of a file, `world_from_camera`.
 pub(super) enum PoseText<'a> {
-    Timed(Vec<(f64, Pose)>),
+    Timed(TimedPoses),
     Lines(PoseLines),
     Named(Vec<NamedPose<'a>>),
+}
+
+/// Poses by time.
+pub(super) struct TimedPoses {
+    /// In any order, in the unit of the file.
+    pub samples: Vec<(f64, Pose)>,
+    /// The unit that the file names.
+    pub unit: Option<TimeUnit>,
 }
 
 /// A pose with the name of its image.
@@ -28,141 +46,202 @@ pub(super) struct NamedPose<'a> {
     pub world_from_camera: Pose,
 }
 
-impl<'a> PoseText<'a> {
-    /// Reads a file. Poses by name are only read if `names` are given to look them up.
-    pub fn read(file: &'a TextFile, names: Option<&FrameNames<'_>>) -> Result<Self, SceneError> {
-        let Some(first) = file.lines().next() else {
+/// What a line says.
+struct Row<'a> {
+    line: Line<'a>,
+    key: Key,
+    /// `world_from_camera`; `None` where the camera was lost, which trackers write as NaN.
+    pose: Option<Pose>,
+}
+
+/// What a line says its pose belongs to.
+enum Key {
+    Name(String),
+    Time(f64),
+    Number(u64),
+    /// Nothing: lines are in the order of the frames.
+    Order,
+}
+
+impl<'a> PoseFile<'a> {
+    /// Reads a file. Where several formats fit all lines, the names of the frames decide.
+    ///
+    /// # Errors
+    /// Where no format fits, the error names each of them with the first line that does not fit.
+    pub fn read(file: &'a TextFile, names: &FrameNames<'_>) -> Result<Self, SceneError> {
+        if file.lines().next().is_none() {
             return Err(file.error("poses expected, none found"));
+        }
+        if let Some(read) = table::read(file)? {
+            return Ok(read);
+        }
+        let tried = formats::ALL.iter().map(|format| (format, format.read(file)));
+        let mut fitting = Vec::new();
+        let mut broken = Vec::new();
+        for (format, rows) in tried {
+            match rows {
+                Ok(rows) => fitting.push((format, rows)),
+                Err(misfit) => broken.push((format, misfit)),
+            }
+        }
+        let (format, rows) = match fitting.len() {
+            0 => return Err(no_format(&broken)),
+            1 => fitting.remove(0),
+            _ => best_named(file, fitting, names)?,
         };
-        if let Some(columns) = first.header() {
-            return with_header(file, first, &columns);
-        }
-        let words = first.words().count();
-        match (words, names) {
-            (12, _) => Ok(Self::Lines(by_line(file)?)),
-            (8, Some(names)) if is_named(first, names) => {
-                let poses = file.lines().map(named);
-                Ok(Self::Named(poses.collect::<Result<_, _>>()?))
-            }
-            (8, _) => Ok(Self::Timed(by_time(file)?)),
-            (10.., Some(_)) => {
-                let poses = image_lines(file).map(|(line, image)| {
-                    let image = image?;
-                    Ok(NamedPose {
-                        line,
-                        name: image.name,
-                        world_from_camera: image.camera_from_world.inverse(),
-                    })
-                });
-                Ok(Self::Named(poses.collect::<Result<_, SceneError>>()?))
-            }
-            (_, names) => {
-                let named = match names {
-                    Some(_) => ", `name qw qx qy qz x y z` or COLMAP's images.txt",
-                    None => "",
-                };
-                Err(first.error(format!(
-                    "TUM (8 numbers: time x y z qx qy qz qw), KITTI (12 numbers: a 3x4 matrix){named} \
-                     expected; words found: {words}"
-                )))
-            }
-        }
+        Self::of_rows(file, rows, None, format.is_camera_from_world)
+    }
+
+    fn of_rows(
+        file: &TextFile,
+        rows: Vec<Row<'a>>,
+        unit: Option<TimeUnit>,
+        is_camera_from_world: bool,
+    ) -> Result<Self, SceneError> {
+        warn_of_lost(file, &rows);
+        let poses = match rows.first().map(|row| &row.key) {
+            Some(Key::Time(_)) => PoseText::Timed(TimedPoses { samples: timed(rows), unit }),
+            Some(Key::Name(_)) => PoseText::Named(rows.into_iter().filter_map(named).collect()),
+            _ => PoseText::Lines(PoseLines::new(rows)?),
+        };
+        Ok(Self { poses, is_camera_from_world })
     }
 }
 
-/// The lines below a header that names the columns.
-fn with_header<'a>(
-    file: &'a TextFile,
-    first: Line<'a>,
-    columns: &[String],
-) -> Result<PoseText<'a>, SceneError> {
-    let find =
-        |called: &[&str]| columns.iter().position(|column| called.contains(&column.as_str()));
-    let numbers = [&["x", "tx"], &["y", "ty"], &["z", "tz"]].map(|called| find(called));
-    let quaternion = ["qx", "qy", "qz", "qw"].map(|called| find(&[called]));
-    let (name, time) = (find(NAMES), find(&["time", "timestamp"]));
-    let ([Some(x), Some(y), Some(z)], [Some(qx), Some(qy), Some(qz), Some(qw)], Some(key)) =
-        (numbers, quaternion, name.or(time))
-    else {
-        return Err(first.error(
-            "a header with the columns `name` or `time`, and `x y z qx qy qz qw`, expected",
-        ));
+/// The format of several under which most names are those of frames. A format without names is right where no name
+/// is that of a frame.
+fn best_named<'a>(
+    file: &TextFile,
+    mut fitting: Vec<(&'static Format, Vec<Row<'a>>)>,
+    names: &FrameNames<'_>,
+) -> Result<(&'static Format, Vec<Row<'a>>), SceneError> {
+    let found = |rows: &[Row<'_>]| {
+        let called = rows.iter().filter_map(|row| match &row.key {
+            Key::Name(name) => Some(name.as_str()),
+            _ => None,
+        });
+        names.find_all(called).iter().flatten().count()
     };
-    let poses = file.lines().skip(1).map(|line| {
-        let words: Vec<&str> = line.words().collect();
-        if words.len() != columns.len() {
-            let (count, found) = (columns.len(), words.len());
-            return Err(line.error(format!("{count} columns expected, {found} found")));
-        }
-        let number = |column: usize| line.number(words[column]);
-        let position = [number(x)?, number(y)?, number(z)?];
-        let pose = line.pose(position, [number(qx)?, number(qy)?, number(qz)?, number(qw)?])?;
-        Ok(NamedPose { line, name: words[key].to_owned(), world_from_camera: pose })
+    let score = |rows: &[Row<'_>]| (found(rows), !matches!(rows[0].key, Key::Name(_)));
+    fitting.sort_by_key(|(_, rows)| std::cmp::Reverse(score(rows)));
+    if score(&fitting[0].1) == score(&fitting[1].1) {
+        let [one, other] = [0, 1].map(|at| fitting[at].0);
+        return Err(file.error(format!(
+            "poses of one format expected, but all lines fit {} ({}) and {} ({}); name the columns in a first line: \
+             name x y z qx qy qz qw",
+            one.name, one.form, other.name, other.form
+        )));
+    }
+    Ok(fitting.remove(0))
+}
+
+/// The error of a file that fits no format: the one that fits most lines comes first.
+fn no_format(broken: &[(&Format, formats::Misfit<'_>)]) -> SceneError {
+    let mut sorted: Vec<_> = broken.iter().collect();
+    sorted.sort_by_key(|(_, misfit)| std::cmp::Reverse((misfit.line.number, misfit.has_its_form)));
+    let said = sorted.iter().map(|(format, misfit)| {
+        let Format { name, form, .. } = format;
+        let line = misfit.line.number;
+        let is_first = line == sorted[0].1.line.number;
+        let at = if is_first { String::new() } else { format!("line {line}: ") };
+        format!("{name} ({form}): {at}{}", misfit.why)
     });
-    let poses: Vec<NamedPose<'_>> = poses.collect::<Result<_, SceneError>>()?;
-    if name.is_some() {
-        return Ok(PoseText::Named(poses));
-    }
-    let timed =
-        poses.iter().map(|pose| Ok((pose.line.number(&pose.name)?, pose.world_from_camera)));
-    Ok(PoseText::Timed(timed.collect::<Result<_, SceneError>>()?))
+    let said = said.collect::<Vec<_>>().join("; ");
+    let line = sorted[0].1.line;
+    line.error(format!("a line of one of the formats of poses expected: {said}"))
 }
 
-/// Whether a line of eight words begins with a name instead of a time. If its first word is a number, the quaternion
-/// decides; if both readings are possible, a frame of that name does.
-fn is_named(line: Line<'_>, names: &FrameNames<'_>) -> bool {
-    let name = line.words().next().unwrap_or_default();
-    match (timed(line).is_ok(), named(line).is_ok()) {
-        (true, true) => names.find_alone(name).is_some(),
-        (false, false) => line.number(name).is_err(),
-        (_, is_named) => is_named,
+fn warn_of_lost(file: &TextFile, rows: &[Row<'_>]) {
+    let lost: Vec<&Row<'_>> = rows.iter().filter(|row| row.pose.is_none()).collect();
+    if let Some(first) = lost.first() {
+        log::warn!(
+            "{}: {} of {} poses are not finite, such as that of line {}, and are skipped",
+            file.name(),
+            lost.len(),
+            rows.len(),
+            first.line.number
+        );
     }
 }
 
-/// `name qw qx qy qz x y z`
-fn named(line: Line<'_>) -> Result<NamedPose<'_>, SceneError> {
-    let name = line.words().next().unwrap_or_default();
-    let pose = line.text.strip_prefix(name).unwrap_or_default();
-    let [qw, qx, qy, qz, x, y, z] = line.numbers_of(pose)?;
-    Ok(NamedPose {
-        line,
-        name: name.to_owned(),
-        world_from_camera: line.pose([x, y, z], [qx, qy, qz, qw])?.inverse(),
-    })
+fn timed(rows: Vec<Row<'_>>) -> Vec<(f64, Pose)> {
+    let sample = |row: Row<'_>| match row.key {
+        Key::Time(time) => Some((time, row.pose?)),
+        _ => None,
+    };
+    rows.into_iter().filter_map(sample).collect()
 }
 
-fn timed(line: Line<'_>) -> Result<(f64, Pose), SceneError> {
-    let [time, x, y, z, qx, qy, qz, qw] = line.numbers()?;
-    Ok((time, line.pose([x, y, z], [qx, qy, qz, qw])?))
+fn named(row: Row<'_>) -> Option<NamedPose<'_>> {
+    match row.key {
+        Key::Name(name) => Some(NamedPose { line: row.line, name, world_from_camera: row.pose? }),
+        _ => None,
+    }
 }
 
 /// The poses of a TUM text with their times \[s\].
 pub(super) fn by_time(file: &TextFile) -> Result<Vec<(f64, Pose)>, SceneError> {
-    file.lines().map(timed).collect()
+    let rows = TUM.read(file).map_err(|misfit| misfit.line.error(misfit.why))?;
+    warn_of_lost(file, &rows);
+    Ok(timed(rows))
 }
 
+/// The poses of a KITTI text.
 pub(super) fn by_line(file: &TextFile) -> Result<PoseLines, SceneError> {
-    let poses = file.lines().map(|line| line.matrix_pose());
-    Ok(PoseLines(poses.collect::<Result<_, _>>()?))
+    let rows = KITTI.read(file).map_err(|misfit| misfit.line.error(misfit.why))?;
+    warn_of_lost(file, &rows);
+    PoseLines::new(rows)
 }
 
-pub(super) struct PoseLines(Vec<Pose>);
+/// A pose per line, without names.
+pub(super) struct PoseLines {
+    poses: Vec<Option<Pose>>,
+    /// The positions in the list by the numbers that begin the lines, if any do.
+    numbers: Option<BTreeMap<u64, usize>>,
+}
 
 impl PoseLines {
+    fn new(rows: Vec<Row<'_>>) -> Result<Self, SceneError> {
+        let mut numbers = BTreeMap::new();
+        for (at, row) in rows.iter().enumerate() {
+            if let Key::Number(number) = row.key
+                && numbers.insert(number, at).is_some()
+            {
+                let expected = format!("one pose per number expected, {number} has one already");
+                return Err(row.line.error(expected));
+            }
+        }
+        let poses = rows.into_iter().map(|row| row.pose).collect();
+        Ok(Self { poses, numbers: Some(numbers).filter(|numbers| !numbers.is_empty()) })
+    }
+
     pub fn count(&self) -> usize {
-        self.0.len()
+        self.poses.len()
     }
 
-    /// The pose of a line, counted from 0.
+    /// The range of the numbers that begin the lines, if any do.
+    pub fn numbers(&self) -> Option<(u64, u64)> {
+        let numbers = self.numbers.as_ref()?;
+        Some((*numbers.first_key_value()?.0, *numbers.last_key_value()?.0))
+    }
+
+    /// The pose of a line, counted from 0; `None` where the camera was lost.
     pub fn get(&self, line: usize) -> Option<Pose> {
-        self.0.get(line).copied()
+        self.poses.get(line).copied().flatten()
     }
 
-    /// The pose of a frame. If there are as many lines as frames, lines are in the order of the frames. Otherwise
-    /// the number at the end of the frame's name is the number of its line.
-    pub fn of_frame(&self, index: usize, frames: usize, name: &str) -> Option<Pose> {
-        let by_name = || line_of(name)?.try_into().ok();
-        self.get(if self.count() == frames { index } else { by_name()? })
+    /// The line of a frame. If there are as many lines as frames, numbered from 0 or not at all, they are in the order
+    /// of the frames. Otherwise the number at the end of the frame's name is that of its line.
+    pub fn line_of_frame(&self, index: usize, frames: usize, name: &str) -> Option<usize> {
+        let are_in_order = self.count() == frames
+            && self.numbers().is_none_or(|range| range == (0, frames as u64 - 1));
+        let line = match &self.numbers {
+            Some(numbers) if are_in_order => *numbers.get(&(index as u64))?,
+            Some(numbers) => *numbers.get(&line_of(name)?)?,
+            None if are_in_order => index,
+            None => line_of(name)?.try_into().ok()?,
+        };
+        (line < self.count()).then_some(line)
     }
 }
 
@@ -172,43 +251,4 @@ pub(super) fn line_of(name: &str) -> Option<u64> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_header_names_the_columns() {
-        let text = "image,qw,qx,qy,qz,x,y,z\nDSC_1.JPG,1,0,0,0,4,5,6\nDSC_2.JPG,0,0,1,0,7,8,9\n";
-        let file = TextFile::from_text("poses.csv", text);
-        let Ok(PoseText::Named(poses)) = PoseText::read(&file, None) else {
-            panic!("no named poses");
-        };
-        assert_eq!(poses[1].name, "DSC_2.JPG");
-        assert_eq!(poses[1].world_from_camera.translation.vector.as_slice(), [7.0, 8.0, 9.0]);
-        assert_eq!(poses[1].world_from_camera.rotation.coords.as_slice(), [0.0, 1.0, 0.0, 0.0]);
-        let timed = "x y z qx qy qz qw timestamp\n4 5 6 0 0 0 1 12.5\n";
-        let file = TextFile::from_text("poses.txt", timed);
-        let Ok(PoseText::Timed(samples)) = PoseText::read(&file, None) else {
-            panic!("no timed poses");
-        };
-        assert_eq!(samples[0].0, 12.5);
-        for (wrong, words) in [
-            ("name,x,y,z\na,1,2,3\n", "`x y z qx qy qz qw`, expected"),
-            ("name,x,y,z,qx,qy,qz,qw\na,1,2,3\n", "poses.txt:2: 8 columns expected, 4 found"),
-        ] {
-            let file = TextFile::from_text("poses.txt", wrong);
-            let error = PoseText::read(&file, None).err().expect("wrong").to_string();
-            assert!(error.contains(words), "{error}");
-        }
-    }
-
-    #[test]
-    fn lines_are_in_the_order_of_the_frames_or_by_the_number_of_a_name() {
-        let text: String = (0..3).map(|z| format!("1 0 0 0 0 1 0 0 0 0 1 {z}\n")).collect();
-        let poses = by_line(&TextFile::from_text("poses.txt", &text)).expect("three poses");
-        let way_m = |pose: Option<Pose>| pose.map(|pose| pose.translation.vector.z);
-        assert_eq!(way_m(poses.of_frame(0, 3, "img2")), Some(0.0));
-        assert_eq!(way_m(poses.of_frame(0, 2, "img2")), Some(2.0));
-        assert_eq!(way_m(poses.of_frame(0, 2, "img7")), None);
-        assert_eq!(way_m(poses.of_frame(0, 2, "img")), None);
-    }
-}
+mod tests;

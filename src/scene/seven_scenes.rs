@@ -63,14 +63,18 @@ fn open(folder: &Path, split: Option<&str>) -> Result<Box<dyn Scene>, SceneError
     let (name, photos) = listing(folder, split)?;
     let size = photo_file::dimensions(&photos[0].1)?;
     let cameras = Cameras::of(folder, size)?;
+    let scene = if is_sequence(folder) { scene_of(folder) } else { folder_name(folder) };
     let mut frames = Vec::with_capacity(photos.len());
     let mut depths = Vec::with_capacity(photos.len());
     for (name, photo) in photos {
         let number = photo_number(&photo).unwrap_or_default();
+        let sequence = photo.parent().unwrap_or(folder);
+        let other_name = format!("{scene}/{}/frame-{number}", folder_name(sequence));
         let beside = |kind: &str| photo.with_file_name(format!("frame-{number}.{kind}"));
         depths.push(Some(beside("depth.png")).filter(|path| path.is_file()));
         frames.push(Frame {
             name,
+            other_name: Some(other_name),
             world_from_camera: read_pose(&beside("pose.txt"))?
                 .map(|world_from_posed| world_from_posed * cameras.camera_from_posed.inverse()),
             ..Frame::new(photo, cameras.photo)
@@ -94,15 +98,19 @@ fn open(folder: &Path, split: Option<&str>) -> Result<Box<dyn Scene>, SceneError
     Ok(Box::new(FileScene::new(name, frames, clouds)))
 }
 
+/// The name of the scene that a sequence belongs to.
+fn scene_of(sequence: &Path) -> String {
+    let sequence = sequence.canonicalize().unwrap_or_else(|_| sequence.to_owned());
+    sequence.parent().map(folder_name).unwrap_or_default()
+}
+
 type NamedPhoto = (String, PathBuf);
 
 /// The scene's name and its frames in order. Frames are named by number, or with several sequences by sequence and
 /// number.
 fn listing(folder: &Path, split: Option<&str>) -> Result<(String, Vec<NamedPhoto>), SceneError> {
     if is_sequence(folder) {
-        let scene = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
-        let scene = scene.parent().map(folder_name).unwrap_or_default();
-        let name = format!("7scenes/{scene}/{}", folder_name(folder));
+        let name = format!("7scenes/{}/{}", scene_of(folder), folder_name(folder));
         return Ok((name, frames_of(folder, "")?));
     }
     let mut sequences = subfolders(folder);

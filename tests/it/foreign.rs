@@ -222,7 +222,7 @@ fn poses_that_cannot_be_read_are_named_with_their_line() {
     let file = sequence.path().join("poses.txt");
     for (content, words) in [
         ("", "poses expected, none found"),
-        ("1 2 3\n", "poses.txt:1: TUM"),
+        ("1 2 3\n", "poses.txt:1: ~ TUM"),
         ("a.png 1 0 0 0 0 0 0\n", "with names like `000004`; the file has names like `a.png`"),
         (
             "5 1 0 0 0 0 0 0\n5.png 1 0 0 0 0 0 0\n",
@@ -230,14 +230,14 @@ fn poses_that_cannot_be_read_are_named_with_their_line() {
         ),
         (
             "0.4 0 0 0 0 0 0 1\n0.5 0 0 0 0 0 9 1\n",
-            "poses.txt:2: a quaternion of length 1 expected",
+            "poses.txt:2: ~ a quaternion of length 1 expected",
         ),
-        ("a.png 2 0 0 0 0 0 0\n", "poses.txt:1: a quaternion of length 1 expected"),
+        ("a.png 2 0 0 0 0 0 0\n", "poses.txt:1: ~ a quaternion of length 1 expected"),
         ("77.4 0 0 0 0 0 0 1\n", "the frames' times are 0.4 … 0.7, the poses' times 77.4"),
         ("1 0 0 0 0 1 0 0 0 0 1 0\n", "1 lines found. Poses of some frames need names"),
         ("x,y\n", "poses.txt:1: a header with the columns `name` or `time`"),
-        ("1 0 0 0 0 1 0 0 0 0 1 x\n", "poses.txt:1: a number expected, `x` found"),
-        ("1 1 0 0 0 0 0 0 1 5.png\n\n2 1 0 0 0 0 0 0 1\n", "poses.txt:3: a line `id qw"),
+        ("1 0 0 0 0 1 0 0 0 0 1 x\n", "poses.txt:1: ~ a number expected, `x` found"),
+        ("1 1 0 0 0 0 0 0 1 5.png\n\n2 1 0 0 0 0 0 0 1\n", "poses.txt:3: ~ a line `id qw"),
     ] {
         write(&file, content);
         let read = scene::read_estimates(&file, scene.as_ref());
@@ -270,6 +270,6 @@ fn an_unreadable_file_of_poses_is_bad_data() {
     write(sequence.path().join("poses.txt"), "1 2 3\n");
     refused(
         sequence.path(),
-        "3 | run sequences/42 --query 5 --reference 4 --estimates other=poses.txt | poses.txt:1: TUM",
+        "3 | run sequences/42 --query 5 --reference 4 --estimates other=poses.txt | poses.txt:1: ~ TUM",
     );
 }

@@ -277,6 +277,26 @@ fn no_damage_to_a_table_of_poses_or_positions_makes_its_reader_panic() {
             "vloc.txt",
             "000004.png 1 0 0 0 0 0 -4\n000005.png 0.6 0 0.8 0 1 2 -5\n7 1 0 0 0 0 0 -7\n",
         ),
+        ("one-line.txt", "1 1 0 0 0 0 0 -4 1 000004.png\n2 1 0 0 0 0 0 -5 1 000005.png\n"),
+        (
+            "euroc.csv",
+            "#timestamp [ns],p_RS_R_x [m],p_RS_R_y [m],p_RS_R_z [m],q_RS_w [],q_RS_x [],q_RS_y [],q_RS_z []\n\
+             400000000,0,0,4,1,0,0,0\n500000000,0,0,5.25,0.8,0,0.6,0\n",
+        ),
+        (
+            "kitti-360.txt",
+            "4 1 0 0 0 0 1 0 0 0 0 1 4\n5 1 0 0 0 0 1 0 0 0 0 1 5\n7 0 0 1 0 0 1 0 0 -1 0 0 7\n",
+        ),
+        ("ace.txt", "000004.png 1 0 0 0 0 0 -4 0.5 1.5 61\n000005.png 0.6 0 0.8 0 1 2 -5 0 1 62\n"),
+        (
+            "ace0.txt",
+            "000004.png 1 0 0 0 0 0 -4 525.5 0.9\n000005.png 0.6 0 0.8 0 1 2 -5 525.5 1\n",
+        ),
+        (
+            "kapture.txt",
+            "# timestamp, device_id, qw, qx, qy, qz, tx, ty, tz\n0.4, cam0, 1, 0, 0, 0, 0, 0, -4\n\
+             0.5, cam0, 0.6, 0, 0.8, 0, 1, 2, -5\n",
+        ),
     ] {
         fs::write(at(name), content).expect("writable");
         let read = || scene::read_estimates(&at(name), scene.as_ref()).map(drop);

@@ -213,6 +213,49 @@ fn seven_scenes_open_by_split_and_by_sequence() {
 }
 
 #[test]
+fn photos_of_seven_scenes_are_found_by_their_paths() {
+    let folder = TempDir::new().expect("a folder");
+    let root = folder.path().join("kitchen");
+    write_seven_scenes(&root);
+    let file = folder.path().join("poses.txt");
+    let found = |scene: &dyn Scene, name: &str| {
+        fs::write(&file, format!("{name} 1 0 0 0 0 0 0\n")).expect("writable");
+        let read = posescope::scene::read_estimates(&file, scene);
+        read.ok().map(|estimates| estimates.into_keys().collect::<Vec<_>>())
+    };
+    let one = |name: &str| Some(vec![name.to_owned()]);
+    let sequence = open(root.join("seq-01"));
+    for name in [
+        "seq-01/frame-000001.color.png",
+        "kitchen/seq-01/frame-000001.color.png",
+        "7scenes/kitchen/seq-01/frame-000001.color.png",
+        "seq-01-frame-000001.color.png",
+        "frame-000001.color.png",
+        "frame-000001.color",
+        "frame-000001",
+        "000001",
+        "1",
+    ] {
+        assert_eq!(found(sequence.as_ref(), name), one("000001"), "{name}");
+        if !name.contains("-frame") {
+            assert_eq!(sequence.find(name).ok(), Some(1), "{name}");
+        }
+    }
+    for name in
+        ["seq-02/frame-000001.color.png", "office/seq-01/frame-000001.color.png", "img-000001"]
+    {
+        assert_eq!(found(sequence.as_ref(), name), None, "{name}");
+    }
+    assert!(sequence.find("seq-02/frame-000001.color.png").is_err());
+    let scene = open(&root);
+    let name = "seq-02/frame-000000.color.png";
+    assert_eq!(found(scene.as_ref(), name), one("seq-02-000000"));
+    assert_eq!(scene.find(name).ok(), Some(2));
+    assert_eq!(found(scene.as_ref(), "frame-000000"), None);
+    assert_eq!(found(scene.as_ref(), "frame-000001"), one("seq-01-000001"));
+}
+
+#[test]
 fn registered_depth_images_share_the_camera_of_the_photos() {
     let folder = TempDir::new().expect("a folder");
     write_seven_scenes(folder.path());

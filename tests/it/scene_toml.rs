@@ -338,7 +338,7 @@ fn what_is_wrong_with_a_description_is_named_with_its_line() {
         scene.toml | cy = 31.5 -> cy = 31.5\nk1 = -9 | scene.toml:5 ~ a distortion that can be removed
         scene.toml | [camera] -> clouds = { files = "*.xyz" }\n[camera] | scene.toml:3 ~ both found
         poses.txt | text  | poses.txt ~ none found
-        poses.txt | text 1 2 3\n | poses.txt:1 ~ 8 numbers ~ words found: 3
+        poses.txt | text 1 2 3\n | poses.txt:1 ~ 8 numbers expected, 3 found ~ 12 or 16 numbers
         poses.txt | text 1 0 0 0 0 1 0 0 0 0 1 0\n | poses.txt ~ one line per image expected (3) ~ `img1`
         poses.txt | text 5.0 0 0 0 0 0 0 1\n | poses.txt ~ img0 ~ between 5 and 5
         poses.txt | text name x y z qx qy qz qw\na 0 0 0 0 0 0 1\n | names like `img0` expected ~ names like `a`

@@ -34,6 +34,12 @@ pub trait Scene: Send + Sync {
     /// The frames' names, as their files are called, in their order.
     fn frames(&self) -> &[String];
 
+    /// Another name of a frame: the path of its photo without extension, where that is more than the frame's name says
+    /// and other programs call it so.
+    fn other_name(&self, _frame: usize) -> Option<&str> {
+        None
+    }
+
     /// The camera of the frame, and with it the size of its photo.
     fn intrinsics(&self, frame: usize) -> Intrinsics;
 
@@ -197,19 +203,24 @@ impl dyn Scene + '_ {
             path.parse::<f64>().is_ok()
                 && (rest.starts_with('.') || path.contains('.') && !rest.is_empty())
         };
-        let readings: [&dyn Fn(&str) -> bool; 8] = [
-            &|frame| frame == name,
-            &|frame| frame == path,
-            &|frame| frame.contains('/') && frame.replace('/', "-") == path,
-            &ends_path,
-            &|frame| number.is_some() && frame.parse().ok() == number,
-            &|frame| stem(frame) == path,
-            &|frame| number.is_some() && trailing_number(frame) == number,
-            &begins_a_time,
+        let is_other = |at: usize| {
+            let path = without_kind(path);
+            let other = self.other_name(at);
+            other.is_some_and(|other| ends_with_path(other, path) || ends_with_path(path, other))
+        };
+        let readings: [&dyn Fn(usize) -> bool; 9] = [
+            &|at| frames[at] == name,
+            &|at| frames[at] == path,
+            &|at| frames[at].contains('/') && frames[at].replace('/', "-") == path,
+            &|at| ends_path(&frames[at]),
+            &|at| is_other(at),
+            &|at| number.is_some() && frames[at].parse().ok() == number,
+            &|at| stem(&frames[at]) == path,
+            &|at| number.is_some() && trailing_number(&frames[at]) == number,
+            &|at| begins_a_time(&frames[at]),
         ];
         for is_meant in readings {
-            let fitting: Vec<usize> =
-                (0..frames.len()).filter(|&at| is_meant(&frames[at])).collect();
+            let fitting: Vec<usize> = (0..frames.len()).filter(|&at| is_meant(at)).collect();
             match fitting.as_slice() {
                 [] => {}
                 [only] => return Ok(*only),
@@ -248,6 +259,16 @@ pub fn frame_range(scene: &dyn Scene) -> String {
 pub fn trailing_number(name: &str) -> Option<u64> {
     let before = name.trim_end_matches(|c: char| c.is_ascii_digit());
     name[before.len()..].parse().ok()
+}
+
+/// Whether a path ends with another one.
+fn ends_with_path(path: &str, end: &str) -> bool {
+    path.strip_suffix(end).is_some_and(|before| before.is_empty() || before.ends_with('/'))
+}
+
+/// A name without what 7-Scenes puts before the extension of its photos.
+pub fn without_kind(name: &str) -> &str {
+    name.strip_suffix(".color").unwrap_or(name)
 }
 
 /// A name without folder and extension of a photo.

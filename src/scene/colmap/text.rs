@@ -49,16 +49,23 @@ fn points(path: &Path) -> Result<Points, SceneError> {
 }
 
 /// Two lines per image: `IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME`, then `X Y POINT3D_ID` of each feature. The
-/// second line may be empty.
+/// second line may be empty or missing.
 fn images(path: &Path, points: &Points) -> Result<Vec<ModelImage>, SceneError> {
     let file = TextFile::read(path)?;
     let mut images = Vec::new();
     for (line, features) in pairs_of_lines(&file) {
-        let mut image = image(line)?;
-        if let Some(features) = features {
-            image.observed = observed(features, points)?;
+        let ImageLine { name, camera, numbers } =
+            image_of_line(line.text).map_err(|why| line.error(why))?;
+        if let Some(number) = numbers.iter().find(|number| !number.is_finite()) {
+            return Err(line.error(format!("finite numbers expected, {number} found")));
         }
-        images.push(image);
+        let [qw, qx, qy, qz, x, y, z] = numbers;
+        images.push(ModelImage {
+            name: name.to_owned(),
+            camera,
+            camera_from_world: line.pose([x, y, z], [qx, qy, qz, qw])?,
+            observed: features.map_or_else(|| Ok(Vec::new()), |line| observed(line, points))?,
+        });
     }
     if images.is_empty() {
         return Err(file.error("images expected, none found"));
@@ -66,41 +73,57 @@ fn images(path: &Path, points: &Points) -> Result<Vec<ModelImage>, SceneError> {
     Ok(images)
 }
 
-/// The line of each image with that of its features.
+/// The line of each image with that of its features. Programs that skip blank lines drop the second lines of images
+/// without features, so the content decides.
 fn pairs_of_lines(file: &TextFile) -> impl Iterator<Item = (Line<'_>, Option<Line<'_>>)> {
-    let mut lines = file.all_lines();
-    std::iter::from_fn(move || Some((lines.find(Line::has_content)?, lines.next())))
+    let mut lines = file.all_lines().peekable();
+    std::iter::from_fn(move || {
+        let image = lines.find(Line::has_content)?;
+        Some((image, lines.next_if(|line| line.has_content() && !is_image(line.text))))
+    })
 }
 
-/// The images of a text with their lines, without observed points.
-pub(in super::super) fn image_lines(
-    file: &TextFile,
-) -> impl Iterator<Item = (Line<'_>, Result<ModelImage, SceneError>)> {
-    pairs_of_lines(file).map(|(line, _)| (line, image(line)))
+/// Whether a line is that of an image and not of features, which are triples of numbers.
+fn is_image(text: &str) -> bool {
+    let words: Vec<&str> = text.split_whitespace().collect();
+    let has_name = words.iter().any(|word| word.parse::<f64>().is_err());
+    words.len() >= 10
+        && words[8].parse::<u32>().is_ok()
+        && (has_name || !words.len().is_multiple_of(3))
 }
 
-fn image(line: Line<'_>) -> Result<ModelImage, SceneError> {
-    let mut rest = line.text;
+/// The lines of the images of a text, without those of their features.
+pub(in super::super) fn lines_of_images(file: &TextFile) -> Vec<Line<'_>> {
+    pairs_of_lines(file).map(|(line, _)| line).collect()
+}
+
+/// The line of an image.
+pub(in super::super) struct ImageLine<'a> {
+    /// It may contain blanks.
+    pub name: &'a str,
+    pub camera: u32,
+    /// `qw qx qy qz x y z`, world to camera. They may be NaN.
+    pub numbers: [f64; 7],
+}
+
+pub(in super::super) fn image_of_line(text: &str) -> Result<ImageLine<'_>, String> {
+    let mut rest = text;
     let mut next = || {
-        let (word, after) = rest.split_once(char::is_whitespace).ok_or_else(|| {
-            line.error("a line `id qw qx qy qz tx ty tz camera name` expected, it is cut off")
-        })?;
+        let (word, after) = rest
+            .split_once(char::is_whitespace)
+            .ok_or("a line `id qw qx qy qz tx ty tz camera name` expected, it is cut off")?;
         rest = after.trim_start();
-        Ok::<&str, SceneError>(word)
+        Ok::<&str, String>(word)
     };
-    let _id: u32 = whole(&line, next()?)?;
+    let _id: u32 = whole_number(next()?)?;
     let mut numbers = [0.0; 7];
     for number in &mut numbers {
-        *number = line.number(next()?)?;
+        let word = next()?;
+        let error = |_| format!("a number expected, `{}` found", excerpt(word));
+        *number = word.parse().map_err(error)?;
     }
-    let camera = whole(&line, next()?)?;
-    let [qw, qx, qy, qz, x, y, z] = numbers;
-    Ok(ModelImage {
-        name: rest.to_owned(),
-        camera,
-        camera_from_world: line.pose([x, y, z], [qx, qy, qz, qw])?,
-        observed: Vec::new(),
-    })
+    let camera = whole_number(next()?)?;
+    Ok(ImageLine { name: rest, camera, numbers })
 }
 
 /// The points of the features; −1 means none.
@@ -121,6 +144,9 @@ fn observed(line: Line<'_>, points: &Points) -> Result<Vec<u32>, SceneError> {
 }
 
 fn whole<T: std::str::FromStr>(line: &Line<'_>, word: &str) -> Result<T, SceneError> {
-    let error = |_| format!("a whole number expected, `{}` found", excerpt(word));
-    word.parse().map_err(error).map_err(|why| line.error(why))
+    whole_number(word).map_err(|why| line.error(why))
+}
+
+fn whole_number<T: std::str::FromStr>(word: &str) -> Result<T, String> {
+    word.parse().map_err(|_| format!("a whole number expected, `{}` found", excerpt(word)))
 }

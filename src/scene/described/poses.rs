@@ -4,8 +4,9 @@ use std::path::Path;
 
 use super::super::SceneError;
 use super::super::frame_names::FrameNames;
-use super::super::lines::{self, TextFile};
-use super::super::pose_text::{NamedPose, PoseLines, PoseText};
+use super::super::lines::TextFile;
+use super::super::pose_text::{NamedPose, PoseFile, PoseLines, PoseText, TimedPoses};
+use super::super::time_unit::{TimeUnit, time_of_name};
 use super::super::trajectory::Trajectory;
 use crate::geometry::Pose;
 
@@ -18,13 +19,18 @@ pub(super) struct FramePoses {
     pub time_s: Option<f64>,
 }
 
-pub(super) fn read(path: &Path, photos: &[String]) -> Result<Vec<FramePoses>, SceneError> {
+/// The poses of photos, and whether the format of the file says that they are `camera_from_world`. They are inverted
+/// already then.
+pub(super) fn read(path: &Path, photos: &[String]) -> Result<(Vec<FramePoses>, bool), SceneError> {
     let file = TextFile::read(path)?;
-    match PoseText::read(&file, None)? {
-        PoseText::Timed(samples) => by_time(&file, Trajectory::in_seconds(samples), photos),
+    let PoseFile { poses, is_camera_from_world } =
+        PoseFile::read(&file, &FrameNames::of("", photos))?;
+    let poses = match poses {
+        PoseText::Timed(poses) => by_time(&file, &poses, photos),
         PoseText::Lines(poses) => by_line(&file, &poses, photos),
         PoseText::Named(poses) => by_name(&file, &poses, photos),
-    }
+    };
+    Ok((poses?, is_camera_from_world))
 }
 
 /// Poses of photos by their names; photos that the file does not name have none.
@@ -50,24 +56,44 @@ fn by_name(
     Ok(poses)
 }
 
-/// Poses of photos whose names are times.
+/// Poses of photos whose names are times. Where the file names no unit of its times, it is the one in which most fit.
 fn by_time(
     file: &TextFile,
-    trajectory: Trajectory,
+    TimedPoses { samples, unit }: &TimedPoses,
     photos: &[String],
 ) -> Result<Vec<FramePoses>, SceneError> {
-    let poses = photos.iter().map(|photo| {
-        let time_s = lines::numbers::<1>(photo).ok().map(|[time]| time);
-        FramePoses { pose: time_s.and_then(|time| trajectory.at(time)), time_s }
-    });
-    let poses: Vec<FramePoses> = poses.collect();
-    if poses.iter().all(|frame| frame.pose.is_none()) {
-        let (first, last) = trajectory.range().unwrap_or_default();
+    let in_unit = |unit: TimeUnit| {
+        let samples = samples.iter().map(|(time, pose)| (unit.seconds(*time), *pose));
+        let trajectory = Trajectory::in_seconds(samples.collect());
+        let poses = photos.iter().map(|photo| {
+            let time_s = time_of_name(photo);
+            FramePoses { pose: time_s.and_then(|time| trajectory.at(time)), time_s }
+        });
+        poses.collect::<Vec<FramePoses>>()
+    };
+    let found = |poses: &[FramePoses]| poses.iter().filter(|frame| frame.pose.is_some()).count();
+    let units = unit.map_or(TimeUnit::ALL.to_vec(), |unit| vec![unit]);
+    let read = units.into_iter().map(|unit| (unit, in_unit(unit)));
+    // The first of those that are equally good: seconds.
+    let best = read.reduce(|a, b| if found(&b.1) > found(&a.1) { b } else { a });
+    let (read_in, poses) = best.unwrap_or((TimeUnit::Second, Vec::new()));
+    if found(&poses) == 0 {
+        let times = samples.iter().map(|(time, _)| *time);
+        let (first, last) =
+            times.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), t| (a.min(t), b.max(t)));
         return Err(file.error(format!(
             "poses at the times in the photos' names expected, such as {}; the poses are between {first} and {last}. If \
              the names are no times, name the columns in a first line: name x y z qx qy qz qw",
             photos[0]
         )));
+    }
+    if unit.is_none() && read_in != TimeUnit::Second {
+        log::warn!(
+            "{}: the times are read as {}, in which {} photos have a pose",
+            file.name(),
+            read_in.symbol(),
+            found(&poses)
+        );
     }
     Ok(poses)
 }
@@ -78,16 +104,26 @@ fn by_line(
     photos: &[String],
 ) -> Result<Vec<FramePoses>, SceneError> {
     let pose = |(index, name): (usize, &String)| {
-        let pose = poses.of_frame(index, photos.len(), name);
-        let pose = pose.ok_or_else(|| {
-            file.error(format!(
+        let line = poses.line_of_frame(index, photos.len(), name);
+        if line.is_none() && poses.numbers().is_none() {
+            return Err(file.error(format!(
                 "one line per image expected ({}), or one per number from 0 at the end of their names; \
                  {} lines found, none for `{name}`",
                 photos.len(),
                 poses.count(),
-            ))
-        })?;
-        Ok(FramePoses { pose: Some(pose), time_s: None })
+            )));
+        }
+        Ok(FramePoses { pose: line.and_then(|line| poses.get(line)), time_s: None })
     };
-    photos.iter().enumerate().map(pose).collect()
+    let posed = photos.iter().enumerate().map(pose).collect::<Result<Vec<_>, _>>()?;
+    if let (true, Some((first, last))) =
+        (posed.iter().all(|frame| frame.pose.is_none()), poses.numbers())
+    {
+        return Err(file.error(format!(
+            "numbers at the end of the images' names expected, such as of `{}`; lines with numbers from {first} to \
+             {last} found",
+            photos[0]
+        )));
+    }
+    Ok(posed)
 }

@@ -33,6 +33,9 @@ macro_rules! inner_scene {
     (@ $scene:tt frames) => {
         $crate::inner_scene!(@ $scene frames() -> &[String]);
     };
+    (@ $scene:tt other_name) => {
+        $crate::inner_scene!(@ $scene other_name(frame: usize) -> Option<&str>);
+    };
     (@ $scene:tt intrinsics) => {
         $crate::inner_scene!(@ $scene intrinsics(frame: usize) -> $crate::camera::Intrinsics);
     };
