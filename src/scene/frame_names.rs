@@ -90,7 +90,7 @@ impl<'a> FrameNames<'a> {
         })
     }
 
-    /// By the name of the file. Where both have folders, one path must be the end of the other.
+    /// By the name of the file. Where both have folders, the name must end with the whole path of the photo.
     fn find_stem(&self, name: &str) -> Option<usize> {
         let frame = self.stems.get(stem(name)).copied().flatten()?;
         agree(without_extension(name), &self.frames[frame]).then_some(frame)
@@ -158,12 +158,11 @@ pub(super) fn ends_of(path: &str) -> impl Iterator<Item = &str> {
     std::iter::successors(Some(path), |path| Some(path.split_once('/')?.1))
 }
 
-/// Whether two names may mean one photo: one has no folder, or its path is the end of the other.
-pub(super) fn agree(one: &str, other: &str) -> bool {
-    let ends = |path: &str, end: &str| {
-        path.strip_suffix(end).is_some_and(|before| before.is_empty() || before.ends_with('/'))
-    };
-    !one.contains('/') || !other.contains('/') || ends(one, other) || ends(other, one)
+/// Whether a name in a file may mean a frame: one of them has no folder, or the name ends with the whole path of the
+/// frame's photo. A shorter end may be the path of another photo.
+pub(super) fn agree(name: &str, frame: &str) -> bool {
+    let is_end = || name.strip_suffix(frame).is_some_and(|b| b.is_empty() || b.ends_with('/'));
+    !name.contains('/') || !frame.contains('/') || is_end()
 }
 
 /// A name with `-` in place of `/`.
@@ -211,6 +210,10 @@ mod tests {
         assert_eq!(found(&rig, &["000001.jpg", "000002.jpg"]), [None, Some(1)]);
         assert_eq!(found(&numbers, &["a/000002.jpg", "b/000002.jpg"]), [None, None]);
         assert_eq!(found(&rig, &["data/cam0/000002.jpg"]), [Some(1)]);
+        // Not by a shorter end of the path, which may be that of another photo.
+        let deep = ["a/cam0/000001", "a/cam1/000002"];
+        assert_eq!(found(&deep, &["cam0/000001.jpg", "000002.jpg"]), [None, Some(1)]);
+        assert_eq!(found(&deep, &["data/a/cam0/000001.jpg"]), [Some(0)]);
         // A number says nothing about a folder or about letters.
         assert_eq!(found(&rig, &["2", "cam2/000002", "img2"]), [None, None, None]);
         assert_eq!(found(&["left2", "right3"], &["2", "3"]), [None, None]);
