@@ -22,7 +22,7 @@ use crate::measure::{
     worst_first,
 };
 use crate::params::Params;
-use crate::run::{FAILURES, FolderError, RunFile, Scenes, read_run, recording_name};
+use crate::run::{FAILURES, FolderError, RecordingNames, RunFile, Scenes, read_run};
 use crate::scale::LengthUnit;
 use crate::table::Table;
 use pictures::thumbnail;
@@ -166,17 +166,16 @@ impl RunReport {
 
 fn reported(folder: &Path, run: &RunFile, results: &[QueryResult]) -> Vec<ReportedResult> {
     let mut queries: BTreeMap<[String; 3], usize> = BTreeMap::new();
-    let several_pairs = run.pairs.len() > 1;
+    let names = RecordingNames::of(run);
     let results = results.iter().enumerate().map(|(number, result)| {
         let query_scene = result.query_scene.clone();
         let key = [result.scene.clone(), query_scene.unwrap_or_default(), result.query.clone()];
         let next = queries.len();
         let query = *queries.entry(key).or_insert(next);
-        let recording = run
-            .pair_of(result)
-            .map(|pair| recording_name(pair, &result.query, result.method, several_pairs))
-            .map(|name| format!("{FAILURES}/{name}.rrd"))
-            .filter(|name| folder.join(name).is_file());
+        let recording = names
+            .of_result(result)
+            .map(|file| format!("{FAILURES}/{file}"))
+            .filter(|file| folder.join(file).is_file());
         ReportedResult {
             number,
             query,

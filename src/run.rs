@@ -43,7 +43,7 @@ pub use publish::{append_step_summary, publish, step_summary};
 pub use reference::Reference;
 pub use run_file::{RUN_SCHEMA, RunFile, RunItem, Shard};
 pub use run_folder::{
-    FAILURES, FolderError, RunFolder, merge, read_results, read_run, recording_name, result_lines,
+    FAILURES, FolderError, RecordingNames, RunFolder, merge, read_results, read_run, result_lines,
     results_of_pair,
 };
 pub use scene_pair::{QueryCamera, ScenePair, is_called};

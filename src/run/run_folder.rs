@@ -3,7 +3,7 @@
 //! A query's results are appended together once all are computed, so a killed run loses at most the current
 //! query. Resuming cuts off incomplete lines and ends with the same bytes.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, HashMap, HashSet};
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, BufRead as _, BufReader, Seek as _, SeekFrom, Write as _};
 use std::ops::Range;
@@ -29,22 +29,48 @@ const TIMINGS: &str = "timings.jsonl";
 /// The folder of the failures' recordings, inside the run folder.
 pub const FAILURES: &str = "failures";
 
-/// The name of a failure's recording: `QUERY-METHOD`, preceded by the scenes if the run has several pairs.
-pub fn recording_name(
-    pair: &ScenePair,
-    query: &str,
-    method: Method,
-    several_pairs: bool,
-) -> String {
-    let name = if several_pairs {
-        format!("{}-{}-{}-{method}", pair.scene, pair.query_scene, query)
-    } else {
-        format!("{query}-{method}")
-    };
-    let plain = |c: char| {
-        if c.is_alphanumeric() || "-_.".contains(c) { c } else { '-' }
-    };
-    name.chars().map(plain).collect()
+/// The names of the recordings of a run's failures: `QUERY-METHOD`, preceded by the scenes if the run has several pairs.
+/// Each query has a name of its own, also beside another that differs from it only by characters that file names do not
+/// have.
+pub struct RecordingNames(HashMap<[String; 3], String>);
+
+impl RecordingNames {
+    /// Those of all queries of a run.
+    pub fn of(run: &RunFile) -> Self {
+        let is_plain = |c: char| c.is_alphanumeric() || "-_.".contains(c);
+        let several_pairs = run.pairs.len() > 1;
+        let queries = run.plan().map(|item| {
+            let ScenePair { scene, query_scene, .. } = item.pair;
+            let scenes = several_pairs.then(|| format!("{scene}-{query_scene}-"));
+            let name = scenes.unwrap_or_default() + item.query;
+            ([scene, query_scene, item.query].map(str::to_owned), name)
+        });
+        let (exact, changed): (Vec<_>, Vec<_>) =
+            queries.partition(|(_, name)| name.chars().all(is_plain));
+        let mut used: HashSet<String> = exact.iter().map(|(_, name)| name.clone()).collect();
+        let changed = changed.into_iter().map(|(key, name)| {
+            let plain: String = name.chars().map(|c| if is_plain(c) { c } else { '-' }).collect();
+            let numbered = (2..).map(|number| format!("{plain}-{number}"));
+            let mut free = [plain.clone()].into_iter().chain(numbered);
+            let name = free.find(|name| used.insert(name.clone()));
+            (key, name.unwrap_or(plain))
+        });
+        let changed: Vec<_> = changed.collect();
+        Self(exact.into_iter().chain(changed).collect())
+    }
+
+    /// The file of a failure in the folder [`FAILURES`]; `None` for a query that is not of the run.
+    pub fn file(&self, scenes: [&str; 2], query: &str, method: Method) -> Option<String> {
+        let [scene, query_scene] = scenes;
+        let name = self.0.get(&[scene, query_scene, query].map(str::to_owned))?;
+        Some(format!("{name}-{method}.rrd"))
+    }
+
+    /// The file of a failed result.
+    pub fn of_result(&self, result: &QueryResult) -> Option<String> {
+        let query_scene = result.query_scene.as_ref().unwrap_or(&result.scene);
+        self.file([&result.scene, query_scene], &result.query, result.method)
+    }
 }
 
 /// Why a run folder cannot be used.
@@ -582,4 +608,72 @@ fn copy_line(
     let Some(line) = lines.next() else { return Ok(()) };
     let written = line.and_then(|line| writeln!(file, "{line}"));
     written.map_err(FolderError::io(target))
+}
+
+#[cfg(test)]
+mod tests {
+    use tempfile::TempDir;
+
+    use super::*;
+    use crate::run::{Protocol, QueryCamera, RUN_SCHEMA};
+
+    /// A run over these queries.
+    fn run(queries: &[&str]) -> RunFile {
+        let camera = QueryCamera { width: 2, height: 1, fx: 1.0, fy: 1.0, cx: 0.5, cy: 0.0 };
+        let pair = ScenePair {
+            scene_index: 0,
+            query_index: None,
+            scene: "map".to_owned(),
+            query_scene: "map".to_owned(),
+            camera,
+            cameras: Vec::new(),
+            drawn: Vec::new(),
+            queries: queries.iter().map(|query| (*query).to_owned()).collect(),
+            times_s: Vec::new(),
+        };
+        RunFile {
+            schema: RUN_SCHEMA.to_owned(),
+            version: "1".to_owned(),
+            scenes: vec!["map".to_owned()],
+            shard: None,
+            protocol: Protocol::default(),
+            inputs: BTreeMap::new(),
+            paths: BTreeMap::new(),
+            pairs: vec![pair],
+            params: Params::default().to_toml().parse().expect("a table"),
+        }
+    }
+
+    #[test]
+    fn names_that_files_cannot_tell_apart_get_numbers() {
+        let queries = ["cam0/3", "cam0-3", "cam0:3", "cam1/3", "70"];
+        let names = RecordingNames::of(&run(&queries));
+        let files = queries.map(|query| names.file(["map", "map"], query, Method::FB));
+        let files = files.map(|file| file.expect("is of the run"));
+        let expected = ["cam0-3-2-fb", "cam0-3-fb", "cam0-3-3-fb", "cam1-3-fb", "70-fb"];
+        assert_eq!(files, expected.map(|name| format!("{name}.rrd")));
+        assert_eq!(names.file(["map", "map"], "71", Method::FB), None);
+    }
+
+    #[test]
+    fn a_process_that_does_not_get_the_lock_changes_nothing() {
+        let root = TempDir::new().expect("a folder");
+        let (path, run) = (root.path(), run(&["70"]));
+        let is_in_use = |opened: Result<RunFolder, FolderError>| {
+            assert!(matches!(opened, Err(FolderError::InUse(_))), "{opened:?}");
+        };
+        // Another process has just taken the lock, and has described nothing yet.
+        let other = RunFolder::open(path).expect("the lock");
+        is_in_use(RunFolder::create(path, &run));
+        assert!(!path.join(RUN).exists());
+        drop(other);
+        let other = RunFolder::create(path, &run).expect("nobody has the lock");
+        let temporary = path.join("tmp-results.jsonl");
+        fs::write(&temporary, "of the other process").expect("writable");
+        is_in_use(RunFolder::resume(path, &run));
+        assert!(temporary.exists());
+        drop(other);
+        RunFolder::resume(path, &run).expect("nobody has the lock");
+        assert!(!temporary.exists());
+    }
 }

@@ -17,8 +17,8 @@ use crate::localize::{LocalizeError, LocalizeObserver, QueryResult};
 use crate::method::Method;
 use crate::problem::Problem;
 use crate::run::{
-    FAILURES, FailedQuery, FolderError, Plan, RunError, RunFile, RunFolder, RunItem, RunObserver,
-    ScenePair, read_results, recording_name,
+    FAILURES, FailedQuery, FolderError, Plan, RecordingNames, RunError, RunFile, RunFolder,
+    RunItem, RunObserver, ScenePair, read_results,
 };
 use crate::trace::{Cancelled, Record, Sink};
 
@@ -47,6 +47,7 @@ pub trait Follower: Send {
 pub struct RunRecords<'a> {
     folder: PathBuf,
     plan: &'a Plan,
+    names: RecordingNames,
     /// How many more failures to record.
     left: usize,
     missed: usize,
@@ -74,6 +75,7 @@ impl<'a> RunRecords<'a> {
         let failures = failures(folder.path(), &plan.run)?;
         Ok(Self {
             folder: path,
+            names: RecordingNames::of(&plan.run),
             plan,
             left: kept.saturating_sub(failures.len()),
             missed: failures.len().saturating_sub(kept),
@@ -91,12 +93,6 @@ impl<'a> RunRecords<'a> {
     pub fn close(self) -> Result<(), FolderError> {
         warn_of_missed(self.missed);
         self.events.map_or(Ok(()), EventExport::close)
-    }
-
-    fn recording(&self, item: &RunItem<'_>, method: Method) -> PathBuf {
-        let several_pairs = self.plan.run.pairs.len() > 1;
-        let name = recording_name(item.pair, item.query, method, several_pairs);
-        self.folder.join(format!("{name}.rrd"))
     }
 
     fn record(&self, query: &FailedQuery<'_>, path: &Path) -> Result<(), RecordError> {
@@ -143,36 +139,28 @@ pub fn merge_failures(
     fs::create_dir_all(&folder).map_err(FolderError::io(&folder))?;
     let failures = failures(target, run)?;
     warn_of_missed(failures.len().saturating_sub(kept));
-    for name in failures.iter().take(kept) {
-        let file = format!("{name}.rrd");
-        let sources = parts.iter().map(|part| part.join(FAILURES).join(&file));
-        if let Some(source) = sources.into_iter().find(|path| path.exists()) {
-            let copied = fs::copy(&source, folder.join(&file));
+    for file in failures.iter().take(kept) {
+        let mut sources = parts.iter().map(|part| part.join(FAILURES).join(file));
+        if let Some(source) = sources.find(|path| path.exists()) {
+            let copied = fs::copy(&source, folder.join(file));
             copied.map_err(FolderError::io(source))?;
         }
     }
     Ok(())
 }
 
-/// The names of the recordings of all failures of a run folder, in the order of its results.
+/// The recordings of all failures of a run folder, in the order of its results.
 fn failures(folder: &Path, run: &RunFile) -> Result<Vec<String>, FolderError> {
-    let mut names: Vec<String> = Vec::new();
-    let several_pairs = run.pairs.len() > 1;
+    let (mut files, names): (Vec<String>, _) = (Vec::new(), RecordingNames::of(run));
     for result in read_results::<QueryResult>(folder)? {
         let result = result?;
         // Queries whose files cannot be read have no recording.
-        if result.grade.is_failure()
-            && result.reason.as_ref().is_none_or(|reason| reason.code != Code::I1)
-            && let Some(pair) = run.pair_of(&result)
-        {
-            let name = recording_name(pair, &result.query, result.method, several_pairs);
-            // The results of one method and query are consecutive.
-            if names.last() != Some(&name) {
-                names.push(name);
-            }
-        }
+        let is_unread = result.reason.as_ref().is_some_and(|reason| reason.code == Code::I1);
+        let file = names.of_result(&result).filter(|_| result.grade.is_failure() && !is_unread);
+        // The results of one method and query are consecutive.
+        files.extend(file.filter(|file| files.last() != Some(file)));
     }
-    Ok(names)
+    Ok(files)
 }
 
 impl Sink for RunRecords<'_> {
@@ -228,7 +216,9 @@ impl RunObserver for RunRecords<'_> {
     }
 
     fn failed(&mut self, query: &FailedQuery<'_>) -> Result<(), RunError> {
-        let path = self.recording(&query.item, query.method);
+        let ScenePair { scene, query_scene, .. } = query.item.pair;
+        let file = self.names.file([scene, query_scene], query.item.query, query.method);
+        let path = self.folder.join(file.unwrap_or_default());
         match fs::remove_file(&path) {
             Err(error) if error.kind() != ErrorKind::NotFound => {
                 return Err(FolderError::io(&path)(error).into());
