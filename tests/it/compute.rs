@@ -66,6 +66,22 @@ fn without_a_card_who_asks_for_one_is_told_in_one_line_and_others_are_served() {
 }
 
 #[test]
+fn of_a_driver_the_user_hears_what_we_say_and_not_what_it_prints() {
+    let sequence = SmallSequence::of(&[0, 1, 2, 3]);
+    let line = eval("gpu").replace(" -q", "");
+    let mut command = command_in(sequence.path(), &line);
+    let said = Said::by(command.env_remove("XDG_RUNTIME_DIR").env_remove("WAYLAND_DISPLAY"));
+    if is_skipped(&said) {
+        return;
+    }
+    assert!(!said.err.contains("XDG_RUNTIME_DIR"), "{}", said.err);
+    // What comes after the driver was loaded is heard again: without ground truth within a millimetre, a failure.
+    let line = line.replace("--out gpu", "--out gate --gate 'median_m@pm < 0.000001'");
+    let mut command = command_in(sequence.path(), &line);
+    Said::by(command.env_remove("XDG_RUNTIME_DIR")).fails(1, "median_m@pm");
+}
+
+#[test]
 fn a_dense_surface_is_written_and_least_near_the_truth() {
     let sequence = SmallSequence::of(&[0, 1, 2, 3]);
     let line =

@@ -3,6 +3,7 @@
 use wgpu::{AdapterInfo, Backends, DeviceType, Limits};
 
 use crate::failure::GpuError;
+use crate::quiet::quietly;
 
 /// Threads of a workgroup, as the shaders have it.
 const LANES: u32 = 256;
@@ -15,11 +16,13 @@ const SHARED: u32 = 16_000;
 pub(crate) fn choose(software_will_do: bool) -> Result<wgpu::Adapter, GpuError> {
     // OpenGL is left out: it has too few buffers.
     let backends = Backends::VULKAN | Backends::METAL | Backends::DX12;
-    let instance = wgpu::Instance::new(wgpu::InstanceDescriptor {
-        backends,
-        ..wgpu::InstanceDescriptor::new_without_display_handle()
+    let adapters = quietly(|| {
+        let instance = wgpu::Instance::new(wgpu::InstanceDescriptor {
+            backends,
+            ..wgpu::InstanceDescriptor::new_without_display_handle()
+        });
+        pollster::block_on(instance.enumerate_adapters(backends))
     });
-    let adapters = pollster::block_on(instance.enumerate_adapters(backends));
     let chosen = adapters
         .into_iter()
         .min_by_key(|adapter| rank(adapter.get_info().device_type))

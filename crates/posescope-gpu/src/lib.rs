@@ -21,6 +21,7 @@ mod failure;
 mod kernels;
 mod loaded;
 mod probe;
+mod quiet;
 mod slots;
 
 use std::collections::BTreeSet;
