@@ -17,8 +17,16 @@ use super::output::{self, JsonLines};
 use super::terminal::Terminal;
 
 /// The fields shown in a terminal by default.
-const COLUMNS: [&str; 8] =
-    ["query", "reference", "method", "grade", "error", "rotation", "code", "probability"];
+const COLUMNS: [&Field; 8] = [
+    Field::named("query"),
+    Field::named("reference"),
+    Field::named("method"),
+    Field::named("grade"),
+    Field::named("error"),
+    Field::named("rotation"),
+    Field::named("code"),
+    Field::named("probability"),
+];
 
 pub fn results(args: &ResultsArgs, terminal: &Terminal) -> Result<(), CliError> {
     args.refuse_unused()?;
@@ -101,7 +109,7 @@ fn row_table<'a>(
 ) -> Table {
     let is_text = form == Form::Text;
     let columns: Vec<&Field> = match args.columns.as_slice() {
-        [] if is_text => COLUMNS.into_iter().filter_map(|name| Field::find(name).ok()).collect(),
+        [] if is_text => COLUMNS.to_vec(),
         [] => Field::ALL.iter().chain(Field::POSE).collect(),
         named => named.to_vec(),
     };
@@ -116,11 +124,13 @@ fn draw(
     plot: Plot,
     terminal: &Terminal,
 ) -> Result<(), CliError> {
-    let svg = plot
-        .svg(&RunResults::of(graded(args)?, run.failure_radius_m()))
-        .ok_or_else(|| CliError::Usage("the run has too few results for this plot: verdicts and causes need ground truth and failures, success needs \
-             several radii, numbers of references or scenes, basin and margin a method with a cost"
-                .to_owned()))?;
+    let svg =
+        plot.svg(&RunResults::of(graded(args)?, run.failure_radius_m())).ok_or_else(|| {
+            CliError::Usage(format!(
+                "the run has too few results for this plot, which needs {}",
+                plot.needs()
+            ))
+        })?;
     write(&svg, args.out.as_deref())?;
     if let Some(path) = &args.out {
         terminal.say(|| format!("Plot: {}", path.display()));
@@ -141,7 +151,7 @@ fn poses(
         condition.is_none_or(|one| one.is_met(graded.as_ref().unwrap_or(result)))
     };
     let exported = export(&args.run, run, format, &takes);
-    let Export { files, left_out } = exported.map_err(|error| match error {
+    let Export { files, excluded } = exported.map_err(|error| match error {
         ExportError::Folder(error) => CliError::Folder(error),
         error => CliError::Usage(error.to_string()),
     })?;
@@ -161,8 +171,8 @@ fn poses(
             }
         }
     }
-    if left_out > 0 {
-        terminal.say(|| format!("{left_out} queries have no pose and are left out"));
+    if excluded > 0 {
+        terminal.say(|| format!("{excluded} queries have no pose and are left out"));
     }
     Ok(())
 }

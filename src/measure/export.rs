@@ -68,7 +68,7 @@ pub struct Export {
     /// One file, or those of a folder.
     pub files: Vec<ExportedFile>,
     /// Queries left out because they have no pose.
-    pub left_out: usize,
+    pub excluded: usize,
 }
 
 /// A query with its result.
@@ -91,14 +91,14 @@ pub fn export(
     if localized.is_empty() {
         return Err(ExportError::Nothing);
     }
-    let left_out = localized.iter().filter(|one| one.pose.is_none()).count();
+    let excluded = localized.iter().filter(|one| one.pose.is_none()).count();
     let files = match format {
         Format::Tum => vec![("", tum(&localized)?)],
         Format::Kitti => vec![("", kitti(&localized)?)],
         Format::Vloc => vec![("", vloc(&localized))],
         Format::Colmap => colmap(&localized),
     };
-    Ok(Export { files, left_out })
+    Ok(Export { files, excluded })
 }
 
 /// One result per query, in the order of the run.

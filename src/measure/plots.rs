@@ -44,6 +44,16 @@ pub enum Plot {
 }
 
 impl Plot {
+    /// What a run must have, so that there is something to draw.
+    pub fn needs(self) -> &'static str {
+        match self {
+            Self::Errors | Self::Recall => "ground truth",
+            Self::Verdicts | Self::Causes => "ground truth and failures",
+            Self::Success | Self::Solved => "several radii, numbers of references or scenes",
+            Self::Basin | Self::Margin => "a method with a cost",
+        }
+    }
+
     /// The plot of a run as an SVG file; `None` if there is nothing to draw.
     pub fn svg(self, run: &RunResults) -> Option<String> {
         let charts = self.charts(run);

@@ -14,25 +14,22 @@ use crate::localize::QueryResult;
 use crate::measure::{Field, Order, select, verdict_name};
 use crate::method::Method;
 
-/// The columns of the table with their widths \[points\].
-const COLUMNS: [(&str, f32); 10] = [
-    ("query", 84.0),
-    ("method", 56.0),
-    ("grade", 104.0),
-    ("error", 60.0),
-    ("code", 48.0),
-    ("cause", CAUSE),
-    ("rotation", 64.0),
-    ("start", 60.0),
-    ("probability", 76.0),
-    ("reference", 110.0),
+/// The columns of the table.
+const COLUMNS: [&Field; 10] = [
+    Field::named("query"),
+    Field::named("method"),
+    Field::named("grade"),
+    Field::named("error"),
+    Field::named("code"),
+    Field::named("cause"),
+    Field::named("rotation"),
+    Field::named("start"),
+    Field::named("probability"),
+    Field::named("reference"),
 ];
 
 /// Width of the column with the verdicts of the results A \[points\].
 const WAS: f32 = 40.0;
-
-/// The least width of the causes, which have the rest of the room \[points\].
-const CAUSE: f32 = 120.0;
 
 /// The chosen results, their order, and the version of what they are compared with.
 type ShownKey = (Rc<[ResultRow]>, Option<Order>, u64);
@@ -88,18 +85,19 @@ impl View for BatchView {
         // The names of the columns move sideways with the rows, and stay above them.
         ScrollArea::horizontal().auto_shrink(false).show(ui, |ui| {
             let mut table = TableBuilder::new(ui).striped(true).sense(Sense::click());
-            for (name, width) in COLUMNS {
-                table = table.column(match name {
-                    "cause" => Column::remainder().at_least(width).clip(true),
-                    _ => Column::exact(width),
+            for field in COLUMNS {
+                table = table.column(match field.name {
+                    // It has the rest of the room.
+                    "cause" => Column::remainder().at_least(field.width).clip(true),
+                    _ => Column::exact(field.width),
                 });
             }
             if has_before {
                 table = table.column(Column::exact(WAS));
             }
             let table = table.header(height, |mut names| {
-                for (name, _) in COLUMNS {
-                    names.col(|ui| header(ui, name, &mut order));
+                for field in COLUMNS {
+                    names.col(|ui| header(ui, field, &mut order));
                 }
                 if has_before {
                     names.col(|ui| {
@@ -151,10 +149,8 @@ fn words(context: &ViewContext<'_>, rows: &[ResultRow]) -> String {
 }
 
 /// The name of a column. A click sorts by it, the next one reverses, the third ends it.
-fn header(ui: &mut Ui, name: &str, order: &mut Option<Order>) {
-    let Ok(field) = Field::find(name) else {
-        return;
-    };
+fn header(ui: &mut Ui, field: &'static Field, order: &mut Option<Order>) {
+    let name = field.name;
     let own = order.filter(|order| order.field == field);
     let (text, next) = match own.map(|order| order.descending) {
         None => (name.to_owned(), Some(false)),
@@ -162,7 +158,7 @@ fn header(ui: &mut Ui, name: &str, order: &mut Option<Order>) {
         Some(true) => (format!("{name} ▼"), None),
     };
     let button = ui.add(Button::new(RichText::new(text).small()).frame(false));
-    if button.on_hover_text(field.about).clicked() {
+    if button.on_hover_text(field.about()).clicked() {
         *order = next.map(|descending| Order { field, descending });
     }
 }
@@ -175,13 +171,10 @@ fn draw(row: &mut TableRow<'_, '_>, context: &ViewContext<'_>, at: ResultRow) {
     let label = |ui: &mut Ui, text: RichText| {
         ui.add(egui::Label::new(text).truncate().selectable(false));
     };
-    for (name, _) in COLUMNS {
+    for field in COLUMNS {
         row.col(|ui| {
-            let Ok(field) = Field::find(name) else {
-                return;
-            };
             let (grade, visuals) = (result.grade, ui.visuals());
-            let text = match name {
+            let text = match field.name {
                 "grade" => RichText::new(format!("{} {grade}", grade.glyph()))
                     .color(theme::grade(visuals, grade)),
                 "method" => RichText::new(field.text(result))

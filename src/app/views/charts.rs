@@ -115,7 +115,7 @@ fn measure(ui: &mut Ui, label: &str, name: &mut &'static str) {
     let answer = combo.show_ui(ui, |ui| {
         let numbers = Field::ALL.iter().filter(|field| field.decimals.is_some());
         for field in numbers {
-            ui.selectable_value(name, field.name, field.name).on_hover_text(field.about);
+            ui.selectable_value(name, field.name, field.name).on_hover_text(field.about());
         }
     });
     answer.response.labelled_by(label.id);

@@ -33,8 +33,7 @@ pub struct ResultsArgs {
     /// The table: rows, summary, verdicts, or paper:1 … paper:6
     #[arg(long, value_name = "TABLE", value_enum, default_value = "rows")]
     pub table: TableName,
-    /// Draw a figure as SVG: errors, verdicts, success, recall, causes, basin or margin
-    #[arg(long, value_name = "NAME", value_enum, conflicts_with = "form")]
+    #[arg(long, value_name = "NAME", value_enum, conflicts_with = "form", help = plots())]
     pub plot: Option<Plot>,
     /// The file to write, or the folder for colmap [default: stdout]
     #[arg(long, value_name = "FILE")]
@@ -129,7 +128,7 @@ fn field(name: &str) -> Result<&'static Field, String> {
 
 fn conditions() -> String {
     let fields = Field::ALL.iter();
-    let fields = fields.map(|field| format!("\n- {}: {}", field.name, field.about));
+    let fields = fields.map(|field| format!("\n- {}: {}", field.name, field.about()));
     let codes = Code::all().into_iter();
     let codes = codes.map(|code| format!("\n- {code}: {}", code.title()));
     format!(
@@ -139,4 +138,12 @@ fn conditions() -> String {
         fields.collect::<String>(),
         codes.collect::<String>()
     )
+}
+
+/// The help of `--plot`: every plot.
+fn plots() -> String {
+    let names = Plot::value_variants().iter().filter_map(ValueEnum::to_possible_value);
+    let names: Vec<String> = names.map(|value| value.get_name().to_owned()).collect();
+    let (last, first) = names.split_last().map_or(("", &[][..]), |(last, first)| (last, first));
+    format!("Draw a figure as SVG: {} or {last}", first.join(", "))
 }

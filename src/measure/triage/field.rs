@@ -7,12 +7,17 @@ use crate::localize::QueryResult;
 use crate::table::Align;
 use crate::text::UnknownWord;
 
-/// A field of a result.
+/// A field of a result, which is a column of tables. Tables list their fields; all else about a column is here.
 pub struct Field {
     /// The name in conditions and orders.
     pub name: &'static str,
-    /// What it is, with its unit.
-    pub about: &'static str,
+    /// The heading in the report, without the unit.
+    heading: &'static str,
+    about: &'static str,
+    /// The unit of its numbers; empty for text and for numbers without unit.
+    pub unit: &'static str,
+    /// The width of its column in the window \[points\].
+    pub width: f32,
     /// Digits after the decimal point; `None` for text.
     pub decimals: Option<usize>,
     read: Read,
@@ -61,17 +66,19 @@ impl Value {
 impl Field {
     /// Every field.
     pub const ALL: &[Self] = &[
-        words("query", "the query frame", |r| r.query.clone()),
+        words("query", "the query frame", |r| r.query.clone()).wide(84.0),
         words("scene", "the scene of the references", |r| r.scene.clone()),
         words("queries", "the scene of the query", |r| {
             r.query_scene.clone().unwrap_or_else(|| r.scene.clone())
         }),
-        words("reference", "the reference frames", |r| r.references.join(" ")),
-        words("method", "the method", |r| r.method.to_string()),
+        words("reference", "the reference frames", |r| r.references.join(" ")).wide(110.0),
+        words("method", "the method", |r| r.method.to_string()).wide(56.0),
         words("fusion", "the fusion", |r| {
             r.fusion.as_ref().map_or(String::new(), ToString::to_string)
         }),
         words("grade", "right, wrong, no pose or unmeasured", |r| r.grade.to_string())
+            .called("result")
+            .wide(104.0)
             .only(|word| word.parse::<Grade>().map(drop)),
         words("confidence", "trusted, unsure or low", |r| {
             r.confidence_word().map_or(String::new(), |word| word.to_string())
@@ -80,61 +87,85 @@ impl Field {
         words("code", "the primary verdict", |r| {
             r.diagnosis.first().map_or(String::new(), |d| d.code.to_string())
         })
+        .wide(48.0)
         .only(|word| word.to_uppercase().parse::<Code>().map(drop)),
         words("cause", "the primary verdict as a phrase", |r| {
             r.diagnosis.first().map_or(String::new(), |d| d.code.title().to_owned())
-        }),
+        })
+        .wide(120.0),
         words("codes", "all verdicts", |r| {
             let codes: Vec<&str> = r.diagnosis.iter().map(|d| d.code.name()).collect();
             codes.join(" ")
         }),
-        number("error", "distance from the truth [m]", 3, |r| Some(r.error?.translation_m)),
-        number("rotation", "rotation from the truth [°]", 2, |r| Some(r.error?.rotation_deg)),
-        number("start", "distance of the reference from the truth [m]", 3, |r| {
+        number("error", "distance from the truth", "m", 3, |r| Some(r.error?.translation_m)),
+        number("rotation", "rotation from the truth", "°", 2, |r| Some(r.error?.rotation_deg))
+            .wide(64.0),
+        number("start", "distance of the reference from the truth", "m", 3, |r| {
             Some(r.initial_error?.translation_m)
-        }),
-        number("probability", "probability of being within 1 m", 3, |r| {
+        })
+        .called("distance"),
+        number("probability", "probability of being within 1 m", "", 3, |r| {
             Some(r.confidence.as_ref()?.probability)
-        }),
-        number("keypoints", "keypoints of the query", 0, |r| {
+        })
+        .called("confidence")
+        .wide(76.0),
+        number("keypoints", "keypoints of the query", "", 0, |r| {
             Some(r.counts?.query_keypoints as f64)
         }),
-        number("matches", "matches with a depth", 0, |r| Some(r.counts?.with_depth as f64)),
-        number("inliers", "inliers", 0, |r| Some(r.counts?.inliers as f64)),
-        number("cost", "cost at the result", 4, |r| Some(r.cost.as_ref()?.best)),
-        number("truth_cost", "cost at the truth", 4, |r| r.cost.as_ref()?.truth),
-        number("shuffled", "cost of shuffled pixels", 4, |r| r.cost.as_ref()?.shuffled),
-        number("coverage", "share of the photo covered at the result", 3, |r| {
+        number("matches", "matches with a depth", "", 0, |r| Some(r.counts?.with_depth as f64)),
+        number("inliers", "inliers", "", 0, |r| Some(r.counts?.inliers as f64)),
+        number("cost", "cost at the result", "", 4, |r| Some(r.cost.as_ref()?.best)),
+        number("truth_cost", "cost at the truth", "", 4, |r| r.cost.as_ref()?.truth),
+        number("shuffled", "cost of shuffled pixels", "", 4, |r| r.cost.as_ref()?.shuffled),
+        number("coverage", "share of the photo covered at the result", "", 3, |r| {
             Some(r.cost.as_ref()?.coverage_best)
         }),
-        number("basin", "radius around the truth from which the search finds it [m]", 1, |r| {
+        number("basin", "radius around the truth from which the search finds it", "m", 1, |r| {
             r.cost.as_ref()?.basin_m
         }),
-        number("margin", "cost of the best minimum elsewhere above that at the truth", 4, |r| {
-            r.cost.as_ref()?.basin_margin
-        }),
-        number("radius", "the uncertainty radius [m]", 1, |r| Some(r.setting?.radius_m)),
-        number("references", "requested number of references", 0, |r| {
+        number(
+            "margin",
+            "cost of the best minimum elsewhere above that at the truth",
+            "",
+            4,
+            |r| r.cost.as_ref()?.basin_margin,
+        ),
+        number("radius", "the uncertainty radius", "m", 1, |r| Some(r.setting?.radius_m)),
+        number("references", "requested number of references", "", 0, |r| {
             Some(r.setting?.references as f64)
         }),
-        number("helped", "number of remedies that helped", 0, |r| {
+        number("helped", "number of remedies that helped", "", 0, |r| {
             Some(r.explanation.as_ref()?.helped.len() as f64)
         }),
     ];
 
     /// Further columns of tables, which cannot be used in conditions.
     pub const POSE: &[Self] = &[
-        number("max_euler", "greatest Euler angle from the truth [°]", 2, |r| {
+        number("max_euler", "greatest Euler angle from the truth", "°", 2, |r| {
             Some(r.error?.max_euler_deg)
         }),
-        number("x", "x of the camera in the world [m]", 3, |r| position(r, 0)),
-        number("y", "y of the camera in the world [m]", 3, |r| position(r, 1)),
-        number("z", "z of the camera in the world [m]", 3, |r| position(r, 2)),
-        number("qx", "x of the quaternion of the rotation to the world", 4, |r| quaternion(r, 0)),
-        number("qy", "y of the quaternion", 4, |r| quaternion(r, 1)),
-        number("qz", "z of the quaternion", 4, |r| quaternion(r, 2)),
-        number("qw", "scalar of the quaternion", 4, |r| quaternion(r, 3)),
+        number("x", "x of the camera in the world", "m", 3, |r| position(r, 0)),
+        number("y", "y of the camera in the world", "m", 3, |r| position(r, 1)),
+        number("z", "z of the camera in the world", "m", 3, |r| position(r, 2)),
+        number("qx", "x of the quaternion of the rotation to the world", "", 4, |r| {
+            quaternion(r, 0)
+        }),
+        number("qy", "y of the quaternion", "", 4, |r| quaternion(r, 1)),
+        number("qz", "z of the quaternion", "", 4, |r| quaternion(r, 2)),
+        number("qw", "scalar of the quaternion", "", 4, |r| quaternion(r, 3)),
     ];
+
+    /// The field with this name, for the columns of a table. A name that no field has does not compile.
+    pub const fn named(name: &str) -> &'static Self {
+        let mut at = 0;
+        while at < Self::ALL.len() {
+            if is_equal(Self::ALL[at].name.as_bytes(), name.as_bytes()) {
+                return &Self::ALL[at];
+            }
+            at += 1;
+        }
+        panic!("no field has this name")
+    }
 
     /// The field with this name.
     ///
@@ -157,6 +188,32 @@ impl Field {
     /// The same field, of which only these values make sense.
     const fn only(self, check: fn(&str) -> Result<(), UnknownWord>) -> Self {
         Self { check, ..self }
+    }
+
+    /// The same field with another heading than its name.
+    const fn called(self, heading: &'static str) -> Self {
+        Self { heading, ..self }
+    }
+
+    /// The same field in a column of this width \[points\].
+    const fn wide(self, width: f32) -> Self {
+        Self { width, ..self }
+    }
+
+    /// The heading of its column in the report, with its unit.
+    pub fn heading(&self) -> String {
+        match self.unit {
+            "" => self.heading.to_owned(),
+            unit => format!("{} ({unit})", self.heading),
+        }
+    }
+
+    /// What it is, with its unit.
+    pub fn about(&self) -> String {
+        match self.unit {
+            "" => self.about.to_owned(),
+            unit => format!("{} [{unit}]", self.about),
+        }
     }
 
     /// The alignment of its column in a table.
@@ -207,15 +264,37 @@ enum Read {
     Number(fn(&QueryResult) -> Option<f64>),
 }
 
+/// The width of most columns \[points\].
+const WIDTH: f32 = 60.0;
+
 const fn words(name: &'static str, about: &'static str, read: fn(&QueryResult) -> String) -> Field {
-    Field { name, about, decimals: None, read: Read::Words(read), check: |_| Ok(()) }
+    Field {
+        name,
+        heading: name,
+        about,
+        unit: "",
+        width: WIDTH,
+        decimals: None,
+        read: Read::Words(read),
+        check: |_| Ok(()),
+    }
 }
 
 const fn number(
     name: &'static str,
     about: &'static str,
+    unit: &'static str,
     decimals: usize,
     read: fn(&QueryResult) -> Option<f64>,
 ) -> Field {
-    Field { name, about, decimals: Some(decimals), read: Read::Number(read), check: |_| Ok(()) }
+    let read = Read::Number(read);
+    Field { unit, decimals: Some(decimals), read, ..words(name, about, |_| String::new()) }
+}
+
+const fn is_equal(one: &[u8], other: &[u8]) -> bool {
+    let mut at = 0;
+    while at < one.len() && at < other.len() && one[at] == other[at] {
+        at += 1;
+    }
+    at == one.len() && at == other.len()
 }

@@ -5,56 +5,81 @@ use maud::{Markup, html};
 use super::super::{ReportedResult, RunReport};
 use super::words::{capital, class_of};
 use crate::diagnosis::{Code, Grade};
-use crate::measure::Group;
+use crate::measure::{Field, Group};
 
 /// A column of the table.
-pub(super) struct Column {
-    name: &'static str,
-    /// The CSS class of its cells.
-    class: &'static str,
-    /// Whether it is shown at first.
-    is_default: bool,
+#[derive(Clone, Copy)]
+pub(super) enum Column {
+    /// A field of the results.
+    Field(&'static Field),
+    /// The scenes and the setting.
+    Where,
+    /// The change since the baseline.
+    Change,
+    /// The photo of the query.
+    Photo,
 }
 
-const fn column(name: &'static str, class: &'static str, is_default: bool) -> Column {
-    Column { name, class, is_default }
-}
-
+/// The columns; the first of them are shown at first.
 const COLUMNS: [Column; 12] = [
-    column("query", "", true),
-    column("method", "", true),
-    column("where", "", true),
-    column("result", "", true),
-    column("error (m)", "number", true),
-    column("cause", "words", true),
-    column("change", "", true),
-    column("rotation (°)", "number", false),
-    column("confidence", "number", false),
-    column("distance (m)", "number", false),
-    column("reference", "", false),
-    column("photo", "", false),
+    Column::Field(Field::named("query")),
+    Column::Field(Field::named("method")),
+    Column::Where,
+    Column::Field(Field::named("grade")),
+    Column::Field(Field::named("error")),
+    Column::Field(Field::named("cause")),
+    Column::Change,
+    Column::Field(Field::named("rotation")),
+    Column::Field(Field::named("probability")),
+    Column::Field(Field::named("start")),
+    Column::Field(Field::named("reference")),
+    Column::Photo,
 ];
 
-/// The columns of which the run has values.
-pub(super) fn columns(report: &RunReport) -> Vec<&'static Column> {
-    let has_any = |column: &&Column| match column.name {
-        "where" => report.has_several_groups(),
-        "change" => report.baseline.is_some(),
-        "photo" => !report.thumbnails.is_empty(),
-        _ => true,
+/// How many columns are shown at first.
+const SHOWN: usize = 7;
+
+impl Column {
+    fn heading(self) -> String {
+        match self {
+            Self::Field(field) => field.heading(),
+            Self::Where => "where".to_owned(),
+            Self::Change => "change".to_owned(),
+            Self::Photo => "photo".to_owned(),
+        }
+    }
+
+    /// The CSS class of its cells.
+    fn class(self) -> Option<&'static str> {
+        match self {
+            Self::Field(field) if field.decimals.is_some() => Some("number"),
+            Self::Field(field) if field.name == "cause" => Some("words"),
+            _ => None,
+        }
+    }
+}
+
+/// The columns of which the run has values, and whether each is shown at first.
+pub(super) fn columns(report: &RunReport) -> Vec<(Column, bool)> {
+    let has_any = |column: &Column| match column {
+        Column::Where => report.has_several_groups(),
+        Column::Change => report.baseline.is_some(),
+        Column::Photo => !report.thumbnails.is_empty(),
+        Column::Field(_) => true,
     };
-    COLUMNS.iter().filter(has_any).collect()
+    let columns = COLUMNS.into_iter().enumerate().map(|(at, column)| (column, at < SHOWN));
+    columns.filter(|(column, _)| has_any(column)).collect()
 }
 
 /// The rules that hide the columns that are not chosen; they work without a script.
-pub(super) fn column_rules(columns: &[&Column]) -> String {
+pub(super) fn column_rules(columns: &[(Column, bool)]) -> String {
     let rule = |at: usize| {
         format!("section:has(#c{at}:not(:checked)) #results tr>:nth-child({at}){{display:none}}\n")
     };
     (1..=columns.len()).map(rule).collect()
 }
 
-pub(super) fn results(report: &RunReport, columns: &[&Column]) -> Markup {
+pub(super) fn results(report: &RunReport, columns: &[(Column, bool)]) -> Markup {
     let unit = report.unit();
     let is_any = |is: &dyn Fn(&ReportedResult) -> bool| report.results.iter().any(is);
     let methods = &report.run.protocol.methods;
@@ -77,10 +102,10 @@ pub(super) fn results(report: &RunReport, columns: &[&Column]) -> Markup {
             }
             fieldset.columns {
                 legend { "Columns" }
-                @for (at, column) in columns.iter().enumerate() {
+                @for (at, (column, is_shown)) in columns.iter().enumerate() {
                     label {
-                        input type="checkbox" id={ "c" (at + 1) } checked[column.is_default] autocomplete="off";
-                        " " (unit.words(column.name))
+                        input type="checkbox" id={ "c" (at + 1) } checked[*is_shown] autocomplete="off";
+                        " " (unit.words(&column.heading()))
                     }
                     " "
                 }
@@ -91,10 +116,10 @@ pub(super) fn results(report: &RunReport, columns: &[&Column]) -> Markup {
                     caption { span { "One row for each result. The cause of a failure leads to its picture." } }
                     thead {
                         tr {
-                            @for column in columns {
-                                th scope="col" class=[class(column)] {
-                                    @if column.name == "photo" { (column.name) }
-                                    @else { button type="button" { (unit.words(column.name)) } }
+                            @for (column, _) in columns {
+                                th scope="col" class=[column.class()] {
+                                    @if matches!(column, Column::Photo) { (column.heading()) }
+                                    @else { button type="button" { (unit.words(&column.heading())) } }
                                 }
                             }
                         }
@@ -129,52 +154,37 @@ fn primary(one: &ReportedResult) -> Option<Code> {
     one.result.diagnosis.first().map(|primary| primary.code)
 }
 
-fn class(column: &Column) -> Option<&'static str> {
-    Some(column.class).filter(|class| !class.is_empty())
-}
-
-fn row(report: &RunReport, one: &ReportedResult, columns: &[&Column]) -> Markup {
+fn row(report: &RunReport, one: &ReportedResult, columns: &[(Column, bool)]) -> Markup {
     let code = primary(one).map_or(String::new(), |code| code.to_string());
     html! {
         tr id={ "r" (one.number) } data-method=(one.result.method) data-grade=(one.result.grade) data-code=(code) {
-            @for column in columns { (cell(report, one, column)) }
+            @for (column, _) in columns { (cell(report, one, *column)) }
         }
     }
 }
 
-fn cell(report: &RunReport, one: &ReportedResult, column: &Column) -> Markup {
-    let result = &one.result;
-    let class = class(column);
-    let number = |value: Option<f64>, digits: usize| {
-        html! {
-            td class=[class] data-v=(value.map_or(String::new(), |value| value.to_string())) {
-                @if let Some(value) = value { (format!("{value:.digits$}")) }
-            }
-        }
-    };
-    match column.name {
-        "photo" => html! {
-            td {
-                @if report.thumbnails.contains_key(&one.query) {
-                    span class={ "photo q" (one.query) } role="img" aria-label={ "photo of query " (result.query) } {}
+fn cell(report: &RunReport, one: &ReportedResult, column: Column) -> Markup {
+    let (result, class) = (&one.result, column.class());
+    let field = match column {
+        Column::Photo => {
+            return html! {
+                td {
+                    @if report.thumbnails.contains_key(&one.query) {
+                        span class={ "photo q" (one.query) } role="img" aria-label={ "photo of query " (result.query) } {}
+                    }
                 }
-            }
-        },
-        "query" => html! { td { (result.query) } },
+            };
+        }
+        Column::Where => return html! { td { (place(one)) } },
+        Column::Change => {
+            return html! { td { @if let Some(change) = one.change { (change.name()) } } };
+        }
+        Column::Field(field) => field,
+    };
+    match field.name {
         "method" => html! { td { (result.method_name()) } },
-        "where" => html! { td { (place(one)) } },
-        "reference" => html! { td { (result.references.join(" ")) } },
-        "result" => html! {
+        "grade" => html! {
             td class=(class_of(result.grade)) { (result.grade.glyph()) " " (result.grade) }
-        },
-        "error (m)" => number(result.error.map(|error| error.translation_m), 3),
-        "rotation (°)" => number(result.error.map(|error| error.rotation_deg), 2),
-        "distance (m)" => number(result.initial_error.map(|error| error.translation_m), 3),
-        "confidence" => match &result.confidence {
-            Some(known) => {
-                html! { td class=[class] data-v=(known.probability) { (known.likely()) } }
-            }
-            None => html! { td class=[class] data-v="" {} },
         },
         "cause" => html! {
             td class=[class] {
@@ -187,7 +197,15 @@ fn cell(report: &RunReport, one: &ReportedResult, column: &Column) -> Markup {
                 }
             }
         },
-        _ => html! { td { @if let Some(change) = one.change { (change.name()) } } },
+        "probability" => html! {
+            td class=[class] data-v=(field.whole(result)) {
+                @if let Some(known) = &result.confidence { (known.likely()) }
+            }
+        },
+        _ if field.decimals.is_some() => html! {
+            td class=[class] data-v=(field.whole(result)) { (field.text(result)) }
+        },
+        _ => html! { td { (field.text(result)) } },
     }
 }
 

@@ -103,7 +103,7 @@ fn fields(
                 {
                     continue;
                 }
-                ui.label(field.name.replace('_', " ")).on_hover_text(field.about);
+                ui.label(field.name.replace('_', " ")).on_hover_text(field.about());
                 let own = RichText::new(own.unwrap_or_else(|| "–".to_owned()));
                 ui.label(if differs { own.strong() } else { own });
                 if is_compared {
