@@ -44,7 +44,7 @@ pub use save::SaveTarget;
 pub use scoring::{CostAlong, CostLine, DenseAsk, DenseMap, Probe, Scoring};
 pub use selection::{KnownResults, ResultRow, Results};
 pub use setup::Setup;
-pub use shot::{Moment, Shot, ShotError, shoot};
+pub use shot::{Shot, ShotError, ShotTime, shoot};
 pub use shown::{ShownReason, ShownView};
 pub use state::{AppState, Note};
 pub(crate) use view_context::Sends;

@@ -416,7 +416,7 @@ impl AppState {
             NamedPose::Coarse => minimum(Phase::PositionCoarse),
             NamedPose::Fine => minimum(Phase::PositionFine),
             NamedPose::Estimate => {
-                let span = span.filter(|span| self.has_come(span))?;
+                let span = span.filter(|span| self.is_finished_at_cursor(span))?;
                 span.result.as_ref()?.pose.as_ref()?.to_pose()
             }
             NamedPose::Truth => run.truth().copied().filter(|_| self.options.shows_truth),

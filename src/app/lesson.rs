@@ -262,7 +262,7 @@ fn outcome(context: &ViewContext<'_>, method: Method, guess: &Pose) -> Vec<Strin
     let run = context.state.run();
     let apart = |pose: &Pose| (guess.translation.vector - pose.translation.vector).norm();
     let span = run.span_of(Part::Reference(method, 0));
-    let span = span.filter(|span| context.state.has_come(span));
+    let span = span.filter(|span| context.state.is_finished_at_cursor(span));
     let pose = span.and_then(|span| span.result.as_ref()?.pose.as_ref()?.to_pose());
     let mut words: Vec<String> = place(context, guess).into_iter().collect();
     match pose {

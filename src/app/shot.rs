@@ -18,7 +18,7 @@ use crate::session::{Part, RunState};
 #[derive(Clone, Debug)]
 pub struct Shot {
     /// The moment of the run.
-    pub moment: Moment,
+    pub moment: ShotTime,
     /// Size of the picture \[px\].
     pub size_px: [u32; 2],
     /// Pixels per point: how large words and marks are.
@@ -29,7 +29,7 @@ pub struct Shot {
 
 /// A moment of a run that has come to its end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Moment {
+pub enum ShotTime {
     /// The end of the run.
     End,
     /// The end of a method's part.
@@ -38,7 +38,7 @@ pub enum Moment {
     Step(usize),
 }
 
-impl FromStr for Moment {
+impl FromStr for ShotTime {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
@@ -54,7 +54,7 @@ impl FromStr for Moment {
     }
 }
 
-impl fmt::Display for Moment {
+impl fmt::Display for ShotTime {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::End => f.write_str("end"),
@@ -137,19 +137,19 @@ impl<'a> Window<'a> {
         }
     }
 
-    fn go_to(&mut self, moment: Moment) -> Result<(), ShotError> {
+    fn go_to(&mut self, moment: ShotTime) -> Result<(), ShotError> {
         let steps = self.app.app_state().run().len();
         match moment {
             // The window is at the cause by itself.
-            Moment::End => {}
-            Moment::Step(step) if step < steps => self.app.state.move_cursor(step),
-            Moment::Step(step) => {
+            ShotTime::End => {}
+            ShotTime::Step(step) if step < steps => self.app.state.move_cursor(step),
+            ShotTime::Step(step) => {
                 return Err(ShotError::Unknown(format!(
                     "step {step}: the run has the steps 0 to {}",
                     steps.saturating_sub(1)
                 )));
             }
-            Moment::Method(method) => {
+            ShotTime::Method(method) => {
                 let asked = &self.app.app_state().setup.task.protocol.methods;
                 if !asked.contains(&method) {
                     let names: Vec<_> = asked.iter().map(|one| one.name()).collect();

@@ -134,9 +134,9 @@ impl AppState {
         self.navigation.cursor()
     }
 
-    /// Whether a part of the run was told to its end at the cursor, or at the step that all methods have
-    /// come to. What is still to come is told by nobody who hides it.
-    pub(super) fn has_come(&self, span: &Span) -> bool {
+    /// Whether a part of the run is finished at the cursor, or at the common step of the lock-step view. Without the
+    /// option that hides the future, every part counts as finished.
+    pub(super) fn is_finished_at_cursor(&self, span: &Span) -> bool {
         match self.options.lockstep {
             Some(step) => span.records.len() <= step + 1,
             None => !self.options.hides_future || span.records.end <= self.cursor() + 1,

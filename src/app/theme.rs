@@ -130,10 +130,10 @@ pub fn contrast(a: Color32, b: Color32) -> f32 {
     a.max(b) / a.min(b)
 }
 
-/// A theme: egui's own, with pale words that can be read.
+/// A theme: egui's own, with more contrast for pale text.
 fn visuals(theme: egui::Theme) -> Visuals {
     let mut visuals = theme.default_visuals();
-    // What is not to be pressed is read as well as what is.
+    // Labels need as much contrast as buttons.
     let ([pale, plain], ground, words) = match theme {
         egui::Theme::Dark => ([170, 190], [0x3A, 0x37, 0x70], [0xE8, 0xE6, 0xFF]),
         egui::Theme::Light => ([88, 60], [0xCD, 0xCB, 0xFA], [0x1E, 0x1B, 0x50]),

@@ -174,7 +174,7 @@ impl<'a> ViewContext<'a> {
             return self.latest::<ReferencesFused>()?.pose;
         }
         let (span, _) = self.part_of(method)?;
-        let span = Some(span).filter(|span| self.state.has_come(span))?;
+        let span = Some(span).filter(|span| self.state.is_finished_at_cursor(span))?;
         span.result.as_ref()?.pose.as_ref()?.to_pose()
     }
 
@@ -184,7 +184,7 @@ impl<'a> ViewContext<'a> {
         let assessed = self.latest_of::<MinimumAssessed>(method);
         let report = self
             .part_of(method)
-            .filter(|(span, _)| self.state.has_come(span))
+            .filter(|(span, _)| self.state.is_finished_at_cursor(span))
             .and_then(|(span, _)| span.result.as_ref()?.cost.as_ref());
         CostBounds {
             shuffled: assessed.and_then(|assessed| assessed.shuffled),

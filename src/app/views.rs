@@ -30,7 +30,7 @@ use crate::session::Span;
 
 /// A part of the window.
 pub trait View {
-    /// Draws the view. It must bear any moment of any run, and none.
+    /// Draws the view. It is called at every step of a run, and without a run.
     fn ui(&mut self, ui: &mut egui::Ui, context: &ViewContext<'_>);
 }
 

@@ -21,7 +21,7 @@ pub fn index(args: &IndexArgs, terminal: &Terminal) -> Result<(), CliError> {
     };
     let options =
         IndexOptions { words: params.index.words, every: args.every.get(), seed: args.seed };
-    let without = left_out(scene.as_ref(), &args.scene, &args.without)?;
+    let without = excluded(scene.as_ref(), &args.scene, &args.without)?;
     let request = Retriever::request(scene.as_ref(), &options, &without, &params);
     if !args.force {
         let there = Index::open(&path, params.retrieval.checks);
@@ -61,7 +61,7 @@ pub fn index(args: &IndexArgs, terminal: &Terminal) -> Result<(), CliError> {
             summary.frames,
             match without.len() {
                 0 => String::new(),
-                left_out => format!(" without {left_out}"),
+                excluded => format!(" without {excluded}"),
             },
             summary.features,
             summary.words,
@@ -73,7 +73,7 @@ pub fn index(args: &IndexArgs, terminal: &Terminal) -> Result<(), CliError> {
 }
 
 /// The frames of the scene to leave out: the named ones, and the queries of runs. `argument` is the scene's.
-fn left_out(
+fn excluded(
     scene: &dyn Scene,
     argument: &str,
     named: &[String],

@@ -17,7 +17,7 @@ pub struct PageTurner {
 #[derive(Clone, Debug)]
 struct WaitingPage {
     watch: Watch,
-    has_come: bool,
+    is_reached: bool,
     text: String,
 }
 
@@ -31,7 +31,7 @@ impl PageTurner {
             let mut wait = |moment: &super::Moment, text| {
                 waiting.push_back(WaitingPage {
                     watch: Watch::new(moment.clone()),
-                    has_come: false,
+                    is_reached: false,
                     text,
                 });
             };
@@ -46,10 +46,10 @@ impl PageTurner {
     /// The pages that come with a record, as Markdown. Must be called with every record.
     pub fn turn(&mut self, record: &Record) -> Vec<String> {
         for page in &mut self.waiting {
-            page.has_come |= page.watch.is_reached(record);
+            page.is_reached |= page.watch.is_reached(record);
         }
         let mut turned = Vec::new();
-        while let Some(page) = self.waiting.pop_front_if(|page| page.has_come) {
+        while let Some(page) = self.waiting.pop_front_if(|page| page.is_reached) {
             turned.push(page.text);
         }
         turned

@@ -56,7 +56,7 @@ impl ProofPicture {
     /// The place of each panel's picture in an area of this size, in the order of [`Self::panels`]; titles stand
     /// right above. The others stand below the large panel or to its right, wherever all become larger.
     pub fn places(&self, width: f32, height: f32) -> Vec<Place> {
-        self.better(width, height, worth)
+        self.better(width, height, score)
     }
 
     /// The places on a page of this width, and the height that they take: those that fill more of it.
@@ -75,14 +75,14 @@ impl ProofPicture {
         (places, height)
     }
 
-    fn better(&self, width: f32, height: f32, worth: impl Fn(&[Place]) -> f32) -> Vec<Place> {
+    fn better(&self, width: f32, height: f32, score: impl Fn(&[Place]) -> f32) -> Vec<Place> {
         let all = Place { left: 0.0, top: 0.0, width, height };
         if self.beside.is_empty() {
             return self.side_by_side(all, 1.0, 1);
         }
         let mut best = self.stacked(all);
         let mut hold = |places: Vec<Place>| {
-            if worth(&places) >= worth(&best) {
+            if score(&places) >= score(&best) {
                 best = places;
             }
         };
@@ -165,7 +165,7 @@ impl ProofPicture {
 }
 
 /// What places show: their area. A small panel counts half, because it may be small.
-fn worth(places: &[Place]) -> f32 {
+fn score(places: &[Place]) -> f32 {
     let small: f32 = places.iter().skip(1).map(Place::area).sum();
     places.first().map_or(0.0, Place::area) + 0.5 * small
 }

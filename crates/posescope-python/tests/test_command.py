@@ -118,3 +118,30 @@ def test_the_doctor_says_what_the_command_prints(tmp_path: Path) -> None:
     assert ran.stdout.split() == found.text.split()
     with pytest.raises(posescope.InputError):
         posescope.doctor(tmp_path / "nowhere")
+
+
+def test_each_error_has_its_class_file_and_place(tmp_path: Path) -> None:
+    known = tmp_path / "known.txt"
+    known.write_text("70 fb\n70 fb D3 too many words\n")
+    with pytest.raises(posescope.InputError) as raised:
+        posescope.evaluate("street", tmp_path / "a", known_failures=known, progress=False)
+    assert (raised.value.file, raised.value.place) == (str(known), "line 2")
+    with pytest.raises(posescope.InputError, match="nothing") as raised:
+        posescope.evaluate("street", tmp_path / "b", baseline=tmp_path / "nothing", progress=False)
+    assert raised.value.file == str(tmp_path / "nothing")
+    for options in (
+        {"gate": "right@mi >= 0.5", "method": "fb"},
+        {"radius": -1},
+        {"limit": "many"},
+        {"reference": "70"},
+        {"set": "fb.ratio=7"},
+        {"sweep": "gamma=0.2:1:0.1"},
+        {"compute": "abacus"},
+    ):
+        with pytest.raises(ValueError):
+            posescope.evaluate("street", tmp_path / "c", progress=False, **options)  # type: ignore[arg-type]
+    assert not (tmp_path / "c").exists()
+    run = posescope.evaluate(
+        "street", tmp_path / "d", limit=1, method="fb", radius=[10, 12.5], explain=False, keep_failures=0, progress=False
+    )
+    assert len(run.rows()) == 2

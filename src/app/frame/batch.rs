@@ -6,7 +6,7 @@ use egui::{
 };
 
 use super::inspector::capital;
-use super::verdicts::{split, told};
+use super::verdicts::{split, words_of};
 use super::{Panes, canvas, proof::elided};
 use crate::app::App;
 use crate::app::theme;
@@ -144,7 +144,7 @@ pub(crate) fn right(ui: &mut Ui, context: &ViewContext<'_>, panes: &mut Panes) {
             Some(result) => {
                 let error = result.off().map_or(String::new(), |off| format!(" · {off} off"));
                 ui.strong(format!("{} · {}{error}", result.query, result.method.label()));
-                let text = told(result);
+                let text = words_of(result);
                 ui.add(egui::Label::new(split(&text).0).truncate()).on_hover_text(&text);
             }
             None => {

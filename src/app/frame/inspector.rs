@@ -9,7 +9,7 @@ use serde_json::Value;
 use super::Panes;
 use super::stage::three_digits;
 use super::storyboard::part_name;
-use super::verdicts::{short, split, told};
+use super::verdicts::{short, split, words_of};
 use crate::app::theme;
 use crate::app::view_options::Tab;
 use crate::app::{Sends, ViewContext};
@@ -78,7 +78,7 @@ fn why(ui: &mut Ui, context: &ViewContext<'_>) {
         }
         None => {
             ui.strong(format!("{}: {}", part_name(span.part), result.grade));
-            ui.label(told(&result));
+            ui.label(words_of(&result));
             changed(ui, context.run);
         }
     }

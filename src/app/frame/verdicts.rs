@@ -163,11 +163,11 @@ fn sentence(
         let latest = lecture::latest(context.run, span, context.cursor);
         return (first, latest.unwrap_or_default());
     };
-    split(&told(result))
+    split(&words_of(result))
 }
 
 /// What a result is, in its own words: its verdict, or why it has no pose, or what speaks for it.
-pub(super) fn told(result: &QueryResult) -> String {
+pub(super) fn words_of(result: &QueryResult) -> String {
     match (result.diagnosis.first(), &result.reason) {
         (Some(found), _) => found.text.clone(),
         (None, Some(reason)) => reason.text.clone(),
@@ -182,10 +182,10 @@ pub(crate) fn split(text: &str) -> (String, String) {
     (first.to_owned(), others.to_owned())
 }
 
-/// What a remedy changes, without the options that need no telling: `mi6`, `grid.rounds=2`.
+/// What a remedy changes, without the names of common options: `mi6`, `grid.rounds=2`.
 pub(super) fn short(args: &[String]) -> String {
-    let told = args.iter().map(String::as_str).filter(|arg| !["--set", "--method"].contains(arg));
-    told.collect::<Vec<_>>().join(" ")
+    let values = args.iter().map(String::as_str).filter(|arg| !["--set", "--method"].contains(arg));
+    values.collect::<Vec<_>>().join(" ")
 }
 
 /// The best of what helped, or the offer to look for it; always of the same width. Where it does not fit, the words end

@@ -68,7 +68,7 @@ impl AppState {
         let run = self.shown_run();
         let reference = run.reference_at(self.shown_cursor());
         let own = || {
-            let spans = run.spans().iter().filter(|span| self.has_come(span));
+            let spans = run.spans().iter().filter(|span| self.is_finished_at_cursor(span));
             spans.filter(move |span| span.part.method() == Some(method) && span.result.is_some())
         };
         let fused = own().rfind(|span| span.part == Part::Fusion(method));
@@ -83,7 +83,7 @@ impl AppState {
 
     /// The same, once the part has come to its end.
     pub(crate) fn outcome(&self, span: &Span) -> Option<QueryResult> {
-        self.has_come(span).then(|| self.shown_result(span)).flatten()
+        self.is_finished_at_cursor(span).then(|| self.shown_result(span)).flatten()
     }
 
     /// What an earlier run found for the method of a part, with nothing in it that is hidden.
@@ -154,7 +154,11 @@ impl AppState {
     pub(crate) fn stage_end(&self, span: &Span, bar: &StageBar) -> usize {
         let stages = self.stages_of(span);
         let is_last = stages.last().is_some_and(|last| last.records == bar.records);
-        let end = if is_last && self.has_come(span) { span.records.end } else { bar.records.end };
+        let end = if is_last && self.is_finished_at_cursor(span) {
+            span.records.end
+        } else {
+            bar.records.end
+        };
         end - 1
     }
 }

@@ -62,7 +62,7 @@ impl View for QueriesView {
 /// Scrolls the rows that are drawn from `first` on, so that one is in the middle, as far as there are rows on either
 /// side; `height` is that of a row alone \[points\].
 ///
-/// An area may be told an offset too, but swings back from what is beyond the contents that it had before.
+/// The offset of a scroll area could be set too, but egui limits it to the size that the contents had before.
 fn bring_to_the_middle(ui: &Ui, first: usize, row: usize, height: f32) {
     let step = height + ui.spacing().item_spacing.y;
     let top = ui.max_rect().top() + (row as f32 - first as f32) * step;

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use posescope::app::Moment;
+use posescope::app::ShotTime;
 
 /// Saves a picture of the window instead of opening it.
 #[derive(Debug, Args)]
@@ -17,11 +17,11 @@ pub struct ScreenshotArgs {
     #[arg(
         long,
         value_name = "end|METHOD|STEP",
-        default_value_t = Moment::End,
+        default_value_t = ShotTime::End,
         requires = "screenshot"
     )]
     #[arg(hide_short_help = true)]
-    pub at: Moment,
+    pub at: ShotTime,
     /// The size of the window [px]
     #[arg(
         long,

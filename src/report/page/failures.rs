@@ -51,7 +51,7 @@ fn failure(report: &RunReport, one: &ReportedResult, is_open: bool) -> Markup {
                 span.about {
                     (result.query) " · " (result.method_name())
                     @if report.has_several_groups() { " · " (place(one)) }
-                    " · " span class=(class_of(result.grade)) { (worth(result)) }
+                    " · " span class=(class_of(result.grade)) { (score(result)) }
                     @if let Some(known) = result.confidence.as_ref().filter(|_| result.pose.is_some()) {
                         " · " (known.likely()) " likely right"
                     }
@@ -72,7 +72,7 @@ fn failure(report: &RunReport, one: &ReportedResult, is_open: bool) -> Markup {
 }
 
 /// The error, or that there is no pose.
-fn worth(result: &QueryResult) -> String {
+fn score(result: &QueryResult) -> String {
     let glyph = result.grade.glyph();
     match result.off() {
         Some(off) => format!("{glyph} {off} off"),

@@ -109,8 +109,8 @@ pub(super) fn log_styles(stream: &mut Stream, methods: &[Method], params: &Param
 
 /// Whether features are matched.
 fn shows_features(methods: &[Method], params: &Params) -> bool {
-    let mut told = methods.iter().flat_map(|&method| told_by(method));
-    told.any(|method| family(method, params).is_some_and(|of| Family::MATCHING.contains(&of)))
+    let mut recorded = methods.iter().flat_map(|&method| told_by(method));
+    recorded.any(|method| family(method, params).is_some_and(|of| Family::MATCHING.contains(&of)))
 }
 
 fn family(method: Method, params: &Params) -> Option<Family> {
@@ -119,8 +119,8 @@ fn family(method: Method, params: &Params) -> Option<Family> {
 
 /// The methods that search a cost, each of which has a row.
 fn searches(methods: &[Method]) -> Vec<Method> {
-    let told: Vec<Method> = methods.iter().flat_map(|&method| told_by(method)).collect();
-    estimator::direct_methods(&told)
+    let recorded: Vec<Method> = methods.iter().flat_map(|&method| told_by(method)).collect();
+    estimator::direct_methods(&recorded)
 }
 
 /// Whether a method's cost uses a joint histogram.

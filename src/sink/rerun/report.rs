@@ -59,11 +59,11 @@ fn story(results: &[QueryResult]) -> String {
             continue;
         };
         let off = result.off().map(|off| format!("{off} off"));
-        let worth = off.unwrap_or_else(|| result.grade.to_string());
+        let score = off.unwrap_or_else(|| result.grade.to_string());
         let (first, rest) = first_sentence(&primary.text);
         let rest = [rest, primary.code.name()].join(" ");
         let name = result.method_name();
-        text += &format!("### {name}: {worth}\n\n**{first}** {}\n\n", rest.trim());
+        text += &format!("### {name}: {score}\n\n**{first}** {}\n\n", rest.trim());
         for paragraph in result.paragraphs() {
             text += &format!("- {paragraph}\n");
         }
