@@ -3,7 +3,7 @@
 //! | files | content |
 //! |---|---|
 //! | `QUERY_REFERENCE_matches.txt` | a match per line, `x y x y`: in the query and in the reference \[px\] |
-//! | `QUERY_REFERENCE_matches.npz` | `keypoints0`, `keypoints1`, `matches`, as SuperGlue's and LightGlue's demonstrations write them |
+//! | `QUERY_REFERENCE_matches.npz` | `keypoints0`, `keypoints1`, and `matches` or `matches0`, as of SuperGlue and LightGlue |
 //! | `*.h5` | features and matches as hloc writes them |
 //!
 //! The centre of the top-left pixel is at (0, 0) in all of them. The reference may also come first.
@@ -12,7 +12,7 @@ mod hloc;
 mod npz;
 mod text;
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use posescope_core::features::{FoundMatches, PairMatches};
@@ -21,7 +21,7 @@ use posescope_core::scene::stem;
 
 use self::hloc::HlocFiles;
 use super::folder::entries;
-use super::frame_names::flat;
+use super::frame_names::{ends_of, flat};
 use super::{Scene, SceneError};
 
 pub use self::text::write_matches;
@@ -99,6 +99,8 @@ pub struct MatchFolder {
     hloc: Option<HlocFiles>,
     /// Names of files that several frames have, of the queries' scene and of the references'.
     shared: [BTreeSet<String>; 2],
+    /// What other programs call the frames of both.
+    others: [BTreeMap<String, String>; 2],
 }
 
 /// What a frame may be called in the files.
@@ -106,6 +108,8 @@ struct Names<'a> {
     frame: &'a str,
     /// Whether no other frame's photo has a file of this name.
     is_file_unique: bool,
+    /// Another name of the frame.
+    other: Option<&'a str>,
 }
 
 impl MatchFolder {
@@ -135,7 +139,12 @@ impl MatchFolder {
             [] => None,
             files => Some(HlocFiles::open(folder, files)?),
         };
-        Ok(Self { folder: folder.to_owned(), hloc, shared: Default::default() })
+        Ok(Self {
+            folder: folder.to_owned(),
+            hloc,
+            shared: Default::default(),
+            others: Default::default(),
+        })
     }
 
     /// The matches of frames of these scenes.
@@ -146,12 +155,23 @@ impl MatchFolder {
             let stems = scene.frames().iter().map(|frame| stem(frame));
             stems.filter(|stem| !seen.insert(*stem)).map(str::to_owned).collect()
         });
-        Self { shared, ..self }
+        let others = [queries, references].map(|scene| {
+            let named = scene.frames().iter().enumerate();
+            let other = |(at, frame): (usize, &String)| {
+                Some((frame.clone(), scene.other_name(at)?.to_owned()))
+            };
+            named.filter_map(other).collect()
+        });
+        Self { shared, others, ..self }
     }
 
     /// The names of a frame of the queries' scene (0) or of the references' (1).
-    fn names<'a>(&self, scene: usize, frame: &'a str) -> Names<'a> {
-        Names { frame, is_file_unique: !self.shared[scene].contains(stem(frame)) }
+    fn names<'a>(&'a self, scene: usize, frame: &'a str) -> Names<'a> {
+        Names {
+            frame,
+            is_file_unique: !self.shared[scene].contains(stem(frame)),
+            other: self.others[scene].get(frame).map(String::as_str),
+        }
     }
 }
 
@@ -188,7 +208,16 @@ impl MatchFolder {
         };
         let by_file = || file(stem(first.frame), stem(second.frame));
         let is_unique = first.is_file_unique && second.is_file_unique;
-        file(first.frame, second.frame).or_else(|| is_unique.then(by_file).flatten())
+        let others = [first, second].map(|names| names.other.map(ends_of));
+        let by_other = || match others {
+            [Some(first), Some(second)] => first.zip(second).find_map(|(first, second)| {
+                let kinds = [format!("{first}.color"), format!("{second}.color")];
+                file(&kinds[0], &kinds[1]).or_else(|| file(first, second))
+            }),
+            _ => None,
+        };
+        let found = file(first.frame, second.frame).or_else(by_other);
+        found.or_else(|| is_unique.then(by_file).flatten())
     }
 }
 

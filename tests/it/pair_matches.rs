@@ -69,8 +69,8 @@ fn a_pair_without_matches_is_a_result_that_says_so() {
 }
 
 /// A file in numpy's format.
-fn npy(kind: &str, shape: &str, bytes: &[u8]) -> Vec<u8> {
-    let mut header = format!("{{'descr': '{kind}', 'fortran_order': False, 'shape': {shape}, }}");
+fn npy(kind: &str, shape: &str, order: &str, bytes: &[u8]) -> Vec<u8> {
+    let mut header = format!("{{'descr': '{kind}', 'fortran_order': {order}, 'shape': {shape}, }}");
     while (10 + header.len() + 1) % 64 != 0 {
         header.push(' ');
     }
@@ -82,28 +82,59 @@ fn npy(kind: &str, shape: &str, bytes: &[u8]) -> Vec<u8> {
     file
 }
 
-/// As SuperGlue's demonstration writes it: three keypoints, two, and one match.
-fn npz(path: &Path) {
-    let floats = |values: &[f32]| values.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<_>>();
-    let whole = [-1_i64, 1, -1].map(i64::to_le_bytes).concat();
-    let keypoints = floats(&[1.0, 2.0, 3.5, 4.0, 5.0, 6.0]);
+fn floats(values: &[f32]) -> Vec<u8> {
+    values.iter().flat_map(|value| value.to_le_bytes()).collect()
+}
+
+fn whole(values: &[i64]) -> Vec<u8> {
+    values.iter().flat_map(|value| value.to_le_bytes()).collect()
+}
+
+/// An archive with three keypoints of the first photo, two of the second, and these arrays. `batch` begins the shapes.
+fn npz_with(path: &Path, batch: &str, arrays: &[(&str, Vec<u8>)]) {
     let mut archive = zip::ZipWriter::new(fs::File::create(path).expect("writable"));
     let options = zip::write::SimpleFileOptions::default()
         .compression_method(zip::CompressionMethod::Deflated);
-    for (name, content) in [
-        ("keypoints0.npy", npy("<f4", "(3, 2)", &keypoints)),
-        ("keypoints1.npy", npy("<f4", "(2, 2)", &floats(&[7.0, 8.0, 9.0, 10.25]))),
-        ("matches.npy", npy("<i8", "(3,)", &whole)),
-        ("match_confidence.npy", npy("<f4", "(3,)", &floats(&[0.0, 0.5, 0.0]))),
-    ] {
-        archive.start_file(name, options).expect("writable");
-        archive.write_all(&content).expect("writable");
+    let first = floats(&[1.0, 2.0, 3.5, 4.0, 5.0, 6.0]);
+    let second = floats(&[7.0, 8.0, 9.0, 10.25]);
+    let keypoints = [
+        ("keypoints0", npy("<f4", &format!("({batch}3, 2)"), "False", &first)),
+        ("keypoints1", npy("<f4", &format!("({batch}2, 2)"), "False", &second)),
+    ];
+    for (name, content) in keypoints.iter().chain(arrays) {
+        archive.start_file(format!("{name}.npy"), options).expect("writable");
+        archive.write_all(content).expect("writable");
     }
     archive.finish().expect("writable");
 }
 
-/// As hloc writes them, with names in folders; the writer has no positions of 16 bits.
-fn hloc(folder: &Path) {
+/// The partner of each keypoint, in this shape.
+fn partners(shape: &str) -> Vec<u8> {
+    npy("<i8", shape, "False", &whole(&[-1, 1, -1]))
+}
+
+/// As SuperGlue's demonstration writes it: three keypoints, two, and one match.
+fn npz(path: &Path) {
+    let confidence = npy("<f4", "(3,)", "False", &floats(&[0.0, 0.5, 0.0]));
+    npz_with(path, "", &[("matches", partners("(3,)")), ("match_confidence", confidence)]);
+}
+
+/// As LightGlue gives it: pairs of keypoints, and the partner of each.
+fn pairs(path: &Path) {
+    let matches = npy("<i8", "(1, 2)", "False", &whole(&[1, 1]));
+    let scores = npy("<f4", "(1,)", "False", &floats(&[0.5]));
+    let arrays = [("matches", matches), ("matches0", partners("(3,)")), ("scores", scores)];
+    npz_with(path, "", &arrays);
+}
+
+/// The same with a batch axis, and pairs that were transposed before they were saved.
+fn batch(path: &Path) {
+    let matches = npy("<i8", "(1, 1, 2)", "True", &whole(&[1, 1]));
+    npz_with(path, "1, ", &[("matches", matches), ("matches0", partners("(1, 3)"))]);
+}
+
+/// As hloc writes them, or as it wrote them, with names in folders; the writer has no positions of 16 bits.
+fn hloc(folder: &Path, is_old: bool) {
     let mut features = hdf5_pure::FileBuilder::new();
     for (name, image, values, count) in [
         ("query", "000070.png", vec![1.0, 2.0, 3.5, 4.0, 5.0, 6.0], 3),
@@ -116,6 +147,14 @@ fn hloc(folder: &Path) {
         features.add_group(outer.finish());
     }
     features.write(folder.join("feats.h5")).expect("writable");
+    if is_old {
+        let mut matches = hdf5_pure::FileBuilder::new();
+        let mut group = matches.create_group("query-000070.png_mapping-000062.png");
+        group.create_dataset("matches0").with_i16_data(&[-1, 1, -1]).with_shape(&[3]);
+        matches.add_group(group.finish());
+        matches.write(folder.join("matches.h5")).expect("writable");
+        return;
+    }
     let mut matches = hdf5_pure::FileBuilder::new();
     let mut first = matches.create_group("query-000070.png");
     let mut second = first.create_group("mapping-000062.png");
@@ -133,15 +172,43 @@ fn text(path: &Path) {
 type Write = fn(&Path);
 
 /// By the name of the form.
-pub const FORMS: [(&str, Write); 3] = [
+pub const FORMS: [(&str, Write); 6] = [
     ("matches as text", |folder| {
         text(&folder.join("000070_000062_matches.txt"));
     }),
     ("matches as npz", |folder| {
         npz(&folder.join("000070_000062_matches.npz"));
     }),
-    ("matches of hloc", hloc),
+    ("matches of LightGlue", |folder| {
+        pairs(&folder.join("000070_000062_matches.npz"));
+    }),
+    ("matches with a batch axis", |folder| {
+        batch(&folder.join("000070_000062_matches.npz"));
+    }),
+    ("matches of hloc", |folder| hloc(folder, false)),
+    ("old matches of hloc", |folder| hloc(folder, true)),
 ];
+
+#[test]
+fn archives_of_matches_that_say_two_things_or_none_are_refused() {
+    let folder = TempDir::new().expect("a folder");
+    let path = folder.path().join("000070_000062_matches.npz");
+    let said = |arrays: &[(&str, Vec<u8>)]| {
+        npz_with(&path, "", arrays);
+        let source = MatchFolder::open(folder.path()).unwrap_or_else(|error| panic!("{error}"));
+        let error = source.matches("000070", "000062").expect_err("no matches").to_string();
+        assert_eq!(error.lines().count(), 1);
+        error
+    };
+    let of =
+        |values: &[i64]| npy("<i8", &format!("({}, 2)", values.len() / 2), "False", &whole(values));
+    has(&said(&[]), "an array matches or matches0 expected, keypoints0, keypoints1 found");
+    has(&said(&[("matches", of(&[0, 0])), ("matches0", partners("(3,)"))]), "the same matches");
+    has(&said(&[("matches", of(&[1, 0, 1, 1]))]), "keypoint 1 has two");
+    has(&said(&[("matches", of(&[3, 0]))]), "a keypoint below 3 expected, 3 found");
+    has(&said(&[("matches", of(&[1, -1]))]), "pairs of whole numbers expected, 1 and -1 found");
+    has(&said(&[("matches0", of(&[1, 1, 0, 0]))]), "one for each keypoint");
+}
 
 #[test]
 fn all_forms_say_the_same_in_both_directions() {
@@ -174,4 +241,22 @@ fn a_folder_without_matches_is_refused() {
     damage::expect_words(&error.to_string(), "hloc's features and matches");
     let line = "run street --query 70 --method mi --export-matches .";
     assert_eq!(run_in(folder.path(), line).code, Some(2));
+}
+
+#[test]
+fn advice_about_given_matches_names_no_parameter_of_our_own_features() {
+    let folder = TempDir::new().expect("a folder");
+    // Ten keypoints are too few.
+    let rows: String = (0..10).map(|at| format!("{at}0 {at}5 {at}0 {at}5\n")).collect();
+    write(folder.path().join("000070_000062_matches.txt"), rows);
+    let said =
+        run_in(folder.path(), "run street --query 70 --reference 62 --method fb --matches .");
+    has(&said.out, "R2");
+    has(&said.out, "let the matcher keep more keypoints");
+    assert!(!said.out.contains("surf."), "{}", said.out);
+    let said = run_in(
+        folder.path(),
+        "run street --query 70 --reference 62 --method fb --matches . --explain",
+    );
+    assert!(!said.out.contains("surf."), "{}", said.out);
 }

@@ -1,5 +1,6 @@
 //! Features and matches of hloc (Sarlin et al., *From Coarse to Fine*, CVPR 2019): one file with `IMAGE/keypoints`
-//! (N × 2, often in 16 bits), one with `IMAGE0/IMAGE1/matches0`, where names have `-` instead of `/`.
+//! (N × 2, often in 16 bits), one with `IMAGE0/IMAGE1/matches0`, where names have `-` instead of `/`. Older files have
+//! `IMAGE0_IMAGE1/matches0`.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -7,7 +8,7 @@ use std::path::{Path, PathBuf};
 use half::f16;
 use hdf5_pure::{Dataset, File, Group};
 
-use posescope_core::scene::stem;
+use posescope_core::scene::{stem, without_kind};
 
 use super::{MAX_KEYPOINTS, Names, RawMatches};
 use crate::scene::SceneError;
@@ -30,8 +31,8 @@ pub(super) struct HlocFiles {
     by_path: BTreeMap<String, Vec<String>>,
     /// The same names of images by the names of their files without extension.
     by_file: BTreeMap<String, Vec<String>>,
-    /// Stored pairs, by these names.
-    pairs: BTreeSet<(String, String)>,
+    /// The groups of stored pairs, by these names.
+    pairs: BTreeMap<(String, String), String>,
 }
 
 impl HlocFiles {
@@ -64,8 +65,19 @@ impl HlocFiles {
         };
         let images: BTreeMap<String, String> =
             found.keypoints.into_iter().map(|name| (name.replace('/', "-"), name)).collect();
+        let mut pairs = BTreeMap::new();
+        for group in stored.matches {
+            let pair = pair_of(&group, &images).map_err(|why| content(&matches_path, &why))?;
+            if let Some(pair) = pair {
+                pairs.insert(pair, group.join("/"));
+            }
+        }
+        if pairs.is_empty() {
+            let expected = "matches of images that the features have expected, none found";
+            return Err(content(&matches_path, &expected));
+        }
         let (mut by_path, mut by_file) = (BTreeMap::new(), BTreeMap::new());
-        for name in stored.matches.iter().flatten().collect::<BTreeSet<_>>() {
+        for name in pairs.keys().flat_map(|(a, b)| [a, b]).collect::<BTreeSet<_>>() {
             let own: &mut Vec<String> = by_path.entry(without_ending(name)).or_default();
             own.push(name.clone());
             let path = images.get(name).unwrap_or(name);
@@ -73,7 +85,6 @@ impl HlocFiles {
             let same: &mut Vec<String> = by_file.entry(without_ending(file)).or_default();
             same.push(name.clone());
         }
-        let pairs = stored.matches.into_iter().map(|[first, second]| (first, second)).collect();
         Ok(Self { features, features_path, matches, matches_path, images, by_path, by_file, pairs })
     }
 
@@ -86,6 +97,9 @@ impl HlocFiles {
         if let Some(images) = self.by_path.get(&flat) {
             return images.iter().collect();
         }
+        if let Some(image) = names.other.and_then(|other| self.image_called(other)) {
+            return vec![image];
+        }
         let of_file = self.by_file.get(stem(names.frame)).map(Vec::as_slice);
         match of_file {
             Some([image]) if names.is_file_unique => {
@@ -97,6 +111,16 @@ impl HlocFiles {
         }
     }
 
+    /// The only image that another name of a frame means.
+    fn image_called(&self, other: &str) -> Option<&String> {
+        let path = |image: &String| without_ending(self.images.get(image).unwrap_or(image));
+        let file = stem(other);
+        let called = [file.to_owned(), format!("{file}.color")];
+        let called = called.iter().filter_map(|file| self.by_file.get(file)).flatten();
+        let mut meant = called.filter(|image| agree(without_kind(&path(image)), other));
+        meant.next().filter(|_| meant.next().is_none())
+    }
+
     /// Reads the matches of two frames, if they are stored in this order.
     pub(super) fn read(
         &self,
@@ -106,7 +130,8 @@ impl HlocFiles {
         let seconds = self.images_of(second);
         let both = self.images_of(first).into_iter();
         let both = both.flat_map(|a| seconds.iter().map(move |b| (a.clone(), (*b).clone())));
-        let stored: Vec<(String, String)> = both.filter(|pair| self.pairs.contains(pair)).collect();
+        let stored: Vec<(String, String)> =
+            both.filter(|pair| self.pairs.contains_key(pair)).collect();
         let stored = match stored.as_slice() {
             [] => return Ok(None),
             [(a, b)] => [a, b],
@@ -129,7 +154,9 @@ impl HlocFiles {
             found.map_err(|why| content(&self.features_path, &format!("{place}: {why}")))
         };
         let (first, second) = (keypoints(stored[0])?, keypoints(stored[1])?);
-        let place = format!("{}/{}/matches0", stored[0], stored[1]);
+        let [one, other] = stored;
+        let group = &self.pairs[&(one.clone(), other.clone())];
+        let place = format!("{group}/matches0");
         let partners = self.matches.dataset(&place).map_err(text_of);
         let partners = partners
             .and_then(|set| partners_of(&set))
@@ -158,7 +185,30 @@ fn without_ending(image: &str) -> String {
 #[derive(Default)]
 struct Found {
     keypoints: Vec<String>,
-    matches: Vec<[String; 2]>,
+    /// The groups with matches.
+    matches: Vec<Vec<String>>,
+}
+
+/// The images of a group `IMAGE0/IMAGE1`, or of an older `IMAGE0_IMAGE1`; `None` if it names no two images of the
+/// features. Names may contain `_`.
+fn pair_of(
+    group: &[String],
+    images: &BTreeMap<String, String>,
+) -> Result<Option<(String, String)>, String> {
+    let name = match group {
+        [first, second] => return Ok(Some((first.clone(), second.clone()))),
+        [name] => name,
+        _ => return Ok(None),
+    };
+    let splits = name.match_indices('_').map(|(at, _)| (&name[..at], &name[at + 1..]));
+    let pairs = splits.filter(|(a, b)| images.contains_key(*a) && images.contains_key(*b));
+    match pairs.collect::<Vec<_>>().as_slice() {
+        [] => Ok(None),
+        [(first, second)] => Ok(Some(((*first).to_owned(), (*second).to_owned()))),
+        [(a, b), (c, d), ..] => Err(format!(
+            "the names of two images expected, `{name}` may be `{a}` and `{b}`, or `{c}` and `{d}`"
+        )),
+    }
 }
 
 /// Searches groups for keypoints and matches.
@@ -167,8 +217,8 @@ fn walk(group: &Group, path: &mut Vec<String>, found: &mut Found) -> Result<(), 
     if sets.iter().any(|name| name == "keypoints") {
         found.keypoints.push(path.join("/"));
     }
-    if let (true, [first, second]) = (sets.iter().any(|name| name == "matches0"), path.as_slice()) {
-        found.matches.push([first.clone(), second.clone()]);
+    if sets.iter().any(|name| name == "matches0") && (1..=2).contains(&path.len()) {
+        found.matches.push(path.clone());
     }
     if found.keypoints.len().max(found.matches.len()) > MAX_ENTRIES {
         return Err(format!("at most {MAX_ENTRIES} images or pairs expected"));

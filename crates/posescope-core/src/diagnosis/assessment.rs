@@ -1,7 +1,9 @@
 //! What a result is worth.
 
-use super::{Diagnosis, PoseConfidence, Subject, Tolerance, diagnose};
+use super::rules::GIVEN_MATCHES;
+use super::{Diagnosis, Family, PoseConfidence, Subject, Tolerance, confidence, diagnose};
 use crate::geometry::PoseError;
+use crate::method::Method;
 use crate::text::words;
 
 /// What a result is worth, by the truth where that is known; from the best.
@@ -72,9 +74,23 @@ impl Assessment {
         Self {
             grade: subject.grade(),
             confidence: subject.confidence.clone(),
-            verdicts: diagnose(subject),
+            verdicts: with_origin(diagnose(subject), subject),
         }
     }
+}
+
+/// Verdicts on features, with the origin of the matches in their evidence if another system gave them.
+fn with_origin(mut verdicts: Vec<Diagnosis>, subject: &Subject<'_>) -> Vec<Diagnosis> {
+    let is_of_features = |found: &Diagnosis| found.code.rule().applies_to == Family::MATCHING;
+    let is_fb = confidence::responsible(subject.method, subject.outcome) == Method::FB;
+    if subject.problem.matches().is_some() && is_fb {
+        for found in verdicts.iter_mut().filter(|found| is_of_features(found)) {
+            if let Some(evidence) = found.evidence.as_object_mut() {
+                evidence.insert(GIVEN_MATCHES.to_owned(), true.into());
+            }
+        }
+    }
+    verdicts
 }
 
 #[cfg(test)]

@@ -55,6 +55,15 @@ pub fn remedies(
     tried
 }
 
+/// Whether a remedy changes how features are detected or matched. It does nothing for matches of another system.
+pub fn changes_matching(remedy: &Remedy) -> bool {
+    const MATCHING: [&str; 3] = ["surf.", "fb.ratio=", "fb.unique="];
+    remedy.iter().any(|change| match change {
+        Change::Set(assignment) => MATCHING.iter().any(|key| assignment.starts_with(key)),
+        _ => false,
+    })
+}
+
 /// The parameters that a method reads and that differ from their defaults, back at them.
 fn reset(method: Method, params: &Params) -> Option<Remedy> {
     let entry = estimator::find(method)?;
@@ -71,6 +80,25 @@ fn reset(method: Method, params: &Params) -> Option<Remedy> {
 mod tests {
     use super::*;
     use crate::diagnosis::RULES;
+    use crate::diagnosis::rules::GIVEN_MATCHES;
+
+    #[test]
+    fn no_advice_against_given_matches_is_about_features_of_our_own() {
+        let params = Params::default();
+        let words = ["surf", "fb.ratio", "fb2"];
+        for rule in RULES.iter().filter(|rule| rule.applies_to == Family::MATCHING) {
+            let given = serde_json::json!({ GIVEN_MATCHES: true });
+            let advice = rule.code.advice(Some(Family::Features), &given);
+            assert!(!words.iter().any(|word| advice.contains(word)), "{}: {advice}", rule.code);
+            let tried = remedies(rule.code, Method::FB, false, &params, 10.0).into_iter();
+            let tried: Vec<Remedy> = tried.filter(|remedy| !changes_matching(remedy)).collect();
+            let named = format!("{tried:?}");
+            assert!(!named.contains("surf.") && !named.contains("fb.ratio"), "{named}");
+        }
+        // Without given matches, it is.
+        let advice = Code::R2.advice(Some(Family::Features), &serde_json::json!({}));
+        assert_eq!(advice, "lower surf.threshold");
+    }
 
     #[test]
     fn what_was_changed_by_hand_is_set_back_first() {

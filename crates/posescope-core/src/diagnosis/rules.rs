@@ -110,6 +110,9 @@ verdicts! {
     L1 in l1,
 }
 
+/// The key that the evidence has if another system gave the matches.
+pub(super) const GIVEN_MATCHES: &str = "given_matches";
+
 /// A verdict: when it is given, what proves it and what may help against it.
 #[derive(Debug)]
 pub struct Rule {
@@ -121,6 +124,8 @@ pub struct Rule {
     pub advice: &'static str,
     /// The advice for methods of a family, if it is another.
     pub advice_of: fn(Family) -> Option<&'static str>,
+    /// The advice where another system gave the matches, if it is another: that system reads no parameter of ours.
+    pub advice_of_matches: Option<&'static str>,
     /// The advice for what was found, if that says more.
     pub advice_on: fn(&serde_json::Value) -> Option<&'static str>,
     /// What it applies to.
@@ -151,6 +156,7 @@ impl Rule {
             title: "",
             advice: "",
             advice_of: |_| None,
+            advice_of_matches: None,
             advice_on: |_| None,
             applies_to: &[],
             needs_truth: true,
@@ -218,7 +224,8 @@ impl Code {
             return "compare it with --method robust, or use another reference";
         }
         let of_family = || family.and_then(rule.advice_of);
-        (rule.advice_on)(evidence).or_else(of_family).unwrap_or(rule.advice)
+        let of_matches = rule.advice_of_matches.filter(|_| evidence.get(GIVEN_MATCHES).is_some());
+        (rule.advice_on)(evidence).or(of_matches).or_else(of_family).unwrap_or(rule.advice)
     }
 
     /// Whether it says that something failed: all but [`Code::L1`], which says that the pose is uncertain.
@@ -256,6 +263,11 @@ impl Code {
 }
 
 impl Diagnosis {
+    /// Whether another system gave the matches that it is about.
+    pub(crate) fn has_given_matches(&self) -> bool {
+        self.evidence.get(GIVEN_MATCHES).is_some()
+    }
+
     /// What an estimator that has no pose reports.
     pub fn of_failure(failure: &Failure) -> Self {
         Self { code: Code::of(failure), text: failure.to_string(), evidence: serde_json::json!({}) }

@@ -14,6 +14,7 @@ pub(super) const RULE: Rule = Rule {
         Family::Features => Some("lower surf.threshold"),
         _ => Some("lower fb2.contrast"),
     },
+    advice_of_matches: Some("let the matcher keep more keypoints, or use another reference"),
     applies_to: Family::MATCHING,
     test: Test::Method(test),
     decided_at: DecidedAt::Stage(Stage::Detect),

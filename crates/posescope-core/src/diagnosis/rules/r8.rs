@@ -5,6 +5,7 @@ use super::*;
 pub(super) const RULE: Rule = Rule {
     title: "a wrong pose was accepted",
     advice: "check that camera and cloud belong to the photos; then try another fb.ratio",
+    advice_of_matches: Some("check that camera, cloud and matches belong to the photos"),
     applies_to: Family::MATCHING,
     test: Test::Method(test),
     proof: Proof::Matches,

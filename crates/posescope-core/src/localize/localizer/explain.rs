@@ -5,7 +5,7 @@ use nalgebra::Point3;
 use super::work::Answer;
 use super::{LocalizeError, Localizer, Request};
 use crate::diagnosis::Grade;
-use crate::diagnosis::remedies::{Change, Remedy, remedies};
+use crate::diagnosis::remedies::{Change, Remedy, changes_matching, remedies};
 use crate::geometry::PoseError;
 use crate::localize::observer::{LocalizeObserver, NoObserver, checkpoint};
 use crate::localize::{Explanation, Helped, QueryResult, frames_within};
@@ -49,7 +49,13 @@ impl Localizer<'_> {
     ) -> Result<(), Cancelled> {
         let Answer { result, asked, .. } = answer;
         let candidates = result.diagnosis.first().map_or(Vec::new(), |primary| {
-            remedies(primary.code, result.method, result.fell_back(), self.params(), asked.radius_m)
+            let (method, fell_back) = (result.method, result.fell_back());
+            let mut tried =
+                remedies(primary.code, method, fell_back, self.params(), asked.radius_m);
+            if primary.has_given_matches() {
+                tried.retain(|remedy| !changes_matching(remedy));
+            }
+            tried
         });
         let candidates: Vec<Changed> = candidates
             .iter()
