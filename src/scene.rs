@@ -21,6 +21,7 @@ mod lens;
 mod lines;
 mod loose;
 mod map_blocks;
+mod model_view;
 mod pair_matches;
 mod photo_file;
 mod pose_text;
@@ -29,14 +30,15 @@ mod robotcar;
 mod seven_scenes;
 mod time_unit;
 mod trajectory;
+mod transforms;
 mod tum;
 mod view_crop;
 
 use std::path::{Path, PathBuf};
 
 pub use posescope_core::scene::{
-    CachedScene, DegradedScene, FrameStore, Lengths, Scene, SceneError, SceneFormat, SceneSize,
-    degraded, frame_range,
+    CachedScene, DegradedScene, FrameStore, Lengths, PixelMap, Scene, SceneError, SceneFormat,
+    SceneSize, degraded, frame_range,
 };
 pub use posescope_street as street;
 
@@ -46,7 +48,7 @@ pub use cloud_file::is_decoding;
 pub use estimates::read_estimates;
 pub use gps::located;
 pub use loose::{CameraArgument, LoosePhotos};
-pub use pair_matches::{MatchFolder, write_matches};
+pub use pair_matches::{MatchFolder, PixelMaps, write_matches};
 pub use retriever::{IndexOptions, NoIndex, Retriever};
 
 /// Every format, in the order in which they are tried.
@@ -58,6 +60,7 @@ pub const ALL: &[SceneFormat] = &[
     tum::ENTRY,
     seven_scenes::ENTRY,
     colmap::ENTRY,
+    transforms::ENTRY,
     described::ENTRY,
 ];
 
@@ -88,6 +91,18 @@ pub fn open(argument: &str, format: Option<&str>) -> Result<Box<dyn Scene>, Scen
     Ok(scene)
 }
 
+/// Why no frame of a scene has a cloud, where its reader knows more than that.
+pub fn why_no_cloud(scene: &dyn Scene) -> Option<String> {
+    let frames = scene.frames().len();
+    if frames == 0 || (0..frames).any(|frame| scene.has_cloud(frame)) {
+        return None;
+    }
+    match scene.cloud(0).err()? {
+        SceneError::NoCloud { hint, .. } => Some(hint).filter(|hint| hint != file_scene::NO_CLOUD),
+        _ => None,
+    }
+}
+
 /// Checks what each format promises: names that can be printed, and cameras that see something.
 fn sound(argument: &str, scene: &dyn Scene) -> Result<(), SceneError> {
     /// Half of the photo's width or height in focal lengths; 60 is a view of 178°.
@@ -99,8 +114,18 @@ fn sound(argument: &str, scene: &dyn Scene) -> Result<(), SceneError> {
         let expected = format!("names without control characters expected, `{name}` found");
         return Err(SceneError::expected(argument, expected));
     }
+    let mut is_warned = false;
     for (frame, name) in frames.iter().enumerate() {
-        let Intrinsics { fx, fy, width, height, .. } = scene.intrinsics(frame);
+        let Intrinsics { fx, fy, cx, cy, width, height } = scene.intrinsics(frame);
+        let is_inside =
+            (0.0..f64::from(width)).contains(&cx) && (0.0..f64::from(height)).contains(&cy);
+        if !is_inside && !is_warned {
+            log::warn!(
+                "{argument}: the centre {cx:.1}, {cy:.1} of frame {name} is outside of its photo of {width}x{height} \
+                 pixels; is the camera that of photos of this size?"
+            );
+            is_warned = true;
+        }
         for (focal, side) in [(fx, width), (fy, height)] {
             if !HALF_VIEW.contains(&(f64::from(side) / 2.0 / focal)) {
                 let expected = format!(

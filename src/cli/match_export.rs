@@ -6,7 +6,7 @@ use std::sync::Arc;
 use posescope::event::{Event, Kind, KindSet, Side};
 use posescope::features::Features;
 use posescope::problem::Problem;
-use posescope::scene::write_matches;
+use posescope::scene::{PixelMaps, Scene, write_matches};
 use posescope::trace::Record;
 
 use super::failure::CliError;
@@ -14,6 +14,8 @@ use super::failure::CliError;
 /// Writes one file per pair, as soon as the pair is matched.
 pub struct MatchExport {
     folder: PathBuf,
+    /// Where pixels of queries and references are in their files.
+    maps: [PixelMaps; 2],
     query: Option<Arc<Features>>,
     reference: Option<Arc<Features>>,
     written: usize,
@@ -21,11 +23,16 @@ pub struct MatchExport {
 }
 
 impl MatchExport {
-    /// Writes into this folder, which is created.
-    pub fn to(folder: &Path) -> Result<Self, CliError> {
+    /// Writes the matches of frames of these scenes into this folder, which is created.
+    pub fn to(
+        folder: &Path,
+        queries: &dyn Scene,
+        references: &dyn Scene,
+    ) -> Result<Self, CliError> {
         std::fs::create_dir_all(folder).map_err(CliError::io(folder))?;
         Ok(Self {
             folder: folder.to_owned(),
+            maps: [queries, references].map(PixelMaps::of),
             query: None,
             reference: None,
             written: 0,
@@ -56,6 +63,7 @@ impl MatchExport {
                     (problem.query().name(), query),
                     (problem.reference().name(), reference),
                     &decided.decisions,
+                    [&self.maps[0], &self.maps[1]],
                 );
                 match written {
                     Ok(()) => self.written += 1,

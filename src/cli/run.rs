@@ -9,7 +9,7 @@ use posescope::localize::{
 };
 use posescope::method::Method;
 use posescope::run::{JSON_LINES, refuse_to_replace};
-use posescope::scene::{Retriever, Scene, frame_range};
+use posescope::scene::{Retriever, Scene, frame_range, why_no_cloud};
 use posescope::session::{Breakpoints, StopAtBreakpoint, Task};
 use posescope::sink::rerun::{Identity, Recorder, Targets};
 use posescope::sink::{EventExport, SceneNames};
@@ -92,7 +92,7 @@ pub fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), CliError> {
     observer.bar = terminal.bar(estimates_planned as u64);
     observer.recorder = plan.recorder(&tasks)?;
     if let Some(folder) = &args.export_matches {
-        observer.export = Some(MatchExport::to(folder)?);
+        observer.export = Some(MatchExport::to(folder, queries, references)?);
     }
     if let Some(path) = &args.events {
         let mut events = EventExport::to(path)?;
@@ -287,6 +287,10 @@ impl Plan<'_> {
     ) -> Result<References, CliError> {
         let chosen = chooser.choose(query, &|_| false, observer)?;
         if chosen.frames.is_empty() {
+            if let Some(why) = why_no_cloud(self.localizer.references()) {
+                let scene = self.localizer.references().name();
+                return Err(CliError::Unusable(format!("{scene}: no frame has a cloud: {why}")));
+            }
             let name = &self.localizer.queries().frames()[query];
             let words = format!(
                 "{}: no frame with a pose and a cloud within {} m of query {name}; \

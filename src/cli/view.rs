@@ -7,7 +7,7 @@ use posescope::app::{self, KnownResults, Results, Setup, WindowError};
 use posescope::localize::QueryResult;
 use posescope::measure::StoredSummary;
 use posescope::run::{ConfigError, ScenePair, read_run, results_of_pair};
-use posescope::scene::Scene;
+use posescope::scene::{Scene, why_no_cloud};
 use posescope::session::{IndexFile, Job, RunMode, Task, TaskScenes};
 
 use super::args::{RunArgs, ViewArgs};
@@ -121,6 +121,9 @@ fn begin_at(args: &ViewArgs, named: Option<usize>, setup: &mut Setup) -> Result<
     };
     if has_reference(setup, setup.query) {
         return Ok(());
+    }
+    if let Some(why) = why_no_cloud(setup.references.as_ref()) {
+        return Err(CliError::Unusable(format!("{}: no frame has a cloud: {why}", args.scene)));
     }
     let words = format!(
         "{}: no frame with a pose and a cloud within {} m of query {}; raise --radius or --prior, or \

@@ -1,7 +1,7 @@
 //! The contents of a scene, and whether its numbers are plausible.
 
 use crate::geometry::Pose;
-use crate::scene::Scene;
+use crate::scene::{Scene, why_no_cloud};
 
 /// How many clouds are examined.
 const CLOUDS: usize = 3;
@@ -61,8 +61,9 @@ pub(super) fn take(scene: &dyn Scene) -> (Inventory, Vec<Remark>) {
             (_, 0) => "no frame has a cloud",
             _ => "no frame has both a pose and a cloud",
         };
+        let why = why_no_cloud(scene).map(|why| format!(" ({why})")).unwrap_or_default();
         remarks.push(Remark::Broken(format!(
-            "{missing}: the scene has no references, but its photos can be queries of another scene \
+            "{missing}{why}: the scene has no references, but its photos can be queries of another scene \
              (--query-scene)"
         )));
     }

@@ -80,6 +80,8 @@ enum PoseMeaning {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields, expecting = "a table [camera] with fx, fy, cx and cy")]
 struct CameraDescription {
+    #[serde(default)]
+    model: LensModel,
     fx: f64,
     fy: f64,
     cx: f64,
@@ -92,6 +94,25 @@ struct CameraDescription {
     p1: f64,
     #[serde(default)]
     p2: f64,
+    #[serde(default)]
+    k3: f64,
+    #[serde(default)]
+    k4: f64,
+    #[serde(default)]
+    k5: f64,
+    #[serde(default)]
+    k6: f64,
+}
+
+/// What the coefficients of a lens mean.
+#[derive(Clone, Copy, Default, Deserialize, PartialEq)]
+#[serde(rename_all = "lowercase")]
+enum LensModel {
+    /// OpenCV's `k1 k2 p1 p2 k3 k4 k5 k6`.
+    #[default]
+    OpenCv,
+    /// OpenCV's equidistant model, `k1 k2 k3 k4`.
+    Fisheye,
 }
 
 #[derive(Deserialize)]
@@ -226,7 +247,16 @@ fn camera(
     let numbers = [camera.fx, camera.fy, camera.cx, camera.cy];
     let error = |why: String| source.error(described, &why);
     let taken = pinhole(numbers, photo_file::dimensions(first)?).map_err(error)?;
-    let distortion = Distortion { k1: camera.k1, k2: camera.k2, p1: camera.p1, p2: camera.p2 };
+    let CameraDescription { k1, k2, p1, p2, k3, k4, k5, k6, .. } = *camera;
+    let distortion = match camera.model {
+        LensModel::OpenCv => Distortion::brown([k1, k2, k3, k4, k5, k6], [p1, p2]),
+        LensModel::Fisheye if [p1, p2, k5, k6] == [0.0; 4] => Distortion::fisheye([k1, k2, k3, k4]),
+        LensModel::Fisheye => {
+            return Err(error(
+                "a fisheye camera with the coefficients k1 k2 k3 k4 expected".to_owned(),
+            ));
+        }
+    };
     developed_camera(taken, distortion).map_err(error)
 }
 

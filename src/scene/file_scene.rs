@@ -4,11 +4,14 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::folder::stem;
-use super::{Lengths, Scene, SceneError, photo_file};
+use super::{Lengths, PixelMap, Scene, SceneError, photo_file};
 use crate::camera::Intrinsics;
 use crate::cloud::Cloud;
 use crate::geometry::Pose;
 use crate::image::Photo;
+
+/// The hint of a scene whose format may have clouds, but here has none.
+pub(super) const NO_CLOUD: &str = "no frame of this scene has one";
 
 /// A frame of a scene.
 pub(super) struct Frame {
@@ -44,6 +47,11 @@ impl Frame {
 /// Converts images in files to photos: removes distortion, for example.
 pub(super) trait Develop: Send + Sync {
     fn developed(&self, image: Photo) -> Photo;
+
+    /// Where pixels of the photo are in the image, if the photo is undistorted.
+    fn pixel_map(&self) -> Option<Arc<dyn PixelMap>> {
+        None
+    }
 
     /// The size of the image in the file \[px\], from that of the photo.
     fn size_in_file(&self, photo: (u32, u32)) -> (u32, u32) {
@@ -100,7 +108,7 @@ impl<C: Clouds> FileScene<C> {
             .map(|(_, name)| name.as_str())
             .collect();
         match with.as_slice() {
-            [] => "no frame of this scene has one".to_owned(),
+            [] => NO_CLOUD.to_owned(),
             [only] => format!("frame {only} has one"),
             [first, .., last] => format!("{} frames have one: {first} … {last}", with.len()),
         }
@@ -114,6 +122,10 @@ impl<C: Clouds> Scene for FileScene<C> {
 
     fn frames(&self) -> &[String] {
         &self.names
+    }
+
+    fn pixel_map(&self, frame: usize) -> Option<Arc<dyn PixelMap>> {
+        self.frames[frame].develop.as_ref()?.pixel_map()
     }
 
     fn other_name(&self, frame: usize) -> Option<&str> {

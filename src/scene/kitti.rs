@@ -54,7 +54,8 @@ fn open(path: &Path) -> Result<Box<dyn Scene>, SceneError> {
         (Some(_), Some(stem)) => folder.join("velodyne").join(stem).with_extension("bin"),
         _ => folder.join(CALIBRATION),
     };
-    let none = "a line `Tr:` expected (camera 0 from Velodyne), none found";
+    let none = "a line `Tr:` (camera 0 from Velodyne) expected in calib.txt, as in KITTI's archive \
+                data_odometry_calib, none found";
     let matrix = camera_from_velodyne.unwrap_or_else(Matrix3x4::zeros);
     let paths: Vec<PathBuf> = photos.values().map(scan).collect();
     let scans = Scans {

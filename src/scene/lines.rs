@@ -152,6 +152,11 @@ pub(super) fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
     Ok(numbers)
 }
 
+/// The finite numbers of a text, and nothing else.
+pub(super) fn parsed_numbers(text: &str) -> Result<Vec<f64>, String> {
+    words(text).map(number).collect()
+}
+
 fn number(word: &str) -> Result<f64, String> {
     let number: f64 =
         word.parse().map_err(|_| format!("a number expected, `{}` found", excerpt(word)))?;

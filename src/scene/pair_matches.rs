@@ -6,7 +6,8 @@
 //! | `QUERY_REFERENCE_matches.npz` | `keypoints0`, `keypoints1`, and `matches` or `matches0`, as of SuperGlue and LightGlue |
 //! | `*.h5` | features and matches as hloc writes them |
 //!
-//! The centre of the top-left pixel is at (0, 0) in all of them. The reference may also come first.
+//! Keypoints are in the pixels of the image files, also where posescope undistorts photos. The centre of the top-left
+//! pixel is at (0, 0) in all of them. The reference may also come first.
 
 mod hloc;
 mod npz;
@@ -14,7 +15,9 @@ mod text;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
+use nalgebra::Point2;
 use posescope_core::features::{FoundMatches, PairMatches};
 use posescope_core::foreign::MatchSource;
 use posescope_core::scene::stem;
@@ -22,7 +25,7 @@ use posescope_core::scene::stem;
 use self::hloc::HlocFiles;
 use super::folder::entries;
 use super::frame_names::{ends_of, flat};
-use super::{Scene, SceneError};
+use super::{PixelMap, Scene, SceneError};
 
 pub use self::text::write_matches;
 
@@ -75,6 +78,33 @@ impl RawMatches {
         Ok(self)
     }
 
+    /// The keypoints in undistorted photos. Those that no pinhole camera sees are dropped.
+    fn undistorted(self, first: Option<&dyn PixelMap>, second: Option<&dyn PixelMap>) -> Self {
+        if first.is_none() && second.is_none() {
+            return self;
+        }
+        let moved = |at: &[f32; 2], map: Option<&dyn PixelMap>| {
+            let Some(map) = map else { return Some(*at) };
+            let pixel = map.to_photo(Point2::from(*at).cast())?.cast::<f32>();
+            (pixel.x.is_finite() && pixel.y.is_finite()).then_some([pixel.x, pixel.y])
+        };
+        let mut seconds = Vec::with_capacity(self.second.len());
+        let places: Vec<Option<usize>> = self
+            .second
+            .iter()
+            .map(|at| {
+                seconds.push(moved(at, second)?);
+                Some(seconds.len() - 1)
+            })
+            .collect();
+        let kept = self.first.iter().zip(&self.partners);
+        let kept = kept.filter_map(|(at, &partner)| {
+            Some((moved(at, first)?, partner.and_then(|partner| places[partner])))
+        });
+        let (first, partners) = kept.unzip();
+        Self { first, second: seconds, partners }
+    }
+
     /// The matches from the query to the reference.
     fn of_query(self, order: Order) -> FoundMatches {
         let Self { first, second, partners } = self;
@@ -101,6 +131,25 @@ pub struct MatchFolder {
     shared: [BTreeSet<String>; 2],
     /// What other programs call the frames of both.
     others: [BTreeMap<String, String>; 2],
+    /// Where the pixels of both are in their files.
+    maps: [PixelMaps; 2],
+}
+
+/// Where pixels of undistorted photos are in their files, by the name of the frame.
+#[derive(Default)]
+pub struct PixelMaps(BTreeMap<String, Arc<dyn PixelMap>>);
+
+impl PixelMaps {
+    /// Those of the frames of a scene whose photos are undistorted.
+    #[must_use]
+    pub fn of(scene: &dyn Scene) -> Self {
+        let named = scene.frames().iter().enumerate();
+        Self(named.filter_map(|(at, frame)| Some((frame.clone(), scene.pixel_map(at)?))).collect())
+    }
+
+    fn get(&self, frame: &str) -> Option<&dyn PixelMap> {
+        self.0.get(frame).map(|map| &**map)
+    }
 }
 
 /// What a frame may be called in the files.
@@ -110,6 +159,8 @@ struct Names<'a> {
     is_file_unique: bool,
     /// Another name of the frame.
     other: Option<&'a str>,
+    /// Where pixels of its photo are in the file.
+    map: Option<&'a dyn PixelMap>,
 }
 
 impl MatchFolder {
@@ -144,6 +195,7 @@ impl MatchFolder {
             hloc,
             shared: Default::default(),
             others: Default::default(),
+            maps: Default::default(),
         })
     }
 
@@ -162,7 +214,8 @@ impl MatchFolder {
             };
             named.filter_map(other).collect()
         });
-        Self { shared, others, ..self }
+        let maps = [queries, references].map(PixelMaps::of);
+        Self { shared, others, maps, ..self }
     }
 
     /// The names of a frame of the queries' scene (0) or of the references' (1).
@@ -171,6 +224,7 @@ impl MatchFolder {
             frame,
             is_file_unique: !self.shared[scene].contains(stem(frame)),
             other: self.others[scene].get(frame).map(String::as_str),
+            map: self.maps[scene].get(frame),
         }
     }
 }
@@ -192,6 +246,7 @@ impl MatchSource for MatchFolder {
                 }
             };
             if let Some(found) = found {
+                let found = found.undistorted(first.map, second.map);
                 return Ok(Some(PairMatches::Found(found.of_query(order))));
             }
         }

@@ -244,6 +244,117 @@ fn a_model_opens_by_its_own_folder_too() {
 }
 
 #[test]
+fn a_camera_that_cannot_be_read_costs_its_own_images_alone() {
+    for form in [Form::Text, Form::Binary] {
+        let folder = TempDir::new().expect("a folder");
+        write(folder.path(), form);
+        let model = folder.path().join("sparse/0");
+        match form {
+            Form::Text => {
+                let text = "1 PINHOLE 160 64 100 101 80.5 32.5\n7 PERSPECTIVE 96 80 90 90 48 40\n";
+                fs::write(model.join("cameras.txt"), text).expect("writable");
+            }
+            Form::Binary => {
+                // A focal length of no size.
+                let path = model.join("cameras.bin");
+                let mut bytes = fs::read(&path).expect("just written");
+                let at = bytes.len() - 64;
+                bytes[at..at + 8].copy_from_slice(&0.0_f64.to_le_bytes());
+                fs::write(&path, bytes).expect("writable");
+            }
+        }
+        assert_eq!(open(folder.path()).frames(), ["a/1"], "{form:?}");
+    }
+}
+
+/// Moves an image to a model of its own.
+fn write_two_models(folder: &Path) {
+    write(folder, Form::Text);
+    let [first, second] = ["sparse/0", "sparse/1"].map(|model| folder.join(model));
+    fs::create_dir(&second).expect("writable");
+    for file in ["cameras.txt", "images.txt", "points3D.txt"] {
+        fs::copy(first.join(file), second.join(file)).expect("readable");
+    }
+    let text = fs::read_to_string(first.join("images.txt")).expect("just written");
+    let only: Vec<&str> = text.lines().take(3).collect();
+    fs::write(first.join("images.txt"), only.join("\n") + "\n").expect("writable");
+}
+
+#[test]
+fn of_several_models_the_largest_is_read_and_the_others_by_their_names() {
+    let folder = TempDir::new().expect("a folder");
+    write_two_models(folder.path());
+    // What newer versions of COLMAP write besides.
+    for file in ["rigs.bin", "frames.bin", "rigs.txt", "frames.txt"] {
+        fs::write(folder.path().join("sparse/1").join(file), "?").expect("writable");
+    }
+    for place in ["", "sparse", "sparse/1"] {
+        assert_eq!(open(folder.path().join(place)).frames(), ["a/1", "b side/2"], "{place}");
+    }
+    assert_eq!(open(folder.path().join("sparse/0")).frames(), ["b side/2"]);
+    let said = run_in(folder.path(), "doctor .");
+    has(&said.err, "sparse/1 (2 images) is read, the largest of 2 models ~ sparse/0 (1 images)");
+}
+
+#[cfg(unix)]
+#[test]
+fn a_model_whose_photos_are_a_link_is_called_by_its_folder() {
+    let folder = TempDir::new().expect("a folder");
+    let (model, photos) = (folder.path().join("project"), folder.path().join("elsewhere"));
+    write(&model, Form::Binary);
+    fs::rename(model.join("images"), &photos).expect("just written");
+    std::os::unix::fs::symlink(&photos, model.join("images")).expect("writable");
+    assert_eq!(open(&model).name(), "colmap/project");
+}
+
+#[test]
+fn points_that_no_image_observes_are_given_to_the_frames_that_see_them() {
+    let folder = TempDir::new().expect("a folder");
+    write(folder.path(), Form::Text);
+    let path = folder.path().join("sparse/0/images.txt");
+    let text = fs::read_to_string(&path).expect("just written");
+    let bare: Vec<&str> = text.lines().filter(|line| line.ends_with(".png")).collect();
+    fs::write(&path, bare.join("\n") + "\n").expect("writable");
+    let scene = open(folder.path());
+    // The camera of `a/1` is at (−0.5, 0, −4) and sees all three points.
+    let frame = scene.find("a/1").expect("is there");
+    let mut depths: Vec<f32> =
+        scene.cloud(frame).expect("has points").points.iter().map(|point| point.z).collect();
+    depths.sort_by(f32::total_cmp);
+    assert_eq!(depths, [10.0, 11.0, 20.0]);
+    fs::write(folder.path().join("sparse/0/points3D.txt"), "# none\n").expect("writable");
+    let scene = open(folder.path());
+    assert!(!scene.has_cloud(frame));
+    has(&run_in(folder.path(), "doctor .").out, "no frame has a cloud (points3D has no points)");
+}
+
+#[test]
+fn keypoints_of_other_systems_are_in_the_pixels_of_the_file() {
+    let folder = TempDir::new().expect("a folder");
+    write(folder.path(), Form::Binary);
+    let scene = open(folder.path());
+    let frame = scene.find("b side/2").expect("is there");
+    let map = scene.pixel_map(frame).expect("its camera has a distortion");
+    let in_file = Point2::new(10.0, 70.0);
+    let in_photo = map.to_photo(in_file).expect("is in front of the camera");
+    assert!((in_photo - in_file).norm() > 0.5);
+    assert!((map.to_file(in_photo) - in_file).norm() < 1e-6);
+    assert!(scene.pixel_map(scene.find("a/1").expect("is there")).is_none());
+    let matches = folder.path().join("matches");
+    fs::create_dir(&matches).expect("writable");
+    fs::write(matches.join("b side-2_a-1_matches.txt"), "10 70 5 6\n").expect("writable");
+    let source = scene::MatchFolder::open(&matches).expect("a folder of matches");
+    let source = source.between(scene.as_ref(), scene.as_ref());
+    let found = posescope::foreign::MatchSource::matches(&source, "b side/2", "a/1");
+    let Ok(Some(posescope::features::PairMatches::Found(found))) = found else {
+        panic!("one pair");
+    };
+    let (at, other) = (found.query.keypoints[0], found.reference.keypoints[0]);
+    assert!((at.pixel() - in_photo).norm() < 1e-4, "{}", at.pixel());
+    assert_eq!((other.x, other.y), (5.0, 6.0));
+}
+
+#[test]
 fn photos_that_are_not_there_are_left_out() {
     let folder = TempDir::new().expect("a folder");
     write(folder.path(), Form::Text);
@@ -264,8 +375,8 @@ fn what_is_wrong_with_a_text_model_is_named_with_its_line() {
     damage::expect(
         write,
         r#"
-        sparse/0/cameras.txt | PINHOLE 160 -> FOV 160 | cameras.txt:2 ~ `FOV`
-        sparse/0/cameras.txt | 32.5 ->  | cameras.txt:2 ~ 4 parameters of PINHOLE
+        sparse/0/cameras.txt | text 1 LENS 160 64 9\n7 PINHOLE 96 80 9\n | cameras.txt:1 ~ `LENS`
+        sparse/0/cameras.txt | text 1 PINHOLE 160 64 9 9 9\n7 LENS 96 80 9\n | cameras.txt:1 ~ 4 parameters of PINHOLE
         sparse/0/cameras.txt | 7 OPENCV -> 8 OPENCV | images.txt ~ b side/2.png ~ 7 found
         sparse/0/images.txt | 4 0.92 -> 4 2.92 | images.txt:2 ~ length
         sparse/0/images.txt | a/1.png -> ../1.png | images.txt ~ scene's folder

@@ -1,5 +1,7 @@
 //! The reader of KITTI odometry, on a small sequence and on the real one.
 
+use std::fs;
+
 use nalgebra::Point3;
 
 use crate::binary::has;
@@ -106,4 +108,19 @@ fn an_incomplete_real_sequence_opens_and_says_what_it_lacks() {
     assert_eq!(scene.frames().len(), 11);
     let error = scene.reference(0).expect_err("no Tr, no scan").to_string();
     has(&error, "Tr");
+}
+
+#[test]
+fn a_sequence_whose_calibration_has_no_scanner_says_so_everywhere() {
+    let sequence = SmallSequence::write();
+    let path = sequence.folder().join("calib.txt");
+    let text = fs::read_to_string(&path).expect("just written");
+    let without: Vec<&str> = text.lines().filter(|line| !line.starts_with("Tr")).collect();
+    fs::write(&path, without.join("\n")).expect("writable");
+    has(
+        &sequence.run("doctor sequences/42").out,
+        "no frame has a cloud ~ a line `Tr:` (camera 0 from Velodyne)",
+    );
+    let line = "run sequences/42 --query 5 --reference nearest:1 --method fb";
+    sequence.run(line).fails(3, "no frame has a cloud: a line `Tr:`");
 }

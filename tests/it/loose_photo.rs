@@ -80,7 +80,7 @@ fn without_a_position_the_reference_that_looks_most_alike_is_taken() {
     );
     refused(sequence.path(), &table);
     let said = sequence.run(&format!("{line} --camera 100,100"));
-    said.fails_with(2, "4 numbers expected, 2 found");
+    said.fails_with(2, "2 numbers found");
 }
 
 #[test]

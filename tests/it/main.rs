@@ -58,6 +58,7 @@ mod storyboard;
 mod sweep;
 mod synth;
 mod tour;
+mod transforms;
 #[path = "../../crates/posescope-core/tests/it/two_walls.rs"]
 mod two_walls;
 mod unreadable;

@@ -9,7 +9,7 @@ use posescope::scene::{self, Scene};
 use tempfile::TempDir;
 
 use crate::small_sequence::SmallSequence;
-use crate::{colmap, kitti_raw, rgbd, robotcar, scene_toml};
+use crate::{colmap, kitti_raw, rgbd, robotcar, scene_toml, transforms};
 
 /// A small scene of a format on disk, and its argument.
 pub struct Sample {
@@ -51,6 +51,10 @@ fn sample(format: &str) -> Sample {
         }
         "colmap" => {
             colmap::write(&root, colmap::Form::Binary);
+            root
+        }
+        "transforms" => {
+            transforms::write(&root);
             root
         }
         "toml" => {

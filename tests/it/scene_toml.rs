@@ -316,6 +316,39 @@ fn distortion_is_taken_out() {
     let photo = scene.photo(0).expect("readable");
     assert_eq!(photo.dimensions(), (160, 64));
     assert_ne!(photo.gray, wall(160, 64));
+    let of = |coefficients: &str| {
+        with(folder.path(), "cy = 31.5", &format!("cy = 31.5\n{coefficients}"));
+        open(folder.path()).photo(0).expect("readable").gray.clone()
+    };
+    // Further coefficients change the photo if they are not zero, and so does the model.
+    let zeros =
+        "k1 = 0.1\nk2 = 0\np1 = 0\np2 = 0\nk3 = 0\nk4 = 0\nk5 = 0\nk6 = 0\nmodel = \"opencv\"";
+    assert_eq!(of(zeros), photo.gray);
+    assert_ne!(of("k1 = 0.1\nk3 = 0.2"), photo.gray);
+    assert_ne!(of("k1 = 0.1\nmodel = \"fisheye\""), photo.gray);
+    assert_ne!(of("model = \"fisheye\""), wall(160, 64));
+}
+
+#[test]
+fn poses_of_other_programs_are_read_and_say_their_direction() {
+    let folder = TempDir::new().expect("a folder");
+    write(folder.path());
+    let stated = open(folder.path());
+    let [x, y, z] = ORIGIN;
+    let rows: String = (0..3)
+        .map(|frame| {
+            format!("photos/img{frame}.png 1 0 0 0 {} {} {}\n", -x, -y, -z - f64::from(frame))
+        })
+        .collect();
+    fs::write(folder.path().join("poses.txt"), rows).expect("writable");
+    for line in ["pose = \"camera_from_world\"\n", ""] {
+        with(folder.path(), "[camera]", &format!("{line}[camera]"));
+        let scene = open(folder.path());
+        assert_eq!([0, 1, 2].map(|at| scene.pose(at)), [0, 1, 2].map(|at| stated.pose(at)));
+    }
+    with(folder.path(), "[camera]", "pose = \"world_from_camera\"\n[camera]");
+    let error = posescope::scene::open(arg(folder.path()), None).err().expect("a contradiction");
+    has(&error.to_string(), "scene.toml:5 ~ `camera_from_world` or no `pose`");
 }
 
 #[test]

@@ -10,7 +10,7 @@ mod measured;
 
 use std::sync::Arc;
 
-use nalgebra::Point3;
+use nalgebra::{Point2, Point3};
 use xxhash_rust::xxh3::Xxh3;
 
 pub use degraded::{DegradedScene, degraded};
@@ -42,6 +42,11 @@ pub trait Scene: Send + Sync {
 
     /// The camera of the frame, and with it the size of its photo.
     fn intrinsics(&self, frame: usize) -> Intrinsics;
+
+    /// Where pixels of the frame's photo are in the image of its file, if the photo was undistorted.
+    fn pixel_map(&self, _frame: usize) -> Option<Arc<dyn PixelMap>> {
+        None
+    }
 
     /// `world_from_camera`, where it is known.
     fn pose(&self, frame: usize) -> Option<Pose>;
@@ -107,6 +112,16 @@ pub trait Scene: Send + Sync {
     fn fingerprint(&self) -> u64 {
         fingerprint(self, &[])
     }
+}
+
+/// Moves pixels between the image in a file and the photo without distortion that is made of it. Pixel centres are at
+/// integers.
+pub trait PixelMap: Send + Sync {
+    /// The pixel of the photo for one of the file; `None` where no pinhole camera sees it.
+    fn to_photo(&self, in_file: Point2<f64>) -> Option<Point2<f64>>;
+
+    /// The pixel of the file for one of the photo.
+    fn to_file(&self, in_photo: Point2<f64>) -> Point2<f64>;
 }
 
 /// What the lengths of a scene are.

@@ -86,7 +86,8 @@ pub struct ViewArgs {
 pub struct TaskArgs {
     /// The camera of a photo [default: from EXIF]
     ///
-    /// Focal lengths and principal point [px], a camera line of COLMAP, or a cameras.txt.
+    /// Focal lengths and principal point [px], with OpenCV's k1,k2,p1,p2,k3,k4,k5,k6 if the lens distorts; a camera line
+    /// of COLMAP; its cameras.txt; or hloc's list of queries with intrinsics.
     #[arg(long, value_name = "fx,fy,cx,cy", requires = "query", conflicts_with = "query_scene")]
     #[arg(help_heading = "Queries", hide_short_help = true)]
     pub camera: Option<CameraArgument>,

@@ -23,16 +23,16 @@ pub(super) fn read(folder: &Path) -> Result<Model, SceneError> {
     Ok(Model { cameras, images, points: points.positions })
 }
 
-fn cameras(path: &Path) -> Result<BTreeMap<u32, ModelCamera>, SceneError> {
+fn cameras(path: &Path) -> Result<BTreeMap<u32, Result<ModelCamera, SceneError>>, SceneError> {
     let mut file = BinaryFile::open(path)?;
     let mut cameras = BTreeMap::new();
-    for _ in 0..file.count("cameras", 48)? {
+    for _ in 0..file.count("cameras", 40)? {
         let id = u32::from_le_bytes(file.take()?);
         let number = u32::from_le_bytes(file.take()?);
         let size = (file.u64()?, file.u64()?);
         let (model, count) = model_of_number(number).map_err(|why| file.error(why))?;
         let parameters: Vec<f64> = (0..count).map(|_| file.f64()).collect::<Result<_, _>>()?;
-        let camera = ModelCamera::new(model, size, &parameters).map_err(|why| file.error(why))?;
+        let camera = ModelCamera::new(model, size, &parameters).map_err(|why| file.error(why));
         cameras.insert(id, camera);
     }
     Ok(cameras)
@@ -83,6 +83,11 @@ fn images(path: &Path, points: &Points) -> Result<Vec<ModelImage>, SceneError> {
         return Err(file.error("images expected, none found"));
     }
     Ok(images)
+}
+
+/// How many images a file promises.
+pub(super) fn count_images(path: &Path) -> Result<u64, SceneError> {
+    BinaryFile::open(path)?.count("images", 73)
 }
 
 /// A binary file that is read from start to end, and knows how much is left.

@@ -2,11 +2,13 @@
 
 use std::collections::{BTreeMap, HashMap};
 
+use super::super::SceneError;
 use super::camera::ModelCamera;
 use crate::geometry::Pose;
 
 pub(super) struct Model {
-    pub cameras: BTreeMap<u32, ModelCamera>,
+    /// Cameras that cannot be used have an error.
+    pub cameras: BTreeMap<u32, Result<ModelCamera, SceneError>>,
     pub images: Vec<ModelImage>,
     /// The points, in the world's frame.
     pub points: Vec<[f64; 3]>,

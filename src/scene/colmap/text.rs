@@ -11,24 +11,32 @@ use super::model::{Model, ModelImage, Points};
 pub(super) fn read(folder: &Path) -> Result<Model, SceneError> {
     let cameras = TextFile::read(&folder.join("cameras.txt"))?
         .lines()
-        .map(camera)
-        .collect::<Result<BTreeMap<_, _>, _>>()?;
+        .map(|line| {
+            let (id, camera) = camera_of_line(line)?;
+            Ok((whole(&line, id)?, camera))
+        })
+        .collect::<Result<BTreeMap<_, _>, SceneError>>()?;
     let points = points(&folder.join("points3D.txt"))?;
     let images = images(&folder.join("images.txt"), &points)?;
     Ok(Model { cameras, images, points: points.positions })
 }
 
-/// `CAMERA_ID MODEL WIDTH HEIGHT PARAMS…`
-pub(in super::super) fn camera(line: Line<'_>) -> Result<(u32, ModelCamera), SceneError> {
+/// A line `KEY MODEL WIDTH HEIGHT PARAMS…`: its key, which is an id in COLMAP's files and a photo in hloc's, and the
+/// camera, or why it cannot be used.
+pub(in super::super) fn camera_of_line(
+    line: Line<'_>,
+) -> Result<(&str, Result<ModelCamera, SceneError>), SceneError> {
     let words: Vec<&str> = line.words().collect();
-    let [id, model, width, height, parameters @ ..] = words.as_slice() else {
+    let [key, model, width, height, parameters @ ..] = words.as_slice() else {
         return Err(line.error("a line `id model width height parameters` expected"));
     };
-    let size = (whole(&line, width)?, whole(&line, height)?);
-    let parameters =
-        parameters.iter().map(|word| line.number(word)).collect::<Result<Vec<_>, _>>()?;
-    let camera = ModelCamera::new(model, size, &parameters).map_err(|why| line.error(why))?;
-    Ok((whole(&line, id)?, camera))
+    let camera = || {
+        let size = (whole(&line, width)?, whole(&line, height)?);
+        let parameters =
+            parameters.iter().map(|word| line.number(word)).collect::<Result<Vec<_>, _>>()?;
+        ModelCamera::new(model, size, &parameters).map_err(|why| line.error(why))
+    };
+    Ok((*key, camera()))
 }
 
 /// `POINT3D_ID X Y Z R G B ERROR TRACK…`; a model without points has no such file.
@@ -90,6 +98,11 @@ fn is_image(text: &str) -> bool {
     words.len() >= 10
         && words[8].parse::<u32>().is_ok()
         && (has_name || !words.len().is_multiple_of(3))
+}
+
+/// How many images a file lists.
+pub(super) fn count_images(path: &Path) -> Result<u64, SceneError> {
+    Ok(pairs_of_lines(&TextFile::read(path)?).count() as u64)
 }
 
 /// The lines of the images of a text, without those of their features.

@@ -4,11 +4,11 @@ use std::fmt::Write as _;
 use std::io;
 use std::path::Path;
 
-use posescope_core::features::{Features, Match, MatchVerdict};
+use posescope_core::features::{Features, Keypoint, Match, MatchVerdict};
 
-use super::{RawMatches, pair};
-use crate::scene::SceneError;
+use super::{PixelMaps, RawMatches, pair};
 use crate::scene::lines::TextFile;
+use crate::scene::{PixelMap, SceneError};
 
 /// Reads a file of matches. Further columns, such as a score, are ignored.
 pub(super) fn read(path: &Path) -> Result<RawMatches, SceneError> {
@@ -33,7 +33,19 @@ pub(super) fn read(path: &Path) -> Result<RawMatches, SceneError> {
     Ok(found)
 }
 
-/// Writes the accepted matches (distinct and mutual) into a folder. Reading them back gives the same bits.
+/// The pixel of a keypoint in the file of its photo.
+fn in_file(keypoint: &Keypoint, map: Option<&dyn PixelMap>) -> [f32; 2] {
+    match map {
+        Some(map) => {
+            let pixel = map.to_file(keypoint.pixel()).cast::<f32>();
+            [pixel.x, pixel.y]
+        }
+        None => [keypoint.x, keypoint.y],
+    }
+}
+
+/// Writes the accepted matches (distinct and mutual) into a folder, in the pixels of the image files. Reading them back
+/// gives the same bits where photos are not undistorted.
 ///
 /// # Errors
 /// When the file cannot be written.
@@ -42,16 +54,17 @@ pub fn write_matches(
     (query, features): (&str, &Features),
     (reference, others): (&str, &Features),
     decisions: &[Option<Match>],
+    [of_queries, of_references]: [&PixelMaps; 2],
 ) -> io::Result<()> {
     let mut text = format!(
         "# matches of {query} with {reference}: x y in each [px], the centre of the top-left pixel at 0 0\n"
     );
     let is_match = |found: &&Match| found.verdict == MatchVerdict::Candidate;
     for found in decisions.iter().flatten().filter(is_match) {
-        let at = features.keypoints[found.query];
-        let other = others.keypoints[found.reference];
+        let [x, y] = in_file(&features.keypoints[found.query], of_queries.get(query));
+        let [u, v] = in_file(&others.keypoints[found.reference], of_references.get(reference));
         // Rust prints enough digits to read back the same number.
-        let _ = writeln!(text, "{} {} {} {}", at.x, at.y, other.x, other.y);
+        let _ = writeln!(text, "{x} {y} {u} {v}");
     }
     std::fs::create_dir_all(folder)?;
     let path = folder.join(format!("{}.txt", pair(query, reference)));

@@ -39,6 +39,9 @@ macro_rules! inner_scene {
     (@ $scene:tt intrinsics) => {
         $crate::inner_scene!(@ $scene intrinsics(frame: usize) -> $crate::camera::Intrinsics);
     };
+    (@ $scene:tt pixel_map) => {
+        $crate::inner_scene!(@ $scene pixel_map(frame: usize) -> Option<std::sync::Arc<dyn $crate::scene::PixelMap>>);
+    };
     (@ $scene:tt pose) => {
         $crate::inner_scene!(@ $scene pose(frame: usize) -> Option<$crate::geometry::Pose>);
     };
