@@ -1,6 +1,6 @@
 //! `posescope doctor`: whether a scene is usable, and which of the usual mistakes it contains.
 
-use posescope::doctor::{Agreement, Examination, Remark, examine};
+use posescope::doctor::{Agreement, Examination, Fit, Remark, examine};
 use posescope::measure::paper_scene;
 use posescope::run::refuse_to_replace;
 use posescope::scene::{self, Scene};
@@ -68,6 +68,9 @@ fn verdict(scene: &dyn Scene, found: &Examination) -> String {
     if let Some(finding) = &found.finding {
         return format!("{name}: {}; {}", finding.mistake.about(), finding.remedy);
     }
+    if found.fit == Some(Fit::Unexplained) {
+        return format!("{name}: {UNEXPLAINED}");
+    }
     let broken = found.remarks.iter().find_map(|remark| match remark {
         Remark::Broken(why) => Some(why.as_str()),
         Remark::Odd(_) => None,
@@ -123,26 +126,46 @@ pub fn report(scene: &dyn Scene, found: &Examination, width: Option<usize>) -> S
             Remark::Odd(why) => line("odd", why),
         }
     }
-    match &found.finding {
-        Some(finding) => {
-            line("mistake", finding.mistake.about());
-            line("remedy", &finding.remedy);
-            line("after", &numbers(&finding.otherwise));
+    let mut next = found.finding.as_ref();
+    while let Some(finding) = next {
+        line("mistake", finding.mistake.about());
+        line("remedy", &finding.remedy);
+        for (mistake, remedy) in &finding.or {
+            line("or", &format!("{}: {remedy}", mistake.about()));
         }
-        None if found.agreement.is_some() => {
-            line("mistakes", "none of the usual ones found");
-        }
-        None => line("mistakes", "not checked: no frame has a photo, a pose and a cloud"),
+        line("after", &numbers(&finding.otherwise));
+        next = finding.then.as_deref();
+    }
+    match (&found.finding, found.fit) {
+        (_, None) => line("answer", "not checked: no frame has a photo, a pose and a cloud"),
+        (_, Some(Fit::Unexplained)) => line("answer", &format!("does not fit: {UNEXPLAINED}")),
+        (Some(_), Some(_)) => line("answer", "does not fit as stated"),
+        (None, Some(Fit::Fits)) => line(
+            "answer",
+            "fits: no usual mistake explains the photos better; small errors of the calibration are not seen",
+        ),
+        (None, Some(Fit::NoSharedView)) => line(
+            "answer",
+            "cannot be judged: no two compared photos share a view, so that poses and units cannot be checked; take \
+             frames that are closer together",
+        ),
     }
     text
 }
 
+const UNEXPLAINED: &str =
+    "clouds, cameras and poses do not fit the photos, and no usual mistake explains it";
+
 fn numbers(agreement: &Agreement) -> String {
     let number = |value: Option<f64>| value.map_or("–".to_owned(), |value| format!("{value:.2}"));
-    let carried = agreement.carried.map(f64::tanh);
+    let share = |value: Option<f64>| {
+        value.map_or("–".to_owned(), |value| format!("{:.0} %", 100.0 * value))
+    };
     format!(
-        "grey values between photos correlate by {}, depth edges on image edges {} (log ratio); higher is better",
-        number(carried),
+        "the poses explain {} of the features that photos share, grey values between photos correlate by {}, depth \
+         edges on image edges {} (log ratio); higher is better",
+        share(agreement.motions),
+        number(agreement.carried.map(f64::tanh)),
         number(agreement.edges)
     )
 }

@@ -1,10 +1,11 @@
 //! Other readings of a scene: the meaning of its numbers if a usual mistake was made.
 
-use nalgebra::{Matrix3, Point3, Quaternion, Rotation3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Point3, Quaternion, Translation3, UnitQuaternion, Vector3};
 
 use serde::{Deserialize, Serialize};
 
 use crate::camera::Intrinsics;
+use crate::diagnosis::other_axes;
 use crate::geometry::Pose;
 
 /// The part of a scene that is not as stated.
@@ -28,7 +29,7 @@ pub enum Subject {
 pub enum Mistake {
     /// Poses are camera from world, but are read as world from camera.
     InversePose,
-    /// Poses use the axes of a vehicle: forward, left, up.
+    /// Poses use other axes of the camera: those of OpenGL, or of a vehicle.
     PoseAxes,
     /// Clouds use the axes of a scanner: forward, left, up.
     CloudAxes,
@@ -46,6 +47,10 @@ pub enum Mistake {
     OtherStereoCamera,
     /// Clouds are mirrored, or photos are.
     MirroredCloud,
+    /// Photos are upside down.
+    TurnedPhotos,
+    /// Each pose is that of the frame before or after.
+    PoseOfNeighbour,
     /// Clouds are turned or shifted.
     MovedCloud,
     /// Poses are in reverse order.
@@ -61,9 +66,7 @@ impl Mistake {
             Self::InversePose => {
                 "the poses are inverted: world to camera instead of camera to world"
             }
-            Self::PoseAxes => {
-                "the poses use the axes forward, left, up instead of right, down, forward"
-            }
+            Self::PoseAxes => "the poses use other axes of the camera than right, down, forward",
             Self::CloudAxes => {
                 "the clouds use the axes forward, left, up of a scanner instead of right, down, forward"
             }
@@ -76,6 +79,8 @@ impl Mistake {
                 "poses and clouds belong to the other camera of a stereo pair"
             }
             Self::MirroredCloud => "the clouds are mirrored, or the photos are",
+            Self::TurnedPhotos => "the photos are upside down",
+            Self::PoseOfNeighbour => "the poses are one line off",
             Self::MovedCloud => "the clouds are turned or shifted against the photos",
             Self::ReversedPoses => "the poses are in reverse order",
             Self::UndistortedTwice => {
@@ -93,13 +98,14 @@ impl Mistake {
             | Self::PoseAxes
             | Self::QuaternionOrder
             | Self::Degrees
+            | Self::PoseOfNeighbour
             | Self::ReversedPoses => Subject::Poses,
             Self::CloudAxes
             | Self::CloudOfNeighbour
             | Self::OtherStereoCamera
             | Self::MirroredCloud
             | Self::MovedCloud => Subject::Clouds,
-            Self::WrongCamera | Self::UndistortedTwice => Subject::Camera,
+            Self::WrongCamera | Self::UndistortedTwice | Self::TurnedPhotos => Subject::Camera,
             Self::Units => Subject::Units,
         }
     }
@@ -121,6 +127,10 @@ pub(super) enum Change {
     Pose(fn(&Pose) -> Pose),
     /// The pose of a frame, from the whole trajectory.
     Poses(fn(usize, &[Option<Pose>]) -> Option<Pose>),
+    /// The axes of each pose's camera turned.
+    Axes(UnitQuaternion<f64>),
+    /// The same, of poses that are inverted.
+    InvertedAxes(UnitQuaternion<f64>),
     /// The points of each cloud.
     Points(fn(&Point3<f64>) -> Point3<f64>),
     /// The cloud of the frame at this offset.
@@ -131,6 +141,8 @@ pub(super) enum Change {
     Camera { times: f64, right: f64, down: f64 },
     /// Photos so many times as large, and their cameras with them.
     Resized(f64),
+    /// Photos upside down.
+    UpsideDown,
     /// An additional radial distortion k1.
     Lens(f64),
     /// Clouds so many times as large.
@@ -140,11 +152,28 @@ pub(super) enum Change {
 }
 
 impl Change {
+    /// Whether it changes where clouds are in their photos, grossly and without a free number.
+    pub(super) fn is_of_views(&self) -> bool {
+        matches!(self, Self::Points(_) | Self::Resized(_) | Self::UpsideDown)
+    }
+
+    /// Whether it has numbers that are chosen such that they fit.
+    pub(super) fn has_numbers(&self) -> bool {
+        matches!(self, Self::Aside(_) | Self::Camera { .. } | Self::Lens(_) | Self::Move(_))
+    }
+
+    /// Whether it changes nothing but poses.
+    pub(super) fn is_of_poses(&self) -> bool {
+        matches!(self, Self::Pose(_) | Self::Poses(_) | Self::Axes(_) | Self::InvertedAxes(_))
+    }
+
     pub(super) fn pose(&self, frame: usize, poses: &[Option<Pose>]) -> Option<Pose> {
         let stated = || poses.get(frame).copied().flatten();
         match *self {
             Self::Pose(read) => Some(read(&stated()?)),
             Self::Poses(read) => read(frame, poses),
+            Self::Axes(turn) => Some(stated()? * turn),
+            Self::InvertedAxes(turn) => Some(stated()?.inverse() * turn),
             Self::Aside(right_m) => Some(stated()? * Pose::translation(right_m, 0.0, 0.0)),
             _ => stated(),
         }
@@ -196,6 +225,17 @@ impl Change {
                 };
                 (camera, 0.0)
             }
+            Self::UpsideDown => {
+                let (width, height) = (f64::from(stated.width), f64::from(stated.height));
+                let camera = Intrinsics {
+                    fx: -stated.fx,
+                    fy: -stated.fy,
+                    cx: width - 1.0 - stated.cx,
+                    cy: height - 1.0 - stated.cy,
+                    ..*stated
+                };
+                (camera, 0.0)
+            }
             Self::Lens(k1) => (*stated, k1),
             _ => (*stated, 0.0),
         }
@@ -203,29 +243,19 @@ impl Change {
 }
 
 /// A foot \[m\].
-const FOOT_M: f64 = 0.3048;
+pub(super) const FOOT_M: f64 = 0.3048;
 
 /// The readings that need no search.
 pub(super) fn readings() -> Vec<Reading> {
     let reading =
         |mistake, remedy: &str, change| Reading { mistake, remedy: remedy.to_owned(), change };
     use Mistake as M;
-    vec![
+    let mut all = vec![
         reading(M::InversePose, "invert each pose", Change::Pose(|pose| pose.inverse())),
         reading(
             M::InversePose,
             "invert the rotation of each pose, and leave its position",
             Change::Pose(|pose| Pose::from_parts(pose.translation, pose.rotation.inverse())),
-        ),
-        reading(
-            M::PoseAxes,
-            "rotate the axes of each pose to right, down, forward",
-            Change::Pose(|pose| pose * flu_from_rdf()),
-        ),
-        reading(
-            M::PoseAxes,
-            "rotate the axes of world and poses to right, down, forward",
-            Change::Pose(|pose| flu_from_rdf().inverse() * pose * flu_from_rdf()),
         ),
         reading(
             M::CloudAxes,
@@ -273,6 +303,17 @@ pub(super) fn readings() -> Vec<Reading> {
         ),
         reading(M::CloudOfNeighbour, "use the cloud of the previous frame", Change::Neighbour(-1)),
         reading(M::CloudOfNeighbour, "use the cloud of the next frame", Change::Neighbour(1)),
+        reading(
+            M::PoseOfNeighbour,
+            "give each frame the pose of the next line",
+            Change::Poses(|frame, poses| poses.get(frame + 1).copied().flatten()),
+        ),
+        reading(
+            M::PoseOfNeighbour,
+            "give each frame the pose of the line before",
+            Change::Poses(|frame, poses| poses.get(frame.checked_sub(1)?).copied().flatten()),
+        ),
+        reading(M::TurnedPhotos, "turn the photos by 180°", Change::UpsideDown),
         reading(M::Degrees, "read the angles as degrees", Change::Poses(angles_in_degrees)),
         reading(M::Degrees, "read the angles as radians", Change::Pose(angles_in_radians)),
         reading(
@@ -292,15 +333,24 @@ pub(super) fn readings() -> Vec<Reading> {
                 poses.get(poses.len().checked_sub(frame + 1)?).copied().flatten()
             }),
         ),
-    ]
+    ];
+    for (axes, turn) in other_axes() {
+        let of = match axes.as_str() {
+            OPENGL => ", those of OpenGL",
+            VEHICLE => ", those of a vehicle (forward, left, up)",
+            _ => "",
+        };
+        let remedy = format!("read the poses with camera axes {axes}{of}");
+        all.push(reading(M::PoseAxes, &remedy, Change::Axes(turn)));
+        let remedy = format!("invert each pose, then read it with camera axes {axes}{of}");
+        all.push(reading(M::PoseAxes, &remedy, Change::InvertedAxes(turn)));
+    }
+    all
 }
 
-/// From x right, y down, z forward to x forward, y left, z up.
-fn flu_from_rdf() -> Pose {
-    let turn = Matrix3::new(0.0, 0.0, 1.0, -1.0, 0.0, 0.0, 0.0, -1.0, 0.0);
-    let turn = Rotation3::from_matrix_unchecked(turn);
-    Pose::from_parts(Translation3::identity(), UnitQuaternion::from_rotation_matrix(&turn))
-}
+/// The camera axes of OpenGL, and those of a vehicle, in the axes of a camera here.
+const OPENGL: &str = "(x, -y, -z)";
+const VEHICLE: &str = "(z, -x, -y)";
 
 /// The same position, with the quaternion's components reordered.
 fn with_rotation(pose: &Pose, order: fn([f64; 4]) -> [f64; 4]) -> Pose {

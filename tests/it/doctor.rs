@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use posescope::doctor::{Mistake, examine};
+use posescope::doctor::{Fit, Mistake, examine};
 use posescope::scene::street::{Size, Street};
 use posescope::scene::{self, Scene};
 use tempfile::TempDir;
@@ -15,12 +15,16 @@ use crate::planted::{Fault, Planted};
 use crate::small_sequence::SmallSequence;
 
 /// What each fault is to be called; half a pixel is less than clouds and photos agree by.
-const EXPECTED: [(Fault, Option<Mistake>); 22] = [
+const EXPECTED: [(Fault, Option<Mistake>); 26] = [
     (Fault::Nothing, None),
     (Fault::InversePose, Some(Mistake::InversePose)),
     (Fault::InverseRotation, Some(Mistake::InversePose)),
     (Fault::PoseAxes, Some(Mistake::PoseAxes)),
+    (Fault::OpenGlAxes, Some(Mistake::PoseAxes)),
+    (Fault::PoseOneLineOff, Some(Mistake::PoseOfNeighbour)),
     (Fault::CloudAxes, Some(Mistake::CloudAxes)),
+    (Fault::FiveTimesTheDepth, Some(Mistake::Units)),
+    (Fault::UpsideDown, Some(Mistake::TurnedPhotos)),
     (Fault::WrongCamera, Some(Mistake::WrongCamera)),
     (Fault::ResizedPhotos, Some(Mistake::WrongCamera)),
     (Fault::FootPoses, Some(Mistake::Units)),
@@ -41,12 +45,18 @@ const EXPECTED: [(Fault, Option<Mistake>); 22] = [
 ];
 
 /// What mends those that one word names as others are named.
-const REMEDIES: [(Fault, &str); 7] = [
+const REMEDIES: [(Fault, &str); 9] = [
     (Fault::InversePose, "invert each pose"),
     (Fault::InverseRotation, "invert the rotation of each pose, and leave its position"),
     (
         Fault::ResizedPhotos,
         "halve the camera parameters, which are those of photos of twice the size",
+    ),
+    (Fault::OpenGlAxes, "read the poses with camera axes (x, -y, -z), those of OpenGL"),
+    (
+        Fault::FiveTimesTheDepth,
+        "divide the coordinates of clouds by 5; if these are depth images that are read with 1000 for one metre, 5000 \
+         is one metre",
     ),
     (Fault::FootPoses, "multiply the positions of poses by 0.3048"),
     (Fault::MillimetrePoses, "divide the positions of poses by 1000"),
@@ -55,9 +65,10 @@ const REMEDIES: [(Fault, &str); 7] = [
 ];
 
 /// The faults that every change is held to: of a pose, a cloud and a camera, of nothing, and of too little.
-const FEW: [Fault; 6] = [
+const FEW: [Fault; 7] = [
     Fault::Nothing,
     Fault::InversePose,
+    Fault::OpenGlAxes,
     Fault::MirroredCloud,
     Fault::TurnedCloud,
     Fault::WrongCamera,
@@ -90,12 +101,50 @@ fn are_named(is_planted: impl Fn(Fault) -> bool) {
     }
 }
 
+#[test]
+fn two_mistakes_are_found_one_after_the_other() {
+    let street = Street::new("overcast", Size::Half).expect("is built in");
+    let cloud = Planted::new(&street, Fault::CloudAxes, 0, 40);
+    let both = Planted::new(&cloud, Fault::OpenGlAxes, 0, 40);
+    let found = examine(&both).expect("readable");
+    let first = found.finding.expect("a mistake");
+    let second = first.then.as_ref().expect("another");
+    assert_eq!([first.mistake, second.mistake], [Mistake::CloudAxes, Mistake::PoseAxes]);
+}
+
+/// Where no two photos share a view, numbers that are chosen fit by chance.
+#[test]
+fn frames_far_apart_are_not_accused() {
+    for condition in ["overcast", "snow"] {
+        let street = Street::new(condition, Size::Half).expect("is built in");
+        for step in [20, 40] {
+            let thinned = Planted::every(&street, Fault::Nothing, 0..16 * step, step);
+            let found = examine(&thinned).expect("readable");
+            let named = found.finding.map(|one| (one.mistake, one.remedy));
+            assert_eq!(named, None, "{condition}, every {step}th frame");
+            assert_eq!(found.fit, Some(Fit::NoSharedView), "{condition}, every {step}th frame");
+        }
+    }
+}
+
+/// Clouds of another place fit no photo, and no reading makes them fit.
+#[test]
+fn clouds_of_another_place_are_a_misfit_that_nothing_explains() {
+    let street = Street::new("overcast", Size::Half).expect("is built in");
+    let elsewhere = Planted::new(&street, Fault::CloudOfAnotherPlace, 0, 24);
+    let found = examine(&elsewhere).expect("readable");
+    assert_eq!(found.finding.as_ref().map(|one| one.mistake), None);
+    assert_eq!(found.fit, Some(Fit::Unexplained));
+    assert!(found.is_broken());
+}
+
 /// Nothing is wrong with it.
 fn healthy(scene: &dyn Scene) {
     let found = examine(scene).unwrap_or_else(|error| panic!("{error}"));
     let finding = found.finding.as_ref().map(|finding| (finding.mistake, &finding.remedy));
     println!("{}: {:?} {:?}", scene.name(), found.agreement, found.remarks);
     assert_eq!(finding, None, "{}", scene.name());
+    assert_eq!(found.fit, Some(Fit::Fits), "{}", scene.name());
     assert!(!found.is_broken(), "{}: {:?}", scene.name(), found.remarks);
 }
 

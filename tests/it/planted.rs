@@ -1,6 +1,7 @@
 //! A scene with one of the usual mistakes in it.
 
 use std::fs;
+use std::ops::Range;
 use std::path::Path;
 
 use nalgebra::{Matrix3, Point3, Quaternion, Rotation3, Translation3, UnitQuaternion, Vector3};
@@ -19,7 +20,11 @@ pub enum Fault {
     InversePose,
     InverseRotation,
     PoseAxes,
+    OpenGlAxes,
+    PoseOneLineOff,
     CloudAxes,
+    FiveTimesTheDepth,
+    UpsideDown,
     WrongCamera,
     ResizedPhotos,
     FootPoses,
@@ -29,6 +34,7 @@ pub enum Fault {
     QuaternionOrder,
     HalfPixel,
     CloudOneFrameOff,
+    CloudOfAnotherPlace,
     DegreesForRadians,
     RadiansForDegrees,
     LeftForRight,
@@ -43,13 +49,21 @@ pub enum Fault {
 pub struct Planted<'a> {
     scene: &'a dyn Scene,
     fault: Fault,
-    first: usize,
+    /// The frames of the scene.
+    at: Vec<usize>,
     names: Vec<String>,
 }
 
 impl<'a> Planted<'a> {
     pub fn new(scene: &'a dyn Scene, fault: Fault, first: usize, count: usize) -> Self {
-        Self { scene, fault, first, names: scene.frames()[first..first + count].to_vec() }
+        Self::every(scene, fault, first..first + count, 1)
+    }
+
+    /// Every `step`th frame alone.
+    pub fn every(scene: &'a dyn Scene, fault: Fault, frames: Range<usize>, step: usize) -> Self {
+        let at: Vec<usize> = frames.step_by(step).collect();
+        let names = at.iter().map(|&frame| scene.frames()[frame].clone()).collect();
+        Self { scene, fault, at, names }
     }
 
     /// Writes it as a `scene.toml` with a text of points for each frame.
@@ -78,7 +92,7 @@ impl<'a> Planted<'a> {
     }
 
     fn true_pose(&self, frame: usize) -> Option<Pose> {
-        self.scene.pose(self.first + frame)
+        self.scene.pose(self.at[frame])
     }
 }
 
@@ -135,7 +149,7 @@ impl Scene for Planted<'_> {
     }
 
     fn intrinsics(&self, frame: usize) -> Intrinsics {
-        let camera = self.scene.intrinsics(self.first + frame);
+        let camera = self.scene.intrinsics(self.at[frame]);
         match self.fault {
             Fault::WrongCamera => Intrinsics {
                 fx: camera.fx * 1.17,
@@ -160,6 +174,10 @@ impl Scene for Planted<'_> {
         Some(match self.fault {
             Fault::InversePose => pose.inverse(),
             Fault::PoseAxes => pose * flu_from_rdf().inverse(),
+            Fault::OpenGlAxes => {
+                pose * UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI)
+            }
+            Fault::PoseOneLineOff => self.true_pose(frame.saturating_sub(1))?,
             Fault::InverseRotation => Pose::from_parts(pose.translation, pose.rotation.inverse()),
             Fault::FootPoses => larger(&pose, 1.0 / 0.3048),
             Fault::MillimetrePoses => larger(&pose, 1000.0),
@@ -177,18 +195,19 @@ impl Scene for Planted<'_> {
     }
 
     fn time_s(&self, frame: usize) -> Option<f64> {
-        self.scene.time_s(self.first + frame)
+        self.scene.time_s(self.at[frame])
     }
 
     fn has_cloud(&self, frame: usize) -> bool {
-        self.scene.has_cloud(self.first + frame)
+        self.scene.has_cloud(self.at[frame])
     }
 
     fn photo(&self, frame: usize) -> Result<Photo, SceneError> {
-        let photo = self.scene.photo(self.first + frame)?;
+        let photo = self.scene.photo(self.at[frame])?;
         Ok(match self.fault {
+            Fault::UpsideDown => Photo::from_gray(image::imageops::rotate180(&photo.gray)),
             Fault::UndistortedTwice => {
-                let camera = self.scene.intrinsics(self.first + frame);
+                let camera = self.scene.intrinsics(self.at[frame]);
                 Photo::from_gray(bent(&photo.gray, &camera, -0.25))
             }
             _ => photo,
@@ -197,16 +216,19 @@ impl Scene for Planted<'_> {
 
     fn cloud(&self, frame: usize) -> Result<Cloud, SceneError> {
         let of = match self.fault {
-            Fault::CloudOneFrameOff => frame + 1,
-            _ => frame,
+            Fault::CloudOneFrameOff => self.at[frame] + 1,
+            // Each of another one, so that no motion fits.
+            Fault::CloudOfAnotherPlace => (7 * self.at[frame] + 150) % self.scene.frames().len(),
+            _ => self.at[frame],
         };
-        let cloud = self.scene.cloud(self.first + of)?;
+        let cloud = self.scene.cloud(of)?;
         let moved = |change: &dyn Fn(&Point3<f32>) -> Point3<f32>| Cloud {
             points: cloud.points.iter().map(change).collect(),
         };
         Ok(match self.fault {
             Fault::CloudAxes => moved(&|p| Point3::new(p.z, -p.x, -p.y)),
             Fault::MillimetreClouds => moved(&|p| p * 1000.0),
+            Fault::FiveTimesTheDepth => moved(&|p| p * 5.0),
             Fault::CentimetreClouds => moved(&|p| p * 100.0),
             Fault::LeftForRight => moved(&|p| Point3::new(p.x + BASELINE_M as f32, p.y, p.z)),
             Fault::MirroredCloud => moved(&|p| Point3::new(-p.x, p.y, p.z)),

@@ -19,6 +19,7 @@
 
 mod ask;
 mod assessment;
+mod axes;
 mod case;
 pub mod confidence;
 mod evidence;
@@ -36,6 +37,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 pub use assessment::{Assessment, Grade};
+pub use axes::other_axes;
 pub use case::{Case, FusionCase, Member, RankingCase};
 pub use confidence::{Confidence, PoseConfidence};
 pub use evidence::Evidence;

@@ -2,11 +2,12 @@
 
 mod camera;
 
-use nalgebra::{Matrix3, Quaternion, Rotation3, Translation3, UnitQuaternion};
+use nalgebra::{Quaternion, Translation3, UnitQuaternion};
 
 use self::camera::{camera_by_fb, camera_by_matches, camera_of_both};
 use super::*;
 use crate::camera::Intrinsics;
+use crate::diagnosis::axes::other_axes;
 use crate::diagnosis::matches::TrueMatches;
 use crate::stats::median;
 
@@ -194,41 +195,13 @@ fn readings(pose: &Pose) -> Vec<(String, Pose)> {
         ("quaternions with w first".to_owned(), reordered([x, y, z, w])),
         ("quaternions with w last".to_owned(), reordered([z, w, x, y])),
     ];
-    for (axes, rotation) in axes() {
+    for (axes, rotation) in other_axes() {
         readings.push((format!("camera axes {axes}"), pose * rotation));
     }
-    for (axes, rotation) in axes() {
+    for (axes, rotation) in other_axes() {
         readings.push((format!("world axes {axes}"), rotation * pose));
     }
     readings
-}
-
-/// All other right-handed orders and signs of three axes. A name says what the axes of the other system are in those
-/// of a camera here, or those of the world here in its own: the camera axes of OpenGL are `(x, -y, -z)`.
-fn axes() -> Vec<(String, UnitQuaternion<f64>)> {
-    const ORDERS: [[usize; 3]; 6] =
-        [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]];
-    let mut all = Vec::new();
-    for order in ORDERS {
-        for signs in 0..8 {
-            let sign = |row: usize| if (signs >> row) & 1 == 0 { 1.0 } else { -1.0 };
-            let mut matrix = Matrix3::zeros();
-            for (row, &column) in order.iter().enumerate() {
-                matrix[(row, column)] = sign(row);
-            }
-            if matrix.determinant() < 0.0 || matrix == Matrix3::identity() {
-                continue;
-            }
-            let name = |row: usize| {
-                let minus = if sign(row) < 0.0 { "-" } else { "" };
-                format!("{minus}{}", ["x", "y", "z"][order[row]])
-            };
-            let rotation = Rotation3::from_matrix_unchecked(matrix);
-            let axes = format!("({}, {}, {})", name(0), name(1), name(2));
-            all.push((axes, UnitQuaternion::from_rotation_matrix(&rotation)));
-        }
-    }
-    all
 }
 
 evidence!(GivenPose { reading: String, error: PoseError, error_as_stated: PoseError } =>
@@ -315,6 +288,8 @@ evidence!(TruthByCost { probability: f64, error: PoseError } =>
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::{Matrix3, Rotation3};
+
     use super::*;
 
     /// Poses that were written in another convention are right when they are read so.
@@ -346,6 +321,6 @@ mod tests {
             });
             assert_eq!(right.map(|(reading, _)| reading).as_deref(), Some(wanted));
         }
-        assert_eq!(axes().len(), 23);
+        assert_eq!(other_axes().len(), 23);
     }
 }

@@ -1,0 +1,324 @@
+//! The frames of a scene that are compared, and how well a reading fits them.
+
+use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
+
+use image::GrayImage;
+use nalgebra::Point3;
+use rayon::prelude::*;
+
+use super::agreement::{EdgeMap, Seen, carried_agreement, edge_agreement, edge_map, project};
+use super::matches::{
+    DepthCells, Motion, SharedFeature, features, is_view_shared, motion, share_explained, shared,
+};
+use super::reading::Change;
+use crate::camera::Intrinsics;
+use crate::features::Features;
+use crate::geometry::Pose;
+use crate::scene::{Scene, SceneError};
+use crate::solver::Correspondence;
+
+/// How many frames are compared, each with its partners.
+const ANCHORS: usize = 8;
+/// The offsets of an anchor's partners; the first two that exist are used.
+const PARTNERS: [isize; 4] = [1, 3, -1, -3];
+const PARTNERS_OF_EACH: usize = 2;
+/// The most points of a cloud; edges need a dense one.
+const MAX_POINTS: usize = 40_000;
+/// Every how many points one is carried to other frames.
+const CARRIED: usize = 4;
+
+/// A photo with its edges, its features and its camera.
+pub(super) struct Sight {
+    gray: GrayImage,
+    edges: EdgeMap,
+    features: Features,
+    pub(super) camera: Intrinsics,
+}
+
+/// A frame beside an anchor, and the features that both photos share.
+struct Partner {
+    frame: usize,
+    shared: Vec<SharedFeature>,
+}
+
+/// A cloud in the photo of its frame, in some reading.
+struct Seeing {
+    edges: Option<f64>,
+    /// Points that are carried to other frames, and where the photo shows them.
+    carried: Vec<(Point3<f64>, Option<Seen>)>,
+    /// The fewest points that are evidence; with few points in view, agreement is chance.
+    least: usize,
+    /// For each partner the shared features with a depth.
+    lifted: Vec<Vec<Correspondence>>,
+}
+
+/// The compared frames, with all poses.
+pub(super) struct Sample {
+    pub(super) poses: Vec<Option<Pose>>,
+    pub(super) sights: BTreeMap<usize, Sight>,
+    pub(super) clouds: BTreeMap<usize, Vec<Point3<f64>>>,
+    pub(super) anchors: Vec<usize>,
+    partners: BTreeMap<usize, Vec<Partner>>,
+    /// The clouds as stated.
+    stated: BTreeMap<usize, Seeing>,
+    /// The motions between an anchor and its partners by the features and the clouds as stated.
+    motions: BTreeMap<usize, Vec<Option<Motion>>>,
+}
+
+/// How well a reading fits the photos on average; higher is better.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Agreement {
+    /// Logarithm of the ratio of image-edge strength at depth edges to that at all points.
+    pub edges: Option<f64>,
+    /// Correlation of the points' grey values between photos, as Fisher's z.
+    pub carried: Option<f64>,
+    /// The share that the poses explain of the features that two photos share and that agree on a motion.
+    pub motions: Option<f64>,
+}
+
+impl Agreement {
+    /// The mean over frames.
+    pub(super) fn mean(scores: &[Self]) -> Self {
+        let of = |pick: fn(&Self) -> Option<f64>| mean(scores.iter().filter_map(pick));
+        Self {
+            edges: of(|score| score.edges),
+            carried: of(|score| score.carried),
+            motions: of(|score| score.motions),
+        }
+    }
+
+    /// One number for all measures; missing edges count slightly against a reading.
+    pub(super) fn worth(&self) -> f64 {
+        self.carried.unwrap_or(0.0) + self.motions.unwrap_or(0.0) + self.edges.unwrap_or(-0.2)
+    }
+}
+
+pub(super) fn mean(numbers: impl Iterator<Item = f64>) -> Option<f64> {
+    let numbers: Vec<f64> = numbers.collect();
+    (!numbers.is_empty()).then(|| numbers.iter().sum::<f64>() / numbers.len() as f64)
+}
+
+pub(super) fn partners(anchor: usize, count: usize) -> impl Iterator<Item = usize> {
+    let frames = PARTNERS.iter().filter_map(move |&step| anchor.checked_add_signed(step));
+    frames.filter(move |&frame| frame < count).take(PARTNERS_OF_EACH)
+}
+
+impl Sample {
+    /// Reads frames with pose and cloud, spread over the scene.
+    pub(super) fn read(scene: &dyn Scene) -> Result<Self, SceneError> {
+        let count = scene.frames().len();
+        let poses: Vec<Option<Pose>> = (0..count).map(|frame| scene.pose(frame)).collect();
+        let references: Vec<usize> =
+            (0..count).filter(|&frame| poses[frame].is_some() && scene.has_cloud(frame)).collect();
+        let many = ANCHORS.min(references.len());
+        let anchors: Vec<usize> =
+            (0..many).map(|at| references[at * references.len() / many]).collect();
+        let mut seen: Vec<usize> = anchors
+            .iter()
+            .flat_map(|&anchor| std::iter::once(anchor).chain(partners(anchor, count)))
+            .collect();
+        seen.sort_unstable();
+        seen.dedup();
+        let sight = |&frame: &usize| {
+            let photo = scene.photo(frame)?;
+            let sight = Sight {
+                edges: edge_map(&photo.gray),
+                features: features(&photo.gray),
+                gray: photo.gray,
+                camera: scene.intrinsics(frame),
+            };
+            Ok((frame, sight))
+        };
+        let sights = seen.par_iter().map(sight).collect::<Result<_, SceneError>>()?;
+        let mut clouds = BTreeMap::new();
+        for &anchor in &anchors {
+            for frame in anchor.saturating_sub(1)..(anchor + 2).min(count) {
+                if let Entry::Vacant(place) = clouds.entry(frame)
+                    && scene.has_cloud(frame)
+                {
+                    let cloud = scene.cloud(frame)?;
+                    let step = cloud.points.len().div_ceil(MAX_POINTS).max(1);
+                    let points = cloud.points.iter().step_by(step);
+                    place.insert(points.map(|point| point.cast()).collect());
+                }
+            }
+        }
+        let mut sample = Self {
+            poses,
+            sights,
+            clouds,
+            anchors,
+            partners: BTreeMap::new(),
+            stated: BTreeMap::new(),
+            motions: BTreeMap::new(),
+        };
+        let found = sample.anchors.par_iter().map(|&anchor| (anchor, sample.partners_of(anchor)));
+        sample.partners = found.collect();
+        Ok(sample.measured())
+    }
+
+    fn partners_of(&self, anchor: usize) -> Vec<Partner> {
+        let there = partners(anchor, self.poses.len());
+        there
+            .filter_map(|frame| {
+                let (here, there) = (self.sights.get(&anchor)?, self.sights.get(&frame)?);
+                Some(Partner { frame, shared: shared(&here.features, &there.features) })
+            })
+            .collect()
+    }
+
+    /// With what does not depend on other readings.
+    fn measured(mut self) -> Self {
+        let anchors = self.anchors.par_iter();
+        let stated = anchors.filter_map(|&anchor| Some((anchor, self.seeing(anchor, &AS_STATED)?)));
+        self.stated = stated.collect();
+        self.motions = self.motions_in(&AS_STATED);
+        self
+    }
+
+    /// The motions that the features and the clouds of a reading agree on.
+    pub(super) fn motions_in(&self, change: &Change) -> BTreeMap<usize, Vec<Option<Motion>>> {
+        let motions = |&anchor: &usize| {
+            let seeing = self.seeing(anchor, change);
+            let partners = self.partners.get(&anchor).into_iter().flatten();
+            let lifted = seeing.iter().flat_map(|seeing| &seeing.lifted);
+            let of = |(partner, lifted): (&Partner, &Vec<Correspondence>)| {
+                motion(lifted, &change.camera(&self.sights.get(&partner.frame)?.camera).0)
+            };
+            (anchor, partners.zip(lifted).map(of).collect())
+        };
+        self.anchors.par_iter().map(motions).collect()
+    }
+
+    /// The scene as it is if a reading is right.
+    pub(super) fn read_as(mut self, change: &Change) -> Self {
+        let frames = 0..self.poses.len();
+        let poses = frames.map(|frame| change.pose(frame, &self.poses)).collect();
+        let clouds = self.anchors.iter().filter_map(|&anchor| {
+            let cloud = self.clouds.get(&change.cloud_of(anchor)?)?;
+            Some((anchor, change.points(cloud)))
+        });
+        self.clouds = clouds.collect();
+        self.poses = poses;
+        for sight in self.sights.values_mut() {
+            sight.camera = change.camera(&sight.camera).0;
+        }
+        self.measured()
+    }
+
+    /// A frame's photo, and the points of its cloud in front of its camera.
+    pub(super) fn seen(&self, anchor: usize) -> Option<(&GrayImage, Vec<Seen>)> {
+        let sight = self.sights.get(&anchor)?;
+        let points = self.clouds.get(&anchor)?;
+        let seen = points.iter().filter_map(|point| project(&sight.camera, 0.0, point));
+        Some((&sight.gray, seen.collect()))
+    }
+
+    fn seeing(&self, anchor: usize, change: &Change) -> Option<Seeing> {
+        let sight = self.sights.get(&anchor)?;
+        let points = change.points(self.clouds.get(&change.cloud_of(anchor)?)?);
+        let (camera, k1) = change.camera(&sight.camera);
+        let seen: Vec<Option<Seen>> =
+            points.iter().map(|point| project(&camera, k1, point)).collect();
+        let in_front: Vec<Seen> = seen.iter().flatten().copied().collect();
+        let in_view = in_front.iter().filter(|seen| camera.contains(&seen.pixel)).count();
+        let cells = DepthCells::new(&camera, &in_front);
+        let partners = self.partners.get(&anchor).into_iter().flatten();
+        Some(Seeing {
+            edges: edge_agreement(&sight.edges, &in_front),
+            carried: points.into_iter().zip(seen).step_by(CARRIED).collect(),
+            least: in_view / CARRIED / 20,
+            lifted: partners.map(|one| cells.lifted(&camera, &one.shared)).collect(),
+        })
+    }
+
+    /// The scores of a reading, frame by frame.
+    pub(super) fn scores(&self, anchors: &[usize], change: &Change) -> Vec<Agreement> {
+        anchors.par_iter().map(|&anchor| self.score(anchor, change)).collect()
+    }
+
+    fn score(&self, anchor: usize, change: &Change) -> Agreement {
+        // Poses alone leave the cloud where it is in its photo.
+        let anew = if change.is_of_poses() { None } else { self.seeing(anchor, change) };
+        let as_stated = || self.stated.get(&anchor).filter(|_| change.is_of_poses());
+        match anew.as_ref().or_else(as_stated) {
+            Some(seeing) => self.score_of(anchor, seeing, change),
+            None => Agreement::default(),
+        }
+    }
+
+    fn score_of(&self, anchor: usize, seeing: &Seeing, change: &Change) -> Agreement {
+        let (mut carried, mut motions) = (Vec::new(), Vec::new());
+        let partners = self.partners.get(&anchor).into_iter().flatten();
+        let by_features = self.motions.get(&anchor).into_iter().flatten();
+        for ((partner, lifted), by_features) in partners.zip(&seeing.lifted).zip(by_features) {
+            let (Some(sight), Some(other), Some(here), Some(there)) = (
+                self.sights.get(&anchor),
+                self.sights.get(&partner.frame),
+                change.pose(anchor, &self.poses),
+                change.pose(partner.frame, &self.poses),
+            ) else {
+                continue;
+            };
+            let there_from_here = there.inverse() * here;
+            let (camera, k1) = change.camera(&other.camera);
+            let (seen, carried_to): (Vec<_>, Vec<_>) = seeing
+                .carried
+                .iter()
+                .map(|(point, seen)| (*seen, project(&camera, k1, &(there_from_here * point))))
+                .unzip();
+            let agreement =
+                carried_agreement((&sight.gray, &seen), (&other.gray, &carried_to), seeing.least);
+            // Points that are out of view of the partner do not agree.
+            carried.push(agreement.unwrap_or(0.0));
+            motions.extend(share_explained(
+                lifted,
+                &camera,
+                &there_from_here,
+                by_features.as_ref(),
+            ));
+        }
+        Agreement {
+            edges: seeing.edges,
+            carried: mean(carried.into_iter()),
+            motions: mean(motions.into_iter()),
+        }
+    }
+
+    /// How many pairs of photos there are, how many share a view, and of how many the features agree on a motion.
+    pub(super) fn pairs(&self) -> [usize; 3] {
+        let shared = || self.partners.values().flatten().map(|one| is_view_shared(&one.shared));
+        let motions = self.motions.values().flatten().flatten().count();
+        [shared().count(), shared().filter(|shared| *shared).count(), motions]
+    }
+
+    /// How much larger the motions by the features are than the stated ones; `None` where these do not agree on it.
+    pub(super) fn scale(&self) -> Option<f64> {
+        /// Half of the ratios differ by less, as a share to either side.
+        const SPREAD: f64 = 0.05;
+        const MIN_RATIOS: usize = 4;
+        let ratios = self.anchors.iter().flat_map(|anchor| {
+            let partners = self.partners.get(anchor).into_iter().flatten();
+            let motions = self.motions.get(anchor).into_iter().flatten();
+            partners.zip(motions).filter_map(|(partner, motion)| {
+                let here = self.poses.get(*anchor).copied().flatten()?;
+                let there = self.poses.get(partner.frame).copied().flatten()?;
+                let stated_m = (there.inverse() * here).translation.vector.norm();
+                let real_m = motion.as_ref()?.there_from_here.translation.vector.norm();
+                (stated_m > 0.0 && real_m > 0.0).then(|| (real_m / stated_m).ln())
+            })
+        });
+        let mut ratios: Vec<f64> = ratios.collect();
+        ratios.sort_by(f64::total_cmp);
+        if ratios.len() < MIN_RATIOS {
+            return None;
+        }
+        let quantile = |share: f64| ratios.get((share * (ratios.len() - 1) as f64) as usize);
+        let agrees = quantile(0.75)? - quantile(0.25)? < 2.0 * SPREAD;
+        agrees.then_some(quantile(0.5)?.exp())
+    }
+}
+
+/// The reading as stated.
+pub(super) const AS_STATED: Change = Change::Pose(|pose| *pose);
