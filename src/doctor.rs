@@ -19,7 +19,7 @@ mod trial;
 
 use crate::geometry::Pose;
 use crate::image::RgbImage;
-use crate::scene::{Scene, SceneError};
+use crate::scene::Scene;
 
 pub use inventory::{Inventory, Remark};
 pub use reading::{Mistake, Subject};
@@ -36,6 +36,8 @@ pub struct Examination {
     pub remarks: Vec<Remark>,
     /// How well the scene fits its own photos; `None` if nothing can be compared.
     pub agreement: Option<Agreement>,
+    /// The step of the clouds' coordinates \[m\], if it is too coarse to find mistakes.
+    pub coarse_step_m: Option<f64>,
     /// Whether it fits, if anything can be compared.
     pub fit: Option<Fit>,
     /// The mistake that explains the misfit.
@@ -56,25 +58,25 @@ impl Examination {
     }
 }
 
-/// The mistake that explains why clouds and photos do not fit, if any does.
-///
-/// # Errors
-/// A compared frame that cannot be read.
-pub fn mistake(scene: &dyn Scene) -> Result<Option<Finding>, SceneError> {
-    Ok(Sample::read(scene)?.diagnose().2)
+/// The mistake that explains why clouds and photos do not fit, if any does. Photos and clouds that cannot be read do
+/// not count.
+pub fn mistake(scene: &dyn Scene) -> Option<Finding> {
+    let sample = Sample::read(scene);
+    match scene.cloud_facts().coarse_step_m {
+        None => sample.diagnose().2,
+        Some(_) => None,
+    }
 }
 
 /// Examines a scene. Errors of single files become remarks.
-///
-/// # Errors
-/// A compared frame that cannot be read.
-pub fn examine(scene: &dyn Scene) -> Result<Examination, SceneError> {
+pub fn examine(scene: &dyn Scene) -> Examination {
     let (inventory, remarks) = inventory::take(scene);
     let poses: Vec<Pose> = (0..scene.frames().len()).filter_map(|at| scene.pose(at)).collect();
     let mut examination = Examination {
         inventory,
         remarks,
         agreement: None,
+        coarse_step_m: None,
         fit: None,
         finding: None,
         compared: Vec::new(),
@@ -84,18 +86,28 @@ pub fn examine(scene: &dyn Scene) -> Result<Examination, SceneError> {
     let has_clouds = !examination.inventory.clouds.is_empty();
     // A cloud that is out of view may have the wrong axes, so it is still examined.
     if !has_clouds && !examination.remarks.iter().all(is_readable) {
-        return Ok(examination);
+        return examination;
     }
-    let sample = Sample::read(scene)?;
+    let sample = Sample::read(scene);
+    for why in &sample.unreadable {
+        let is_known = |remark: &Remark| matches!(remark, Remark::Broken(known) | Remark::Odd(known) if known == why);
+        if !examination.remarks.iter().any(is_known) {
+            examination.remarks.push(Remark::Odd(why.clone()));
+        }
+    }
     let Some(&first) = sample.anchors.first() else {
-        return Ok(examination);
+        return examination;
     };
     let cloud = sample.seen(first).map(|(photo, seen)| picture::cloud_on(photo, &seen));
     examination.picture = route::below(cloud, &poses);
     examination.compared = sample.anchors.clone();
     let (agreement, fit, finding) = sample.diagnose();
     examination.agreement = Some(agreement);
-    examination.fit = Some(fit);
-    examination.finding = finding;
-    Ok(examination)
+    // Coarse clouds look turned, shifted or of another camera by chance.
+    examination.coarse_step_m = scene.cloud_facts().coarse_step_m;
+    if examination.coarse_step_m.is_none() {
+        examination.fit = Some(fit);
+        examination.finding = finding;
+    }
+    examination
 }

@@ -9,6 +9,7 @@ mod colmap;
 mod depth_image;
 mod described;
 mod estimates;
+mod exif;
 mod file_scene;
 mod folder;
 mod frame_names;
@@ -37,8 +38,8 @@ mod view_crop;
 use std::path::{Path, PathBuf};
 
 pub use posescope_core::scene::{
-    CachedScene, DegradedScene, FrameStore, Lengths, PixelMap, Scene, SceneError, SceneFormat,
-    SceneSize, degraded, frame_range,
+    CachedScene, CloudFacts, DegradedScene, FrameStore, Lengths, MapFacts, PixelMap, Scene,
+    SceneError, SceneFormat, SceneSize, degraded, frame_range,
 };
 pub use posescope_street as street;
 

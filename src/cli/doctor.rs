@@ -45,7 +45,7 @@ fn examine_scene(
             refuse_to_replace(option, path, &[extension], [argument])?;
         }
     }
-    let found = examine(scene.as_ref())?;
+    let found = examine(scene.as_ref());
     if let (Some(path), Some(picture)) = (&args.picture, &found.picture) {
         let written = picture.save_with_format(path, image::ImageFormat::Png);
         written.map_err(CliError::image(path))?;
@@ -137,6 +137,9 @@ pub fn report(scene: &dyn Scene, found: &Examination, width: Option<usize>) -> S
         next = finding.then.as_deref();
     }
     match (&found.finding, found.fit) {
+        _ if let Some(step) = found.coarse_step_m => {
+            line("answer", &format!("cannot be judged: the clouds have steps of {step} m"));
+        }
         (_, None) => line("answer", "not checked: no frame has a photo, a pose and a cloud"),
         (_, Some(Fit::Unexplained)) => line("answer", &format!("does not fit: {UNEXPLAINED}")),
         (Some(_), Some(_)) => line("answer", "does not fit as stated"),

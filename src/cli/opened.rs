@@ -43,12 +43,13 @@ pub fn misfit(
     let (fitting, grid) = (params.defaults(), &params.grid);
     let shift = camera.fx * grid.coarse_step_m / depth / f64::from(camera.width);
     if shift > MAX_SHIFT {
+        let most = MAX_SHIFT * depth * f64::from(camera.width) / camera.fx;
         return Some(format!(
             "a coarse step of {} moves what the camera sees by {:.0} % of the photo, too far for the search; \
              --set grid.coarse_step={} fits",
             grid.coarse_step_m,
             100.0 * shift,
-            fitting.grid.coarse_step_m
+            fitting.grid.coarse_step_m.min(rounded_down(most))
         ));
     }
     let (radius_m, fitting_m) = (protocol.radius_m(), size.radius_m());
@@ -67,6 +68,14 @@ pub fn misfit(
             (1.5 * turn_deg).min(180.0).ceil()
         )
     })
+}
+
+/// A number with two digits that is not larger.
+fn rounded_down(number: f64) -> f64 {
+    let digit = 10_f64.powf(number.log10().floor() - 1.0);
+    let rounded = (number / digit).floor() * digit;
+    // As people write it: the product has digits of its rounding.
+    format!("{rounded:.*}", (-digit.log10()).max(0.0) as usize).parse().unwrap_or(rounded)
 }
 
 /// A task with its scenes and the named queries.

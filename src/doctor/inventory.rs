@@ -1,7 +1,7 @@
 //! The contents of a scene, and whether its numbers are plausible.
 
 use crate::geometry::Pose;
-use crate::scene::{Scene, why_no_cloud};
+use crate::scene::{MapFacts, Scene, why_no_cloud};
 
 /// How many clouds are examined.
 const CLOUDS: usize = 3;
@@ -69,14 +69,27 @@ pub(super) fn take(scene: &dyn Scene) -> (Inventory, Vec<Remark>) {
     }
     steps(&poses, &mut inventory, &mut remarks);
     times(scene, &mut remarks);
-    for at in spread(references.len(), CLOUDS) {
-        cloud(scene, references[at], &mut inventory, &mut remarks);
+    let looked_at: Vec<usize> = spread(references.len(), CLOUDS).map(|at| references[at]).collect();
+    let unseen: Vec<usize> = looked_at
+        .iter()
+        .copied()
+        .filter(|&frame| !cloud(scene, frame, &mut inventory, &mut remarks))
+        .collect();
+    if let Some(map) = scene.cloud_facts().map
+        && let Some(&first) = unseen.first()
+    {
+        remarks.push(if unseen.len() == looked_at.len() {
+            Remark::Broken(out_of_view(&map, &poses, &frames[first]))
+        } else {
+            Remark::Odd(format!("no point of the map is in view of frame {}", frames[first]))
+        });
     }
-    for &frame in references.first().into_iter().chain(references.last()) {
-        if let Err(error) = scene.photo(frame) {
-            remarks.push(Remark::Broken(error.to_string()));
-        }
-    }
+    let ends = || references.first().into_iter().chain(references.last());
+    let unreadable: Vec<String> =
+        ends().filter_map(|&frame| Some(scene.photo(frame).err()?.to_string())).collect();
+    // One photo costs itself alone.
+    let are_all = unreadable.len() == ends().count();
+    remarks.extend(unreadable.into_iter().map(if are_all { Remark::Broken } else { Remark::Odd }));
     remarks.dedup();
     (inventory, remarks)
 }
@@ -142,13 +155,19 @@ fn times(scene: &dyn Scene, remarks: &mut Vec<Remark>) {
     }
 }
 
-fn cloud(scene: &dyn Scene, frame: usize, inventory: &mut Inventory, remarks: &mut Vec<Remark>) {
+/// Examines a cloud, and says whether any of it is in view.
+fn cloud(
+    scene: &dyn Scene,
+    frame: usize,
+    inventory: &mut Inventory,
+    remarks: &mut Vec<Remark>,
+) -> bool {
     let name = &scene.frames()[frame];
     let cloud = match scene.cloud(frame) {
         Ok(cloud) => cloud,
         Err(error) => {
             remarks.push(Remark::Broken(error.to_string()));
-            return;
+            return true;
         }
     };
     let camera = scene.intrinsics(frame);
@@ -162,7 +181,8 @@ fn cloud(scene: &dyn Scene, frame: usize, inventory: &mut Inventory, remarks: &m
         .collect();
     depths.sort_by(f64::total_cmp);
     let median = depths.get(depths.len() / 2).copied();
-    if cloud.is_empty() || depths.is_empty() {
+    // Of a map, the scene has left out what is not in view.
+    if depths.is_empty() && scene.cloud_facts().map.is_none() {
         remarks.push(Remark::Broken(format!(
             "none of the {} points of the cloud of frame {name} is in view of its camera; check the coordinate \
              frame of the cloud",
@@ -175,6 +195,86 @@ fn cloud(scene: &dyn Scene, frame: usize, inventory: &mut Inventory, remarks: &m
         )));
     }
     inventory.clouds.push((name.clone(), cloud.len(), median));
+    !depths.is_empty()
+}
+
+/// What is known of a map that no frame has in view.
+fn out_of_view(map: &MapFacts, poses: &[Option<Pose>], frame: &str) -> String {
+    let positions = || poses.iter().flatten().map(|pose| pose.translation.vector);
+    let of_poses = [0, 1, 2].map(|axis| {
+        let along = || positions().map(|position| position[axis]);
+        (along().fold(f64::INFINITY, f64::min), along().fold(f64::NEG_INFINITY, f64::max))
+    });
+    let spans = |extent: &[(f64, f64); 3]| {
+        let ranges = extent.iter().map(|range| range_words(*range));
+        ranges
+            .zip(["x", "y", "z"])
+            .map(|(range, axis)| format!("{range} in {axis}"))
+            .collect::<Vec<_>>()
+            .join(", ")
+    };
+    format!(
+        "none of the {} points of the map is in view, neither of frame {frame} nor of the others examined; the map \
+         spans {}; the poses {}; {}",
+        grouped(map.points as f64, 0),
+        spans(&map.extent),
+        spans(&of_poses),
+        unit_hint(&map.extent, &of_poses)
+    )
+}
+
+/// What to do, judged by the numbers alone.
+fn unit_hint(map: &[(f64, f64); 3], poses: &[(f64, f64); 3]) -> &'static str {
+    /// Coordinates of surveys are larger, those of a local frame are not.
+    const SURVEY_M: f64 = 1000.0;
+    const FEET_A_METRE: f64 = 3.280_84;
+    let middle = |(least, most): (f64, f64)| (least + most) / 2.0;
+    let largest = |(least, most): (f64, f64)| least.abs().max(most.abs());
+    let is_geographic =
+        |extent: &[(f64, f64); 3]| largest(extent[0]) <= 180.0 && largest(extent[1]) <= 180.0;
+    let is_survey = |extent: &[(f64, f64); 3]| {
+        middle(extent[0]).abs() > SURVEY_M && middle(extent[1]).abs() > SURVEY_M
+    };
+    let are_times = |a: &[(f64, f64); 3], b: &[(f64, f64); 3]| {
+        let ratio = |axis: usize| middle(a[axis]) / middle(b[axis]);
+        is_survey(a)
+            && is_survey(b)
+            && [0, 1].iter().all(|axis| (ratio(*axis) / FEET_A_METRE - 1.0).abs() < 0.002)
+    };
+    if is_geographic(map) && is_survey(poses) {
+        "the map may be in degrees or of a local frame: convert it to the frame of the poses, in metres"
+    } else if is_geographic(poses) && is_survey(map) {
+        "the poses may be in degrees or of a local frame: convert them to the frame of the map, in metres"
+    } else if are_times(map, poses) {
+        "the map seems to be in feet: multiply its coordinates by 0.3048"
+    } else if are_times(poses, map) {
+        "the poses seem to be in feet: multiply their positions by 0.3048"
+    } else {
+        "check that both are in one coordinate frame"
+    }
+}
+
+/// A range, with enough digits to tell its ends apart.
+fn range_words((least, most): (f64, f64)) -> String {
+    let across = most - least;
+    let digits = if across > 0.0 { (1.0 - across.log10()).ceil().clamp(0.0, 6.0) } else { 2.0 };
+    let [least, most] = [least, most].map(|end| grouped(end, digits as usize));
+    format!("{least} to {most}")
+}
+
+/// A number with its thousands marked.
+fn grouped(number: f64, digits: usize) -> String {
+    let text = format!("{:.digits$}", number.abs());
+    let whole = text.split('.').next().unwrap_or_default();
+    let mut words = String::new();
+    for (at, digit) in text.char_indices() {
+        if at > 0 && at < whole.len() && (whole.len() - at) % 3 == 0 {
+            words.push(',');
+        }
+        words.push(digit);
+    }
+    let sign = if number < 0.0 { "-" } else { "" };
+    format!("{sign}{words}")
 }
 
 #[cfg(test)]
@@ -190,5 +290,31 @@ mod tests {
         assert_eq!(of(3, 3), [0, 1, 2]);
         assert_eq!(of(101, 3), [0, 50, 100]);
         assert_eq!(of(9, 1), [0]);
+    }
+
+    #[test]
+    fn numbers_of_surveys_are_grouped_and_ranges_have_the_digits_that_differ() {
+        assert_eq!(grouped(5_334_567.25, 1), "5,334,567.2");
+        assert_eq!(grouped(-512.0, 0), "-512");
+        assert_eq!(range_words((691_234.4, 691_480.2)), "691,234 to 691,480");
+        assert_eq!(range_words((11.57412, 11.57498)), "11.57412 to 11.57498");
+    }
+
+    #[test]
+    fn a_unit_is_named_only_where_the_numbers_say_so() {
+        let survey = [(691_230.0, 691_240.0), (5_334_560.0, 5_334_570.0), (510.0, 512.0)];
+        let times = |factor: f64| survey.map(|(least, most)| (factor * least, factor * most));
+        let degrees = [(11.57, 11.58), (48.13, 48.14), (510.0, 512.0)];
+        for (map, poses, word) in [
+            (degrees, survey, "the map may be in degrees"),
+            (survey, degrees, "the poses may be in degrees"),
+            (times(1.0 / 0.3048), survey, "the map seems to be in feet"),
+            (survey, times(1.0 / 0.3048), "the poses seem to be in feet"),
+            (times(3.0), survey, "check that both"),
+            (degrees, degrees, "check that both"),
+            (survey, survey, "check that both"),
+        ] {
+            assert!(unit_hint(&map, &poses).starts_with(word), "{word}");
+        }
     }
 }

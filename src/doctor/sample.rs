@@ -59,6 +59,8 @@ pub(super) struct Sample {
     pub(super) sights: BTreeMap<usize, Sight>,
     pub(super) clouds: BTreeMap<usize, Vec<Point3<f64>>>,
     pub(super) anchors: Vec<usize>,
+    /// Why photos and clouds could not be read; each costs itself alone.
+    pub(super) unreadable: Vec<String>,
     partners: BTreeMap<usize, Vec<Partner>>,
     /// The clouds as stated.
     stated: BTreeMap<usize, Seeing>,
@@ -106,7 +108,7 @@ pub(super) fn partners(anchor: usize, count: usize) -> impl Iterator<Item = usiz
 
 impl Sample {
     /// Reads frames with pose and cloud, spread over the scene.
-    pub(super) fn read(scene: &dyn Scene) -> Result<Self, SceneError> {
+    pub(super) fn read(scene: &dyn Scene) -> Self {
         let count = scene.frames().len();
         let poses: Vec<Option<Pose>> = (0..count).map(|frame| scene.pose(frame)).collect();
         let references: Vec<usize> =
@@ -130,32 +132,51 @@ impl Sample {
             };
             Ok((frame, sight))
         };
-        let sights = seen.par_iter().map(sight).collect::<Result<_, SceneError>>()?;
-        let mut clouds = BTreeMap::new();
+        let read: Vec<Result<_, SceneError>> = seen.par_iter().map(sight).collect();
+        let (mut sights, mut clouds) = (BTreeMap::new(), BTreeMap::new());
+        let mut unreadable = Vec::new();
+        for one in read {
+            match one {
+                Ok((frame, sight)) => {
+                    sights.insert(frame, sight);
+                }
+                Err(error) => unreadable.push(error.to_string()),
+            }
+        }
         for &anchor in &anchors {
             for frame in anchor.saturating_sub(1)..(anchor + 2).min(count) {
                 if let Entry::Vacant(place) = clouds.entry(frame)
                     && scene.has_cloud(frame)
                 {
-                    let cloud = scene.cloud(frame)?;
-                    let step = cloud.points.len().div_ceil(MAX_POINTS).max(1);
-                    let points = cloud.points.iter().step_by(step);
-                    place.insert(points.map(|point| point.cast()).collect());
+                    match scene.cloud(frame) {
+                        Ok(cloud) => {
+                            let step = cloud.points.len().div_ceil(MAX_POINTS).max(1);
+                            let points = cloud.points.iter().step_by(step);
+                            place.insert(points.map(|point| point.cast()).collect());
+                        }
+                        Err(error) => unreadable.push(error.to_string()),
+                    }
                 }
             }
         }
+        unreadable.sort();
+        unreadable.dedup();
+        let is_readable =
+            |anchor: &usize| sights.contains_key(anchor) && clouds.contains_key(anchor);
+        let anchors = anchors.into_iter().filter(is_readable).collect();
         let mut sample = Self {
             poses,
             sights,
             clouds,
             anchors,
+            unreadable,
             partners: BTreeMap::new(),
             stated: BTreeMap::new(),
             motions: BTreeMap::new(),
         };
         let found = sample.anchors.par_iter().map(|&anchor| (anchor, sample.partners_of(anchor)));
         sample.partners = found.collect();
-        Ok(sample.measured())
+        sample.measured()
     }
 
     fn partners_of(&self, anchor: usize) -> Vec<Partner> {

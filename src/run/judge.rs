@@ -88,8 +88,7 @@ pub fn examine(run: &RunFile, scenes: &Scenes, rows: &[QueryResult]) -> Vec<Find
             continue;
         };
         match catch_unwind(AssertUnwindSafe(|| mistake(scene.as_ref()))) {
-            Ok(Ok(found)) => examined.extend(found.map(|found| of_examination(label, &found))),
-            Ok(Err(error)) => log::warn!("`posescope doctor` cannot examine {label}: {error}"),
+            Ok(found) => examined.extend(found.map(|found| of_examination(label, &found))),
             Err(_) => log::warn!("`posescope doctor` cannot examine {label}"),
         }
     }

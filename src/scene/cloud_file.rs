@@ -1,11 +1,12 @@
-//! Cloud files: PLY, PCD, LAS, LAZ and XYZ text, detected by their content.
+//! Cloud files: PLY, PCD, LAS, LAZ and text (XYZ, CSV, PTS, PTX), detected by their content.
 //!
 //! Counts in headers are checked against the size of the file before anything is allocated.
 
+mod collector;
 mod las;
 mod pcd;
 mod ply;
-mod xyz;
+mod text;
 
 use std::fs::File;
 use std::io::{BufReader, Read as _};
@@ -13,9 +14,13 @@ use std::path::Path;
 
 use nalgebra::{Point3, Vector3};
 
+pub(super) use collector::Note;
 pub use las::is_decoding;
 
+use self::collector::Collector;
+
 use super::SceneError;
+use super::lines::{excerpt_of, text_start};
 
 /// The most points of a cloud, which take 1.2 GB.
 pub(super) const MAX_POINTS: usize = 100_000_000;
@@ -29,26 +34,13 @@ pub(super) struct MapCloud {
     pub origin: Vector3<f64>,
     /// The points relative to the origin \[m\].
     pub points: Vec<Point3<f32>>,
+    /// The least and the greatest coordinate along each axis \[m\].
+    pub extent: [(f64, f64); 3],
+    /// What the reader noticed.
+    pub notes: Vec<Note>,
 }
 
 impl MapCloud {
-    /// Adds a point \[m\]. A point without finite coordinates is a beam without return, and is skipped. The first
-    /// point, rounded to metres, is the local origin.
-    fn add(&mut self, [x, y, z]: [f64; 3]) -> Result<(), String> {
-        let point = Vector3::new(x, y, z);
-        if !point.iter().all(|coordinate| coordinate.is_finite()) {
-            return Ok(());
-        }
-        if self.points.is_empty() {
-            self.origin = point.map(f64::round);
-        }
-        if self.points.len() == MAX_POINTS {
-            return Err(format!("at most {MAX_POINTS} points expected; split or thin the cloud"));
-        }
-        self.points.push(Point3::from(point - self.origin).cast());
-        Ok(())
-    }
-
     /// The points in the frame of their file \[m\].
     pub fn positions(&self) -> impl Iterator<Item = Point3<f64>> + '_ {
         let from_origin = |point: &Point3<f32>| point.cast::<f64>() + self.origin;
@@ -63,28 +55,41 @@ pub(super) fn read(path: &Path) -> Result<MapCloud, SceneError> {
     let file = File::open(path).map_err(io)?;
     let size = file.metadata().map_err(io)?.len();
     BufReader::new(file).take(4096).read_to_end(&mut start).map_err(io)?;
+    if start.starts_with(b"ASTM-E57") {
+        let expected = "a cloud in PLY, PCD, LAS, LAZ or text format expected, E57 found; convert it with CloudCompare \
+                        or by `pdal translate a.e57 a.laz`";
+        return Err(content(path, expected));
+    }
     let read = if start.starts_with(b"ply\n") || start.starts_with(b"ply\r") {
         ply::read
     } else if start.starts_with(b"LASF") {
         las::read
     } else if pcd::is_pcd(&start) {
         pcd::read
+    } else if let Err(expected) = text_start(&start) {
+        return Err(content(path, &expected));
     } else if start.contains(&0) {
-        return Err(content(path, "a cloud in PLY, PCD, LAS, LAZ or XYZ text format expected"));
+        return Err(content(path, "a cloud in PLY, PCD, LAS, LAZ or text format expected"));
     } else {
-        return xyz::read(path);
+        return text::read(path);
     };
     let cloud = read(path, size).map_err(|expected| content(path, &expected))?;
     if cloud.points.is_empty() {
-        return Err(content(path, "at least one point expected, none found"));
+        return Err(content(path, &no_point(&cloud)));
     }
     Ok(cloud)
+}
+
+/// The error of a cloud without points.
+fn no_point(cloud: &MapCloud) -> String {
+    let notes: String = cloud.notes.iter().map(|note| format!("; {note}")).collect();
+    format!("at least one point expected, none found{notes}")
 }
 
 fn content(path: &Path, expected: &str) -> SceneError {
     // Some libraries have errors of several lines.
     let lines: Vec<&str> = expected.split_whitespace().collect();
-    SceneError::expected(path, super::lines::excerpt_of(&lines.join(" "), 200))
+    SceneError::expected(path, excerpt_of(&lines.join(" "), 200))
 }
 
 /// Refuses a header that announces more points than the file can hold.

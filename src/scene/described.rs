@@ -17,21 +17,22 @@
 mod pattern;
 mod poses;
 
+use std::mem::discriminant;
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, OnceLock};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use nalgebra::{Matrix3x4, Point3};
 use serde::Deserialize;
 use toml::Spanned;
 
 use self::poses::FramePoses;
-use super::cloud_file;
+use super::cloud_file::{self, MapCloud, Note};
 use super::file_scene::{Clouds, Develop, FileScene, Frame};
 use super::folder::{folder_name, stem, warn_without_poses, within};
 use super::frame_names::names_of;
 use super::lens::{Distortion, developed_camera, pinhole};
 use super::map_blocks::MapBlocks;
-use super::{Scene, SceneError, SceneFormat, lines, photo_file, view_crop};
+use super::{CloudFacts, Scene, SceneError, SceneFormat, lines, photo_file, view_crop};
 use crate::camera::Intrinsics;
 use crate::cloud::Cloud;
 use crate::geometry::{Pose, pose_from_matrix};
@@ -41,7 +42,7 @@ const FILE: &str = "scene.toml";
 pub(super) const ENTRY: SceneFormat = SceneFormat {
     name: "toml",
     about: "anything else: a scene.toml, or the folder with it, that names images, poses, camera and \
-            cloud (PLY, PCD, LAS, LAZ, XYZ)",
+            cloud (PLY, PCD, LAS, LAZ, PTS, PTX, text)",
     recognizes: |argument| description_of(Path::new(argument)).is_file(),
     open: |argument| open(&description_of(Path::new(argument))),
 };
@@ -196,7 +197,7 @@ fn open(path: &Path) -> Result<Box<dyn Scene>, SceneError> {
         source.error_at(at, error.message())
     })?;
     let photos = source.files(&description.images)?;
-    let (intrinsics, develop) = camera(&source, &description.camera, &photos[0])?;
+    let (intrinsics, develop) = camera(&source, &description.camera, &photos)?;
     let file_names = photos.iter().map(|photo| photo.file_name().unwrap_or_default());
     let file_names: Vec<String> =
         file_names.map(|name| name.to_string_lossy().into_owned()).collect();
@@ -241,12 +242,15 @@ fn open(path: &Path) -> Result<Box<dyn Scene>, SceneError> {
 fn camera(
     source: &Source,
     described: &Spanned<CameraDescription>,
-    first: &Path,
+    photos: &[PathBuf],
 ) -> Result<(Intrinsics, Option<Arc<dyn Develop>>), SceneError> {
     let camera = described.get_ref();
+    let (stored, first) = photo_file::common_size(photos)?;
+    let turned = photo_file::turned_size(stored, photo_file::orientation(first));
+    let size = if turned != stored && fits_turned(camera, stored, first) { turned } else { stored };
     let numbers = [camera.fx, camera.fy, camera.cx, camera.cy];
     let error = |why: String| source.error(described, &why);
-    let taken = pinhole(numbers, photo_file::dimensions(first)?).map_err(error)?;
+    let taken = pinhole(numbers, size).map_err(error)?;
     let CameraDescription { k1, k2, p1, p2, k3, k4, k5, k6, .. } = *camera;
     let distortion = match camera.model {
         LensModel::OpenCv => Distortion::brown([k1, k2, k3, k4, k5, k6], [p1, p2]),
@@ -258,6 +262,32 @@ fn camera(
         }
     };
     developed_camera(taken, distortion).map_err(error)
+}
+
+/// Whether the centre of a camera is that of a photo whose EXIF data exchange width and height, rather than that of
+/// the stored image.
+fn fits_turned(camera: &CameraDescription, (width, height): (u32, u32), photo: &Path) -> bool {
+    /// The share of a photo's size by which one of both must fit better.
+    const CLEAR: f64 = 0.02;
+    let off = |width: u32, height: u32| {
+        let aside = (camera.cx + 0.5) / f64::from(width) - 0.5;
+        let above = (camera.cy + 0.5) / f64::from(height) - 0.5;
+        aside.abs().max(above.abs())
+    };
+    let (stored, turned) = (off(width, height), off(height, width));
+    if (stored - turned).abs() < CLEAR {
+        log::warn!(
+            "{}: the EXIF orientation is ignored, here and in other photos of the scene: the centre of the camera \
+             fits the stored image and the turned one",
+            photo.display()
+        );
+    } else if turned < stored {
+        log::info!(
+            "{}: turned as its EXIF orientation says, since the centre of the camera is that of the turned photo",
+            photo.display()
+        );
+    }
+    turned + CLEAR <= stored
 }
 
 fn clouds(
@@ -326,6 +356,25 @@ struct DescribedClouds {
     files: Vec<Option<PathBuf>>,
     /// The transform of these files to the camera's frame; `None` if they are in the world's frame.
     camera_from_cloud: Option<Pose>,
+    /// What was noticed in the files.
+    notes: Mutex<Vec<Note>>,
+}
+
+impl DescribedClouds {
+    /// Reads a file, and warns of what is noticed in it. The same of other files is not said again.
+    fn read_file(&self, path: &Path) -> Result<MapCloud, SceneError> {
+        let cloud = cloud_file::read(path)?;
+        let mut known = self.notes.lock().unwrap_or_else(PoisonError::into_inner);
+        for note in &cloud.notes {
+            if !known.iter().any(|other| discriminant(other) == discriminant(note)) {
+                let others =
+                    if self.map.is_none() { " (other clouds may have some, too)" } else { "" };
+                log::warn!("{}: {note}{others}", path.display());
+                known.push(note.clone());
+            }
+        }
+        Ok(cloud)
+    }
 }
 
 impl Clouds for DescribedClouds {
@@ -336,6 +385,16 @@ impl Clouds for DescribedClouds {
     fn place<'a>(&'a self, index: usize, _frame: &'a Frame) -> &'a Path {
         let file = self.files.get(index).and_then(Option::as_deref);
         file.unwrap_or(&self.place)
+    }
+
+    fn facts(&self) -> CloudFacts {
+        let known = self.notes.lock().unwrap_or_else(PoisonError::into_inner);
+        let coarse_step_m = known.iter().find_map(|note| match note {
+            Note::Coarse { step, .. } => Some(*step),
+            _ => None,
+        });
+        let map = self.map.as_ref().and_then(OnceLock::get);
+        CloudFacts { coarse_step_m, map: map.map(MapBlocks::facts) }
     }
 
     fn read(&self, index: usize, frame: &Frame) -> Result<Cloud, SceneError> {
@@ -354,14 +413,14 @@ impl Clouds for DescribedClouds {
                 Some(camera_from_cloud) => camera_from_cloud,
                 None => world_from_camera()?.inverse(),
             };
-            let cloud = cloud_file::read(path)?;
+            let cloud = self.read_file(path)?;
             let in_camera = |point: Point3<f64>| (camera_from_cloud * point).cast();
             return Ok(Cloud { points: cloud.positions().map(in_camera).collect() });
         };
         let map = match map.get() {
             Some(map) => map,
             None => {
-                let read = MapBlocks::new(cloud_file::read(path)?);
+                let read = MapBlocks::new(self.read_file(path)?);
                 map.get_or_init(|| read)
             }
         };

@@ -1,10 +1,14 @@
 //! A scene whose photos are files. The reader of a format provides frames and clouds.
 
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, Once, OnceLock};
+
+use image::metadata::Orientation;
+use image::{DynamicImage, GenericImageView as _};
 
 use super::folder::stem;
-use super::{Lengths, PixelMap, Scene, SceneError, photo_file};
+use super::photo_file::GrayRange;
+use super::{CloudFacts, Lengths, PixelMap, Scene, SceneError, photo_file};
 use crate::camera::Intrinsics;
 use crate::cloud::Cloud;
 use crate::geometry::Pose;
@@ -22,7 +26,10 @@ pub(super) struct Frame {
     pub photo: PathBuf,
     /// The camera of the developed photo.
     pub intrinsics: Intrinsics,
-    /// Converts the image in the file to the photo, if they differ.
+    /// How the image in the file is turned; by default as its EXIF data say, if the camera has the size of the
+    /// turned image only.
+    pub turned: Option<Orientation>,
+    /// Converts the turned image to the photo, if they differ.
     pub develop: Option<Arc<dyn Develop>>,
     pub world_from_camera: Option<Pose>,
     /// The time of the photo \[s\], if known.
@@ -37,6 +44,7 @@ impl Frame {
             other_name: None,
             photo,
             intrinsics,
+            turned: None,
             develop: None,
             world_from_camera: None,
             time_s: None,
@@ -79,8 +87,26 @@ pub(super) trait Clouds: Send + Sync {
         Lengths::Metres
     }
 
+    /// What is known of the files, once a cloud was read.
+    fn facts(&self) -> CloudFacts {
+        CloudFacts::default()
+    }
+
     /// Reads the cloud of a frame that has one, in the camera's frame \[m\].
     fn read(&self, index: usize, frame: &Frame) -> Result<Cloud, SceneError>;
+}
+
+/// Warns of a photo that its EXIF data turn into one of the same size.
+fn warn_of_either(path: &Path, size: (u32, u32)) {
+    let turned = photo_file::orientation(path);
+    if turned != Orientation::NoTransforms && photo_file::turned_size(size, turned) == size {
+        log::warn!(
+            "{}: the EXIF orientation is ignored, here and in other photos of the scene: the camera fits the \
+             stored image and the turned one; if it is that of the turned one, turn the files, for example by \
+             `exiftran -ai`",
+            path.display()
+        );
+    }
 }
 
 pub(super) struct FileScene<C> {
@@ -88,6 +114,10 @@ pub(super) struct FileScene<C> {
     names: Vec<String>,
     frames: Vec<Frame>,
     clouds: C,
+    /// What grey values of 16 bits become 0 and 255, once a photo has such.
+    gray_range: OnceLock<GrayRange>,
+    /// Whether an EXIF orientation was looked for that the size of the camera does not decide.
+    is_warned: Once,
 }
 
 impl<C: Clouds> FileScene<C> {
@@ -98,7 +128,45 @@ impl<C: Clouds> FileScene<C> {
             names: frames.iter().map(|frame| frame.name.clone()).collect(),
             frames,
             clouds,
+            gray_range: OnceLock::new(),
+            is_warned: Once::new(),
         }
+    }
+
+    /// The image in a file, turned to the size that its camera has.
+    fn image(&self, frame: &Frame, size: (u32, u32)) -> Result<DynamicImage, SceneError> {
+        let path = &frame.photo;
+        let mut image = photo_file::decode(path)?;
+        let stored = image.dimensions();
+        let turned = match frame.turned {
+            Some(turned) => turned,
+            None if stored == size => {
+                self.is_warned.call_once(|| warn_of_either(path, size));
+                Orientation::NoTransforms
+            }
+            None => photo_file::orientation(path),
+        };
+        if photo_file::turned_size(stored, turned) == size {
+            image.apply_orientation(turned);
+        }
+        photo_file::expect_size(path, image.dimensions(), size)?;
+        Ok(image)
+    }
+
+    /// One range for all photos: the estimators compare their grey values.
+    fn gray_range(&self) -> GrayRange {
+        *self.gray_range.get_or_init(|| {
+            let range = GrayRange::of(self.frames.iter().map(|frame| frame.photo.as_path()));
+            if !range.is_full() {
+                log::warn!(
+                    "{}: photos of 16 bits that use the values {} to {}, which become 0 to 255 in all of them",
+                    self.name,
+                    range.low,
+                    range.high
+                );
+            }
+            range
+        })
     }
 
     fn frames_with_cloud(&self) -> String {
@@ -151,13 +219,13 @@ impl<C: Clouds> Scene for FileScene<C> {
     fn photo(&self, frame: usize) -> Result<Photo, SceneError> {
         let frame = &self.frames[frame];
         let size = (frame.intrinsics.width, frame.intrinsics.height);
-        match &frame.develop {
-            Some(develop) => {
-                let image = photo_file::read(&frame.photo, develop.size_in_file(size))?;
-                Ok(develop.developed(image))
-            }
-            None => photo_file::read(&frame.photo, size),
-        }
+        let develop = frame.develop.as_ref();
+        let in_file = develop.map_or(size, |develop| develop.size_in_file(size));
+        let image = photo_file::photo(self.image(frame, in_file)?, || self.gray_range());
+        Ok(match develop {
+            Some(develop) => develop.developed(image),
+            None => image,
+        })
     }
 
     fn cloud(&self, frame: usize) -> Result<Cloud, SceneError> {
@@ -174,6 +242,10 @@ impl<C: Clouds> Scene for FileScene<C> {
 
     fn lengths(&self) -> Lengths {
         self.clouds.lengths()
+    }
+
+    fn cloud_facts(&self) -> CloudFacts {
+        self.clouds.facts()
     }
 
     /// Includes the sizes of the photos' files: different photos rarely have the same size in bytes. Modification times

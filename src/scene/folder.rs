@@ -6,13 +6,17 @@ use std::str::FromStr;
 
 use super::SceneError;
 
-/// The entries of a folder, in the order of their names.
+/// The entries of a folder, in the order of their names, without hidden ones such as `._a.jpg` and `.DS_Store`.
 pub(super) fn entries(folder: &Path) -> Result<Vec<PathBuf>, SceneError> {
     let io = SceneError::io(folder);
     let paths = std::fs::read_dir(folder).map_err(io)?;
     let mut paths = paths
         .map(|entry| entry.map(|entry| entry.path()).map_err(io))
         .collect::<Result<Vec<_>, _>>()?;
+    let is_hidden = |path: &PathBuf| {
+        path.file_name().is_some_and(|name| name.as_encoded_bytes().starts_with(b"."))
+    };
+    paths.retain(|path| !is_hidden(path));
     paths.sort();
     Ok(paths)
 }

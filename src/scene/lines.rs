@@ -178,8 +178,29 @@ pub(super) fn excerpt_of(text: &str, most: usize) -> String {
     if text.chars().nth(most).is_some() { short + "…" } else { short }
 }
 
+/// Reads a text, without a byte order mark.
 pub(super) fn read_text(path: &Path) -> Result<String, SceneError> {
-    std::fs::read_to_string(path).map_err(SceneError::io(path))
+    let bytes = std::fs::read(path).map_err(SceneError::io(path))?;
+    let start = text_start(&bytes).map_err(|expected| SceneError::expected(path, expected))?;
+    let text = std::str::from_utf8(&bytes[start..]).map_err(|error| {
+        let before = &bytes[..start + error.valid_up_to()];
+        let line = before.iter().filter(|byte| **byte == b'\n').count() + 1;
+        SceneError::line(
+            path,
+            line,
+            "text in UTF-8 expected, other bytes found; save the file as UTF-8",
+        )
+    })?;
+    Ok(text.to_owned())
+}
+
+/// The length of the byte order mark that a text begins with \[bytes\]. The error names UTF-16, which Windows programs
+/// write.
+pub(super) fn text_start(bytes: &[u8]) -> Result<usize, String> {
+    if bytes.starts_with(&[0xff, 0xfe]) || bytes.starts_with(&[0xfe, 0xff]) {
+        return Err("text in UTF-8 expected, UTF-16 found; save the file as UTF-8".to_owned());
+    }
+    Ok(if bytes.starts_with("\u{feff}".as_bytes()) { 3 } else { 0 })
 }
 
 #[cfg(test)]
@@ -229,6 +250,23 @@ mod tests {
         assert!(distance.is_ok_and(|distance| distance < 1e-9));
         let error = said(line.pose([0.0; 3], [0.0, 0.0, 90.0, 0.0])).err();
         assert!(error.is_some_and(|error| error.contains("length 90.000")));
+    }
+
+    #[test]
+    fn a_byte_order_mark_is_skipped_and_other_encodings_are_named() {
+        let folder = tempfile::TempDir::new().expect("a folder");
+        let path = folder.path().join("a.txt");
+        let read = |bytes: &[u8]| {
+            std::fs::write(&path, bytes).expect("writable");
+            read_text(&path).map_err(|error| error.to_string())
+        };
+        assert_eq!(read(b"1 2\n").as_deref(), Ok("1 2\n"));
+        assert_eq!(read(b"\xef\xbb\xbf1 2\n").as_deref(), Ok("1 2\n"));
+        for utf16 in [b"\xff\xfe1\0 \0".as_slice(), b"\xfe\xff\x001\0 "] {
+            assert!(read(utf16).is_err_and(|said| said.contains("UTF-16 found")));
+        }
+        let other = read(b"1\n2\xb0\n");
+        assert!(other.is_err_and(|said| said.contains("a.txt:2: text in UTF-8 expected")));
     }
 
     #[test]

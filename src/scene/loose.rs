@@ -1,25 +1,22 @@
 //! Loose photos: image files that do not belong to a scene. They have a camera, but no pose.
 
 mod camera;
-mod exif;
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use image::DynamicImage;
 use image::metadata::Orientation;
 use serde::{Deserialize, Serialize};
 
 pub use camera::CameraArgument;
 
-use self::exif::Exif;
-use super::file_scene::{Clouds, Develop, FileScene, Frame};
+use super::exif::Exif;
+use super::file_scene::{Clouds, FileScene, Frame};
 use super::folder::stem;
 use super::lens::{developed_camera, pinhole};
 use super::{Lengths, Scene, SceneError, photo_file};
 use crate::cloud::Cloud;
-use crate::image::Photo;
 
 /// The loose photos of a command line.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -81,51 +78,34 @@ impl LoosePhotos {
                 "{}: focal length {focal_px:.0} px from EXIF ({how}), no distortion; --camera overrides it",
                 path.display()
             );
-            let turn = Turn(turned);
-            let (width, height) = turn.size_in_file(stored);
+            let (width, height) = photo_file::turned_size(stored, turned);
             let middle = |side: u32| (f64::from(side) - 1.0) / 2.0;
             let camera = [focal_px, focal_px, middle(width), middle(height)];
             let intrinsics = pinhole(camera, (width, height)).map_err(error)?;
-            let develop: Option<Arc<dyn Develop>> = Some(Arc::new(turn));
-            return Ok(Frame { develop, ..Frame::new(path.to_owned(), intrinsics) });
+            return Ok(Frame { turned: Some(turned), ..Frame::new(path.to_owned(), intrinsics) });
         };
-        // Cameras are calibrated on the stored pixels.
-        if turned != Orientation::NoTransforms {
-            log::warn!(
-                "{}: the EXIF orientation is ignored, since --camera refers to the stored image",
-                path.display()
-            );
-        }
-        let camera = camera.of_photo(path, stored)?;
+        // The size of the camera decides whether it was calibrated on stored or on turned pixels.
+        let upright = photo_file::turned_size(stored, turned);
+        let fitting =
+            camera.of_photo(path, stored).map(|camera| (Orientation::NoTransforms, camera));
+        let (turned, camera) = match fitting {
+            Ok(fitting) => {
+                if turned != Orientation::NoTransforms {
+                    log::warn!(
+                        "{}: the EXIF orientation is ignored, since --camera fits the stored image",
+                        path.display()
+                    );
+                }
+                fitting
+            }
+            Err(_) if upright != stored && camera.of_photo(path, upright).is_ok() => {
+                (turned, camera.of_photo(path, upright)?)
+            }
+            Err(error) => return Err(error),
+        };
         let (intrinsics, develop) =
             developed_camera(camera.intrinsics, camera.distortion).map_err(error)?;
-        Ok(Frame { develop, ..Frame::new(path.to_owned(), intrinsics) })
-    }
-}
-
-/// Rotates the image of a file upright.
-struct Turn(Orientation);
-
-impl Develop for Turn {
-    fn developed(&self, image: Photo) -> Photo {
-        let turned = |mut image: DynamicImage| {
-            image.apply_orientation(self.0);
-            image
-        };
-        match image.color {
-            Some(color) => Photo::from_color(turned(color.into()).into_rgb8()),
-            None => Photo::from_gray(turned(image.gray.into()).into_luma8()),
-        }
-    }
-
-    fn size_in_file(&self, (width, height): (u32, u32)) -> (u32, u32) {
-        match self.0 {
-            Orientation::Rotate90
-            | Orientation::Rotate270
-            | Orientation::Rotate90FlipH
-            | Orientation::Rotate270FlipH => (height, width),
-            _ => (width, height),
-        }
+        Ok(Frame { turned: Some(turned), develop, ..Frame::new(path.to_owned(), intrinsics) })
     }
 }
 

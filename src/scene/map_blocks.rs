@@ -5,6 +5,7 @@ use std::ops::Range;
 use nalgebra::{Point3, Vector3};
 use rayon::slice::ParallelSliceMut as _;
 
+use super::MapFacts;
 use super::cloud_file::MapCloud;
 use crate::camera::Intrinsics;
 use crate::geometry::Pose;
@@ -20,6 +21,8 @@ pub(super) struct MapBlocks {
     origin: Vector3<f64>,
     points: Vec<Point3<f32>>,
     blocks: Vec<Block>,
+    /// The least and the greatest coordinates of the map \[m\].
+    extent: [(f64, f64); 3],
 }
 
 struct Block {
@@ -31,12 +34,12 @@ struct Block {
 
 impl MapBlocks {
     pub fn new(map: MapCloud) -> Self {
-        let MapCloud { origin, mut points } = map;
-        let extent = (0..3).map(|axis| {
+        let MapCloud { origin, mut points, extent, .. } = map;
+        let lengths = (0..3).map(|axis| {
             let along = || points.iter().map(|point| point[axis]);
             along().fold(f32::MIN, f32::max) - along().fold(f32::MAX, f32::min)
         });
-        let longest = extent.fold(0.0, f32::max);
+        let longest = lengths.fold(0.0, f32::max);
         let side = SIDE_M.min(longest / MIN_BLOCKS).max(f32::MIN_POSITIVE);
         let key = |point: &Point3<f32>| [0, 1, 2].map(|axis| (point[axis] / side).floor() as i32);
         // By all coordinates: the order must not depend on the number of threads.
@@ -62,7 +65,11 @@ impl MapBlocks {
             });
             start += chunk.len();
         }
-        Self { origin, points, blocks }
+        Self { origin, points, blocks, extent }
+    }
+
+    pub fn facts(&self) -> MapFacts {
+        MapFacts { points: self.points.len(), extent: self.extent }
     }
 
     /// The points of all blocks that may be in a camera's view, in its frame \[m\].
@@ -115,7 +122,7 @@ mod tests {
             Point3::new(along(200.0), along(200.0), along(20.0))
         };
         let points: Vec<_> = (0..50_000).map(|_| point()).collect();
-        let map = MapCloud { origin, points: points.clone() };
+        let map = MapCloud { origin, points: points.clone(), ..MapCloud::default() };
         let blocks = MapBlocks::new(map);
         let camera =
             Intrinsics { fx: 300.0, fy: 320.0, cx: 300.0, cy: 250.0, width: 640, height: 480 };

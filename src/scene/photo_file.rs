@@ -1,20 +1,98 @@
-//! Photo files.
+//! Photo files. Their content decides the format, not their names.
 
-use std::path::Path;
+mod gray_range;
 
+use std::fs::File;
+use std::io::{BufRead as _, BufReader};
+use std::path::{Path, PathBuf};
+
+use image::metadata::Orientation;
+use image::{DynamicImage, ImageReader};
+
+pub(super) use self::gray_range::{GrayRange, photo};
 use super::SceneError;
-use crate::image::Photo;
+use super::exif::Exif;
+
+/// The photos whose headers decide a size.
+const SAMPLE: usize = 9;
 
 /// The size of an image \[px\], from its header alone.
 pub(super) fn dimensions(path: &Path) -> Result<(u32, u32), SceneError> {
-    image::image_dimensions(path).map_err(SceneError::image(path))
+    reader(path)?.into_dimensions().map_err(SceneError::image(path))
 }
 
-/// Reads a photo, which must have this size \[px\].
-pub(super) fn read(path: &Path, size: (u32, u32)) -> Result<Photo, SceneError> {
-    let photo = Photo::read(path).map_err(SceneError::image(path))?;
-    expect_size(path, photo.dimensions(), size)?;
-    Ok(photo)
+/// The size that most of some photos have, and the first photo of this size. A few others may be broken.
+/// There must be one at least.
+pub(super) fn common_size<'a>(photos: &'a [PathBuf]) -> Result<((u32, u32), &'a Path), SceneError> {
+    let steps = photos.len().div_ceil(SAMPLE).max(1);
+    let sizes = |path: &'a PathBuf| Some((dimensions(path).ok()?, path.as_path()));
+    let read: Vec<((u32, u32), &Path)> = photos.iter().step_by(steps).filter_map(sizes).collect();
+    let mut common: Option<(usize, ((u32, u32), &Path))> = None;
+    for found in &read {
+        let count = read.iter().filter(|(size, _)| *size == found.0).count();
+        if common.is_none_or(|(most, _)| count > most) {
+            common = Some((count, *found));
+        }
+    }
+    match common {
+        Some((_, found)) => Ok(found),
+        None => Ok((dimensions(&photos[0])?, &photos[0])),
+    }
+}
+
+/// Decodes an image.
+pub(super) fn decode(path: &Path) -> Result<DynamicImage, SceneError> {
+    reader(path)?.decode().map_err(SceneError::image(path))
+}
+
+fn reader(path: &Path) -> Result<ImageReader<BufReader<File>>, SceneError> {
+    let io = SceneError::io(path);
+    let mut file = BufReader::new(File::open(path).map_err(io)?);
+    if let Some((format, command)) = unread_format(file.fill_buf().map_err(io)?) {
+        let expected = format!(
+            "a photo in PNG or JPEG format expected, {format} found; convert it, for example by `{command}`"
+        );
+        return Err(SceneError::expected(path, expected));
+    }
+    let reader = ImageReader::new(file).with_guessed_format().map_err(io)?;
+    if reader.format().is_none() {
+        let expected = "a photo in PNG or JPEG format expected, other content found";
+        return Err(SceneError::expected(path, expected));
+    }
+    Ok(reader)
+}
+
+/// The name of a common format that is not read, and a command that converts it.
+fn unread_format(start: &[u8]) -> Option<(&'static str, &'static str)> {
+    let is_at = |at: usize, what: &[u8]| start.get(at..).is_some_and(|rest| rest.starts_with(what));
+    let brands = ["heic", "heix", "heim", "heis", "hevc", "mif1", "msf1"];
+    if is_at(4, b"ftypavif") {
+        Some(("AVIF", "avifdec a.avif a.png"))
+    } else if brands.iter().any(|brand| is_at(4, b"ftyp") && is_at(8, brand.as_bytes())) {
+        Some(("HEIC", "heif-convert a.heic a.jpg"))
+    } else if is_at(0, b"RIFF") && is_at(8, b"WEBP") {
+        Some(("WebP", "dwebp a.webp -o a.png"))
+    } else if is_at(0, b"II*\0") || is_at(0, b"MM\0*") {
+        Some(("TIFF", "magick a.tif a.png"))
+    } else {
+        None
+    }
+}
+
+/// How to turn the image of a file upright, as its EXIF data say.
+pub(super) fn orientation(path: &Path) -> Orientation {
+    Exif::read(path).orientation()
+}
+
+/// The size of an image after it was turned \[px\], or before.
+pub(super) fn turned_size((width, height): (u32, u32), orientation: Orientation) -> (u32, u32) {
+    match orientation {
+        Orientation::Rotate90
+        | Orientation::Rotate270
+        | Orientation::Rotate90FlipH
+        | Orientation::Rotate270FlipH => (height, width),
+        _ => (width, height),
+    }
 }
 
 /// An error if an image has another size than its camera.

@@ -3,6 +3,7 @@
 mod binary;
 mod card;
 mod ci;
+mod cloud_files;
 mod colmap;
 mod command_line;
 mod compare_views;
@@ -32,6 +33,7 @@ mod loose_photo;
 mod mutations;
 mod painted;
 mod pair_matches;
+mod photo_files;
 mod picture_views;
 mod planted;
 mod processors;
@@ -57,6 +59,7 @@ mod stored;
 mod storyboard;
 mod sweep;
 mod synth;
+mod text_clouds;
 mod tour;
 mod transforms;
 #[path = "../../crates/posescope-core/tests/it/two_walls.rs"]

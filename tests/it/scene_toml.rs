@@ -16,7 +16,7 @@ use crate::damage::open;
 use crate::small_sequence::wall;
 
 /// Where the map's frame begins: coordinates as surveyors have them.
-const ORIGIN: [f64; 3] = [500_123.0, 5_400_456.0, 310.0];
+pub const ORIGIN: [f64; 3] = [500_123.0, 5_400_456.0, 310.0];
 
 const SIMPLE: &str = "\
 images = \"photos/*.png\"
@@ -48,7 +48,7 @@ pub fn write(folder: &Path) {
 }
 
 /// A wall 10 m ahead of the first photo, in the frame of the map, on a grid of half a metre.
-fn points() -> Vec<[f64; 3]> {
+pub fn points() -> Vec<[f64; 3]> {
     let rows = (-6..=6).flat_map(|row| (-16..=16).map(move |column| (column, row)));
     rows.map(|(column, row)| {
         let [x, y, z] = ORIGIN;
@@ -58,7 +58,7 @@ fn points() -> Vec<[f64; 3]> {
 }
 
 /// The points of the wall that frame 0 has in view are where its camera sees them.
-fn expect_the_wall(scene: &dyn Scene, tolerance_m: f32) {
+pub fn expect_the_wall(scene: &dyn Scene, tolerance_m: f32) {
     let cloud = scene.cloud(0).unwrap_or_else(|error| panic!("{error}"));
     let camera = scene.intrinsics(0);
     let mut expected: Vec<Point3<f32>> = points()
@@ -211,13 +211,15 @@ fn pcd(data: &str) -> Vec<u8> {
     bytes
 }
 
-fn las(path: &Path) {
+pub fn las(path: &Path, before: &[[f64; 3]]) {
     let mut builder = Builder::from((1, 4));
     let is_layered = path.file_stem().is_some_and(|stem| stem == "layered");
     builder.point_format = Format::new(if is_layered { 7 } else { 0 }).expect("a format");
     builder.point_format.is_compressed = path.extension().is_some_and(|end| end == "laz");
     for (axis, offset) in ORIGIN.into_iter().enumerate() {
-        let transform = las::Transform { scale: 0.001, offset };
+        // Whole numbers of 32 bits reach no further.
+        let scale = if before.is_empty() { 0.001 } else { 0.01 };
+        let transform = las::Transform { scale, offset };
         match axis {
             0 => builder.transforms.x = transform,
             1 => builder.transforms.y = transform,
@@ -226,7 +228,7 @@ fn las(path: &Path) {
     }
     let header = builder.into_header().expect("a header");
     let mut writer = LasWriter::from_path(path, header).expect("writable");
-    for [x, y, z] in points() {
+    for [x, y, z] in [before, &points()].concat() {
         let point = LasPoint {
             x,
             y,
@@ -239,6 +241,25 @@ fn las(path: &Path) {
     }
     writer.close().expect("writable");
 }
+
+type TextLine = fn(usize, [f64; 3]) -> String;
+
+/// The wall as text: the name of a file, what precedes its points, and a point.
+const TEXTS: [(&str, &str, TextLine); 4] = [
+    ("header.csv", "ring,x,y,z\n", |at, [x, y, z]| format!("{},{x:.1},{y:.1},{z:.1}\n", at % 7)),
+    ("scan.pts", "COUNT\n", |_, [x, y, z]| format!("{x:.1} {y:.1} {z:.1} 0 1 2 3\n")),
+    (
+        "scan.ptx",
+        "1\nCOUNT\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n500000 0 0 1\n",
+        |_, [x, y, z]| format!("{:.1} {y:.1} {z:.1} 0.5\n", x - 500_000.0),
+    ),
+    (
+        "lists.ply",
+        "ply\nformat ascii 1.0\nelement vertex COUNT\nproperty double x\nproperty double y\n\
+      property double z\nproperty list uchar uint views\nend_header\n",
+        |at, [x, y, z]| format!("{x:.1} {y:.1} {z:.1} {}\n", ["0", "1 5", "2 5 6"][at % 3]),
+    ),
+];
 
 /// All clouds that can be read, in a folder.
 pub fn write_clouds(folder: &Path) -> Vec<String> {
@@ -253,8 +274,15 @@ pub fn write_clouds(folder: &Path) -> Vec<String> {
         fs::write(folder.join(&name), pcd(data)).expect("writable");
         names.push(name);
     }
+    for (name, before, line) in TEXTS {
+        let points = points();
+        let rows = points.iter().enumerate().map(|(at, [x, y, z])| line(at, [*x, *y, *z]));
+        let before = before.replace("COUNT", &points.len().to_string());
+        fs::write(folder.join(name), before + &rows.collect::<String>()).expect("writable");
+        names.push(name.to_owned());
+    }
     for name in ["map.las", "map.laz", "layered.laz"] {
-        las(&folder.join(name));
+        las(&folder.join(name), &[]);
         names.push(name.to_owned());
     }
     names
@@ -277,7 +305,7 @@ fn every_frame_may_have_a_cloud_of_its_own() {
     write(folder.path());
     let scans = folder.path().join("scans");
     fs::create_dir_all(&scans).expect("writable");
-    fs::write(scans.join("img0.xyz"), "0 0 9\n1, 2, 3\n").expect("writable");
+    fs::write(scans.join("img0.xyz"), "0, 0, 9\n1, 2, 3\n").expect("writable");
     fs::write(scans.join("img2.xyz"), "//X Y Z\n5;6;7\n").expect("writable");
     let described = |more: &str| {
         with(folder.path(), "cloud = \"map.xyz\"\n", "");
@@ -378,6 +406,7 @@ fn what_is_wrong_with_a_description_is_named_with_its_line() {
         map.xyz | text 1 2 3\n1 2 x\n | map.xyz:2 ~ `x`
         map.xyz | text heading\n | map.xyz ~ none found
         map.xyz | text \x00\x00\x00 | map.xyz ~ PLY, PCD
+        map.xyz | text ASTM-E57\x01\x00 | map.xyz ~ E57 found ~ pdal translate
         map.xyz | text LASF | map.xyz ~ LAS
         "#,
     );
@@ -399,12 +428,13 @@ fn a_damaged_cloud_is_named_and_a_length_in_it_is_not_believed() {
             .replace("DATA ascii", &format!("DATA {data}"))
     };
     assert!(huge_pcd("ascii").contains("4000000000000000000"));
-    let list = header("1", &format!("{xyz}property list uint float more\n"));
+    let list = header("1", &format!("property list uint float more\n{xyz}"));
+    let list = list + &"\u{7f}".repeat(4);
     let far_too_many = "4000000000000000000 points";
     for (name, content, words) in [
         ("a.ply", header("4000000000", xyz), "4000000000 points"),
         ("b.ply", header("1", "property float x\n"), "`y`"),
-        ("c.ply", list, "`more` is a list"),
+        ("c.ply", list, "a list of 2139062143 numbers expected"),
         ("d.ply", "ply\nformat ascii 1.0\n".to_owned(), "d.ply"),
         ("a.pcd", huge_pcd("ascii"), far_too_many),
         ("b.pcd", huge_pcd("binary"), far_too_many),
@@ -422,7 +452,7 @@ fn the_length_of_a_compressed_layer_is_not_believed() {
     let folder = TempDir::new().expect("a folder");
     write(folder.path());
     let path = folder.path().join("layered.laz");
-    las(&path);
+    las(&path, &[]);
     let mut bytes = fs::read(&path).expect("just written");
     let points = u32::from_le_bytes([96, 97, 98, 99].map(|at: usize| bytes[at])) as usize;
     // Where the table of chunks is, the first point, how many there are, the length of the first layer.

@@ -102,6 +102,11 @@ pub trait Scene: Send + Sync {
         Lengths::Street
     }
 
+    /// What is known of the clouds' files, once a cloud was read.
+    fn cloud_facts(&self) -> CloudFacts {
+        CloudFacts::default()
+    }
+
     /// The scene as one whose photos are degraded, if they are.
     fn as_degraded(&self) -> Option<&DegradedScene> {
         None
@@ -122,6 +127,24 @@ pub trait PixelMap: Send + Sync {
 
     /// The pixel of the file for one of the photo.
     fn to_file(&self, in_photo: Point2<f64>) -> Point2<f64>;
+}
+
+/// What the files of clouds say beside their points.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct CloudFacts {
+    /// The step of the coordinates \[m\], if it is so coarse that clouds and photos cannot be compared.
+    pub coarse_step_m: Option<f64>,
+    /// The one cloud of all frames, before anything was left out that a camera does not see.
+    pub map: Option<MapFacts>,
+}
+
+/// A cloud in the world's frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MapFacts {
+    /// The number of its points.
+    pub points: usize,
+    /// The least and the greatest x, y and z \[m\].
+    pub extent: [(f64, f64); 3],
 }
 
 /// What the lengths of a scene are.

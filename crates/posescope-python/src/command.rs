@@ -28,7 +28,7 @@ pub fn main(py: Python<'_>, arguments: Vec<OsString>) -> u8 {
 #[pyfunction]
 pub fn doctor<'py>(py: Python<'py>, scene: &Scene) -> PyResult<Bound<'py, PyDict>> {
     let scene = scene.opened.scene.as_ref();
-    let found = detached(py, None, |_| examine(scene))?.map_err(|error| errors::scene(&error))?;
+    let found = detached(py, None, |_| examine(scene))?;
     let dict = PyDict::new(py);
     let Examination { remarks, finding, picture, .. } = &found;
     dict.set_item("is_broken", found.is_broken())?;

@@ -9,7 +9,7 @@ use std::path::Path;
 use las::{Header, Reader};
 use laz::{LazItem, LazItemType, LazVlr};
 
-use super::{MapCloud, expect_room};
+use super::{Collector, MapCloud, expect_room};
 
 /// Points per decoded batch.
 const BATCH: u64 = 65_536;
@@ -55,11 +55,11 @@ fn decoded(path: &Path, size: u64) -> Result<MapCloud, String> {
     }
     file.rewind().map_err(|error| error.to_string())?;
     let mut reader = Reader::new(file).map_err(text)?;
-    let mut cloud = MapCloud::default();
+    let mut cloud = Collector::default();
     loop {
         let batch = reader.read_points(BATCH).map_err(text)?;
         if batch.is_empty() {
-            return Ok(cloud);
+            return Ok(cloud.finish());
         }
         for ((x, y), z) in batch.x().zip(batch.y()).zip(batch.z()) {
             cloud.add([x, y, z])?;

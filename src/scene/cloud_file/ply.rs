@@ -1,101 +1,199 @@
 //! PLY: text, and binary in both byte orders.
+//!
+//! A library reads the header. We read the elements ourselves: the library refuses `nan` in text, and believes the
+//! length of each list.
 
 use std::fs::File;
-use std::io::{BufRead as _, BufReader};
+use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 
 use ply_rs_bw::parser::Parser;
-use ply_rs_bw::ply::{ElementDef, Encoding, Property, PropertyAccess, PropertyType, ScalarType};
+use ply_rs_bw::ply::{DefaultElement, ElementDef, Encoding, PropertyType, ScalarType};
 
-use super::{MapCloud, expect_room};
+use super::super::lines::excerpt;
+use super::{Collector, MapCloud, expect_room};
 
-/// The position of a vertex; other properties are ignored.
-#[derive(Default)]
-struct Vertex([f64; 3]);
-
-impl PropertyAccess for Vertex {
-    fn new() -> Self {
-        Self::default()
-    }
-
-    fn set_property(&mut self, name: &str, value: Property) {
-        let axis = match name {
-            "x" => 0,
-            "y" => 1,
-            "z" => 2,
-            _ => return,
-        };
-        self.0[axis] = match value {
-            Property::Float(value) => f64::from(value),
-            Property::Double(value) => value,
-            Property::Int(value) => f64::from(value),
-            Property::UInt(value) => f64::from(value),
-            Property::Short(value) => f64::from(value),
-            Property::UShort(value) => f64::from(value),
-            Property::Char(value) => f64::from(value),
-            Property::UChar(value) => f64::from(value),
-            _ => f64::NAN,
-        };
-    }
-}
-
-/// Reads the vertices one by one. They must be the first element.
+/// Reads the vertices one by one; other properties and other elements are skipped.
 pub(super) fn read(path: &Path, size: u64) -> Result<MapCloud, String> {
     let text = |error: std::io::Error| error.to_string();
     let mut reader = BufReader::new(File::open(path).map_err(text)?);
-    let parser = Parser::<Vertex>::new();
-    let header = parser.read_header(&mut reader).map_err(text)?;
-    let Some(vertex) = header.elements.values().next().filter(|e| e.name == "vertex") else {
-        return Err("`element vertex` expected as the first element".to_owned());
-    };
-    for axis in ["x", "y", "z"] {
-        if !vertex.properties.contains_key(axis) {
-            return Err(format!("a property `{axis}` of the vertices expected"));
+    let header = Parser::<DefaultElement>::new().read_header(&mut reader).map_err(text)?;
+    let mut elements = Elements { reader, encoding: header.encoding, bytes: Vec::new() };
+    for element in header.elements.values() {
+        let least = least_bytes(element, header.encoding);
+        expect_room(element.count as u64, least, size)?;
+        let axes =
+            ["x", "y", "z"].map(|axis| element.properties.keys().position(|name| name == axis));
+        if element.name != "vertex" {
+            elements.skip(element)?;
+            continue;
         }
-    }
-    expect_room(vertex.count as u64, least_bytes(vertex, header.encoding)?, size)?;
-    let mut cloud = MapCloud::default();
-    let mut line = String::new();
-    for index in 0..vertex.count {
-        let read = match header.encoding {
-            Encoding::Ascii => {
-                line.clear();
-                match reader.read_line(&mut line) {
-                    Ok(0) => {
-                        return Err(format!("{} vertices expected, {index} found", vertex.count));
-                    }
-                    Ok(_) => parser.read_ascii_element(&line, vertex),
-                    Err(error) => Err(error),
-                }
-            }
-            Encoding::BinaryBigEndian => parser.read_big_endian_element(&mut reader, vertex),
-            Encoding::BinaryLittleEndian => parser.read_little_endian_element(&mut reader, vertex),
+        let [Some(x), Some(y), Some(z)] = axes else {
+            let missing = ["x", "y", "z"].iter().zip(axes).find(|(_, at)| at.is_none());
+            let axis = missing.map_or("x", |(axis, _)| axis);
+            return Err(format!("a property `{axis}` of the vertices expected"));
         };
-        let Vertex(position) = read.map_err(|error| format!("vertex {index}: {error}"))?;
-        cloud.add(position)?;
+        let mut cloud = Collector::default();
+        elements.each(element, [x, y, z], |point| cloud.add(point))?;
+        return Ok(cloud.finish());
     }
-    Ok(cloud)
+    Err("`element vertex` expected".to_owned())
 }
 
-/// The smallest size of a vertex \[bytes\]. Lists are refused: clouds have none, and their lengths would have to be
-/// checked too.
-fn least_bytes(vertex: &ElementDef, encoding: Encoding) -> Result<u64, String> {
-    vertex
-        .properties
-        .values()
-        .map(|property| match (&property.data_type, encoding) {
-            (PropertyType::List(..), _) => Err(format!(
-                "only numbers as properties of the vertices expected, `{}` is a list",
-                property.name
+/// The elements of a file, in their order.
+struct Elements {
+    reader: BufReader<File>,
+    encoding: Encoding,
+    bytes: Vec<u8>,
+}
+
+impl Elements {
+    fn skip(&mut self, element: &ElementDef) -> Result<(), String> {
+        self.each(element, [usize::MAX; 3], |_| Ok(()))
+    }
+
+    /// Hands over the numbers at three positions among the properties of each element.
+    fn each(
+        &mut self,
+        element: &ElementDef,
+        places: [usize; 3],
+        mut take: impl FnMut([f64; 3]) -> Result<(), String>,
+    ) -> Result<(), String> {
+        let kinds: Vec<&PropertyType> =
+            element.properties.values().map(|property| &property.data_type).collect();
+        for index in 0..element.count {
+            let read = match self.encoding {
+                Encoding::Ascii => self.text_element(&kinds, places),
+                _ => self.binary_element(&kinds, places),
+            };
+            let numbers = read.map_err(|why| format!("{} {index}: {why}", element.name))?;
+            take(numbers)?;
+        }
+        Ok(())
+    }
+
+    fn text_element(
+        &mut self,
+        kinds: &[&PropertyType],
+        places: [usize; 3],
+    ) -> Result<[f64; 3], String> {
+        self.bytes.clear();
+        let read = self.reader.read_until(b'\n', &mut self.bytes);
+        if read.map_err(|error| error.to_string())? == 0 {
+            return Err("one line per element expected, the file is cut off".to_owned());
+        }
+        let line = std::str::from_utf8(&self.bytes).map_err(|_| "a line of numbers expected")?;
+        let mut words = line.split_ascii_whitespace();
+        let mut next = || words.next().ok_or("more numbers in its line expected");
+        let mut numbers = [f64::NAN; 3];
+        for (at, kind) in kinds.iter().enumerate() {
+            let word = next()?;
+            match kind {
+                PropertyType::Scalar(_) => {
+                    if let Some(axis) = places.iter().position(|place| *place == at) {
+                        numbers[axis] = word.parse().or_else(|_| no_number(word))?;
+                    }
+                }
+                PropertyType::List(..) => {
+                    let length: usize = word.parse().map_err(|_| {
+                        format!("the length of a list expected, `{}` found", excerpt(word))
+                    })?;
+                    for _ in 0..length {
+                        next()?;
+                    }
+                }
+            }
+        }
+        match words.next() {
+            Some(word) => Err(format!(
+                "{} properties in its line expected, then `{}` found",
+                kinds.len(),
+                excerpt(word)
             )),
-            // A digit and a separator.
-            (PropertyType::Scalar(_), Encoding::Ascii) => Ok(2),
-            (PropertyType::Scalar(kind), _) => Ok(match kind {
-                ScalarType::Char | ScalarType::UChar => 1,
-                ScalarType::Short | ScalarType::UShort => 2,
-                ScalarType::Int | ScalarType::UInt | ScalarType::Float => 4,
-                ScalarType::Double => 8,
-            }),
+            None => Ok(numbers),
+        }
+    }
+
+    fn binary_element(
+        &mut self,
+        kinds: &[&PropertyType],
+        places: [usize; 3],
+    ) -> Result<[f64; 3], String> {
+        let mut numbers = [f64::NAN; 3];
+        for (at, kind) in kinds.iter().enumerate() {
+            match kind {
+                PropertyType::Scalar(kind) => {
+                    let value = self.binary_number(kind)?;
+                    if let Some(axis) = places.iter().position(|place| *place == at) {
+                        numbers[axis] = value;
+                    }
+                }
+                PropertyType::List(length, kind) => {
+                    let length = self.binary_number(length)?;
+                    if length < 0.0 {
+                        return Err(format!("the length of a list expected, {length} found"));
+                    }
+                    let bytes = (length as u64).saturating_mul(bytes_of(kind));
+                    let mut list = (&mut self.reader).take(bytes);
+                    let skipped = std::io::copy(&mut list, &mut std::io::sink());
+                    if skipped.map_err(|error| error.to_string())? < bytes {
+                        return Err(format!(
+                            "a list of {length} numbers expected, the file is cut off"
+                        ));
+                    }
+                }
+            }
+        }
+        Ok(numbers)
+    }
+
+    fn binary_number(&mut self, kind: &ScalarType) -> Result<f64, String> {
+        let mut bytes = [0; 8];
+        let bytes = &mut bytes[..bytes_of(kind) as usize];
+        self.reader.read_exact(bytes).map_err(|_| "more bytes expected, the file is cut off")?;
+        // The number is then in the first bytes, the least significant first.
+        if self.encoding == Encoding::BinaryBigEndian {
+            bytes.reverse();
+        }
+        Ok(match *bytes {
+            [a] if *kind == ScalarType::Char => f64::from(i8::from_le_bytes([a])),
+            [a] => f64::from(a),
+            [a, b] if *kind == ScalarType::Short => f64::from(i16::from_le_bytes([a, b])),
+            [a, b] => f64::from(u16::from_le_bytes([a, b])),
+            [a, b, c, d] => match kind {
+                ScalarType::Int => f64::from(i32::from_le_bytes([a, b, c, d])),
+                ScalarType::UInt => f64::from(u32::from_le_bytes([a, b, c, d])),
+                _ => f64::from(f32::from_le_bytes([a, b, c, d])),
+            },
+            [a, b, c, d, e, f, g, h] => f64::from_le_bytes([a, b, c, d, e, f, g, h]),
+            _ => f64::NAN,
         })
-        .sum()
+    }
+}
+
+/// NaN for `-nan(ind)` and such, which the libraries of Windows write.
+fn no_number(word: &str) -> Result<f64, String> {
+    super::text::number(word, false).ok_or_else(|| {
+        let hint = if word.contains(',') { "; write decimal points, not commas" } else { "" };
+        format!("a number expected, `{}` found{hint}", excerpt(word))
+    })
+}
+
+/// The smallest size of an element \[bytes\].
+fn least_bytes(element: &ElementDef, encoding: Encoding) -> u64 {
+    let least = |kind: &PropertyType| match (kind, encoding) {
+        // A digit and a separator.
+        (_, Encoding::Ascii) => 2,
+        (PropertyType::Scalar(kind) | PropertyType::List(kind, _), _) => bytes_of(kind),
+    };
+    element.properties.values().map(|property| least(&property.data_type)).sum()
+}
+
+fn bytes_of(kind: &ScalarType) -> u64 {
+    match kind {
+        ScalarType::Char | ScalarType::UChar => 1,
+        ScalarType::Short | ScalarType::UShort => 2,
+        ScalarType::Int | ScalarType::UInt | ScalarType::Float => 4,
+        ScalarType::Double => 8,
+    }
 }

@@ -69,6 +69,9 @@ macro_rules! inner_scene {
     (@ $scene:tt lengths) => {
         $crate::inner_scene!(@ $scene lengths() -> $crate::scene::Lengths);
     };
+    (@ $scene:tt cloud_facts) => {
+        $crate::inner_scene!(@ $scene cloud_facts() -> $crate::scene::CloudFacts);
+    };
     (@ $scene:tt as_degraded) => {
         $crate::inner_scene!(@ $scene as_degraded() -> Option<&$crate::scene::DegradedScene>);
     };
