@@ -214,7 +214,7 @@ fn out_of_view(map: &MapFacts, poses: &[Option<Pose>], frame: &str) -> String {
             .join(", ")
     };
     format!(
-        "none of the {} points of the map is in view, neither of frame {frame} nor of the others examined; the map \
+        "none of the {} points of the map is in view, for example of frame {frame}; the map \
          spans {}; the poses {}; {}",
         grouped(map.points as f64, 0),
         spans(&map.extent),

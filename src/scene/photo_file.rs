@@ -27,15 +27,10 @@ pub(super) fn common_size<'a>(photos: &'a [PathBuf]) -> Result<((u32, u32), &'a 
     let steps = photos.len().div_ceil(SAMPLE).max(1);
     let sizes = |path: &'a PathBuf| Some((dimensions(path).ok()?, path.as_path()));
     let read: Vec<((u32, u32), &Path)> = photos.iter().step_by(steps).filter_map(sizes).collect();
-    let mut common: Option<(usize, ((u32, u32), &Path))> = None;
-    for found in &read {
-        let count = read.iter().filter(|(size, _)| *size == found.0).count();
-        if common.is_none_or(|(most, _)| count > most) {
-            common = Some((count, *found));
-        }
-    }
-    match common {
-        Some((_, found)) => Ok(found),
+    let count = |size: (u32, u32)| read.iter().filter(|(other, _)| *other == size).count();
+    let most = read.iter().map(|(size, _)| count(*size)).max();
+    match read.iter().find(|(size, _)| Some(count(*size)) == most) {
+        Some(found) => Ok(*found),
         None => Ok((dimensions(&photos[0])?, &photos[0])),
     }
 }

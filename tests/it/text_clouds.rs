@@ -177,10 +177,18 @@ fn what_can_be_read_in_two_ways_is_refused() {
         "691,234.5 5,334,567.1 512.0\n691,235.5 5,334,568.1 512.1\n",
         "lines `x y z` expected",
     );
-    is_refused("1 2 3\n4,5,6\n", "a.txt:2 ~ `4,5,6` found; write decimal points");
-    is_refused("1,2,3\n4 5 6\n", "a.txt:1: the separators of the lines below expected");
-    is_refused("1 2 3\n4,5 6,5 7,5\n", "a.txt:2");
-    is_refused("1,5 2,5 3,5\n1.5 2.5 3.5 1,234.5\n1.5 x 2\n", "a.txt:3");
+    for (mixed, word) in [
+        ("1 2 3\n4,5,6\n7 8 9\n", "4,5,6"),
+        ("1 2 3\n4,5,6\n4,5,6\n", "4,5,6"),
+        ("1,5 2,5 3,5\n1.5 2.5 3.5\n", "1.5"),
+        ("1.5 2.5 3.5\n1,5 2,5 3,5\n", "1,5"),
+    ] {
+        is_refused(
+            mixed,
+            &format!("a.txt:2: a number expected, `{word}` found; write all numbers"),
+        );
+    }
+    is_refused("1,2,3\n4 5 6\n", "a.txt:2: a number expected, `4 5 6` found");
     is_refused("1,2,3\n1,,3\n", "a.txt:2: a number expected, an empty column found");
     is_refused("1 2 3\r4 5 6\r", "carriage returns found");
     is_refused("\u{1}\u{2}", "lines `x y z` expected");

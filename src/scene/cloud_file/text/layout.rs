@@ -36,20 +36,17 @@ impl Layout {
                 }
             }
         }
+        // What a dialect takes for titles must not be points in another one.
+        let earliest = tried.iter().map(|attempt| attempt.layout.first).min();
+        tried.retain(|attempt| Some(attempt.layout.first) == earliest);
         let reach = |attempt: &Attempt| attempt.broken.as_ref().map_or(usize::MAX, |(at, _)| *at);
         let furthest = tried.iter().map(reach).max();
         let Some(best) = tried.iter().position(|attempt| Some(reach(attempt)) == furthest) else {
             return Ok(None);
         };
-        let earliest = tried.iter().map(|attempt| attempt.layout.first).min();
         let Attempt { layout, broken, thousands } = tried.swap_remove(best);
         if let Some(refusal) = broken {
             return Err(refusal);
-        }
-        // A title must not be a point in other words.
-        if let Some(earlier) = earliest.filter(|line| *line < layout.first) {
-            let expected = "the separators of the lines below expected, others found";
-            return Err((earlier, expected.to_owned()));
         }
         if let Some(refusal) = thousands {
             return Err(refusal);
@@ -83,8 +80,10 @@ impl Layout {
 
     fn expected_number(&self, word: &str) -> String {
         let expected = expected_number(word);
-        if word.contains(',') && !self.has_decimal_comma {
-            return format!("{expected}; write decimal points, and separate columns by one sign");
+        if word.contains([',', '.']) {
+            return format!(
+                "{expected}; write all numbers with decimal points, and separate all columns by one sign"
+            );
         }
         expected
     }
@@ -285,9 +284,7 @@ impl Header {
         let words: Vec<&str> = separator
             .words(bare)
             // Units in words of their own, and a word such as `columns:`.
-            .filter(|word| {
-                !word.starts_with(['[', '(']) && !(word.ends_with(':') && word.len() > 1)
-            })
+            .filter(|word| !(word.starts_with(['[', '(']) || word.ends_with(':') && word.len() > 1))
             .collect();
         let names: Vec<String> = words.iter().map(|word| name(word)).collect();
         let place = |called: &str| names.iter().position(|name| name == called);

@@ -13,8 +13,9 @@ const HEADER: usize = 10;
 
 /// Whether a file begins like a scan.
 pub(super) fn is_ptx(lines: &[String]) -> bool {
-    let count =
-        |line: &String| Separator::Blanks.words(line).map(|word| number(word, false)).count();
+    let count = |line: &String| {
+        Separator::Blanks.words(line).filter(|word| number(word, false).is_some()).count()
+    };
     lines.len() >= HEADER
         && lines[..2].iter().all(|line| lone_count(line).is_some())
         && lines[2..6].iter().all(|line| count(line) == 3)

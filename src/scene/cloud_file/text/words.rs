@@ -71,8 +71,8 @@ pub(super) fn lone_count(line: &str) -> Option<u64> {
 /// The number of a word; NaN for what programs write in place of one.
 pub(in crate::scene::cloud_file) fn number(word: &str, has_decimal_comma: bool) -> Option<f64> {
     let word = word.trim_matches('"');
-    if has_decimal_comma && word.contains(',') {
-        // Both signs, or several commas, are those of thousands.
+    if has_decimal_comma && word.contains([',', '.']) && !is_no_number(word) {
+        // Points, or several commas, are those of thousands.
         let is_decimal = !word.contains('.') && word.matches(',').count() == 1;
         return is_decimal.then(|| word.replace(',', ".").parse().ok())?;
     }
