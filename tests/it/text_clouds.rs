@@ -301,6 +301,7 @@ fn scans_of_ptx_are_moved_to_the_world() {
     let moved: Vec<[f64; 3]> = second.iter().map(|[x, y, z]| [5.0 - y, *x, *z]).collect();
     let both = ptx(4, 5, first, UPRIGHT) + &ptx(1, 60, second, TURNED);
     is_read_of("a.ptx", &both, &[first, &moved].concat());
+    is_read_of("a.ptx", format!("\n{both}"), &[first, &moved].concat());
     let transposed = "0 -1 0 5\n1 0 0 0\n0 0 1 0\n0 0 0 1\n";
     is_refused(ptx(2, 40, &all, transposed), "the position as its last row");
     is_refused(ptx(3, 40, &all, UPRIGHT), "120 points of a scan expected, 80 found");

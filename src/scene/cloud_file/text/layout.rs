@@ -240,7 +240,10 @@ impl Dialect {
         let words = || points.iter().flatten();
         let is_cut = |word: &&&str| {
             let digits = word.trim_start_matches(['-', '+']).as_bytes();
-            digits.len() > 1 && digits[0] == b'0' && digits[1].is_ascii_digit()
+            digits.len() > 1
+                && digits[0] == b'0'
+                && digits[1].is_ascii_digit()
+                && word.parse::<f64>().is_ok()
         };
         let halves = |line: &Vec<&str>| {
             line.chunks(2).take(3).all(|two| two.get(1).is_some_and(|word| !word.starts_with('-')))

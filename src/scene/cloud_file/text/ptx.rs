@@ -13,13 +13,15 @@ const HEADER: usize = 10;
 
 /// Whether a file begins like a scan.
 pub(super) fn is_ptx(lines: &[String]) -> bool {
-    let count = |line: &String| {
-        Separator::Blanks.words(line).filter(|word| number(word, false).is_some()).count()
+    let lines: Vec<&String> = lines.iter().filter(|line| !is_comment(line)).take(HEADER).collect();
+    let has = |line: &String, count: usize| {
+        let mut words = Separator::Blanks.words(line).map(|word| number(word, false));
+        words.all(|number| number.is_some()) && Separator::Blanks.words(line).count() == count
     };
-    lines.len() >= HEADER
+    lines.len() == HEADER
         && lines[..2].iter().all(|line| lone_count(line).is_some())
-        && lines[2..6].iter().all(|line| count(line) == 3)
-        && lines[6..HEADER].iter().all(|line| count(line) == 4)
+        && lines[2..6].iter().all(|line| has(line, 3))
+        && lines[6..].iter().all(|line| has(line, 4))
 }
 
 /// Reads all scans.
