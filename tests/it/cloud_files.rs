@@ -35,9 +35,12 @@ fn lists_and_other_elements_of_ply_are_skipped() {
         let mut bytes =
             format!("ply\nformat {byte_order} 1.0\n{camera}{vertex}{faces}end_header\n")
                 .into_bytes();
-        let number = |bytes: &mut Vec<u8>, le: &[u8]| match is_little {
-            true => bytes.extend(le),
-            false => bytes.extend(le.iter().rev()),
+        let number = |bytes: &mut Vec<u8>, le: &[u8]| {
+            let mut number = le.to_vec();
+            if !is_little {
+                number.reverse();
+            }
+            bytes.extend(number);
         };
         for length in [0_i32, 3] {
             number(&mut bytes, &1.5_f32.to_le_bytes());
