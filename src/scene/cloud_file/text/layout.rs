@@ -32,7 +32,7 @@ impl Layout {
                 // Commas cannot be both.
                 if !(has_decimal_comma && separator == Separator::Comma) {
                     let dialect = Dialect { separator, has_decimal_comma };
-                    tried.extend(dialect.attempt(sample)?);
+                    tried.extend(dialect.attempt(sample));
                 }
             }
         }
@@ -44,14 +44,8 @@ impl Layout {
         let Some(best) = tried.iter().position(|attempt| Some(reach(attempt)) == furthest) else {
             return Ok(None);
         };
-        let Attempt { layout, broken, thousands } = tried.swap_remove(best);
-        if let Some(refusal) = broken {
-            return Err(refusal);
-        }
-        if let Some(refusal) = thousands {
-            return Err(refusal);
-        }
-        Ok(Some(layout))
+        let Attempt { layout, broken, doubt } = tried.swap_remove(best);
+        broken.or(doubt).map_or(Ok(Some(layout)), Err)
     }
 
     /// The point of a line \[m\].
@@ -101,8 +95,8 @@ struct Attempt {
     layout: Layout,
     /// The first line that is none in this dialect.
     broken: Option<Refusal>,
-    /// A decimal comma that may be a separator of thousands, if all may.
-    thousands: Option<Refusal>,
+    /// Why its points may mean something else.
+    doubt: Option<Refusal>,
 }
 
 impl Dialect {
@@ -120,7 +114,7 @@ impl Dialect {
     }
 
     /// Reads the first lines in this dialect; `None` if none of them is a point.
-    fn attempt(self, sample: &[String]) -> Result<Option<Attempt>, Refusal> {
+    fn attempt(self, sample: &[String]) -> Option<Attempt> {
         let mut header = None;
         let mut count = None;
         let lines = sample.iter().map(String::as_str).enumerate();
@@ -143,21 +137,14 @@ impl Dialect {
             }
             let width = self.words(line).count();
             let titles = lines.clone().take(at).filter(|(_, line)| !is_comment(line));
-            let columns = match &header {
-                Some((named_at, header)) => header
-                    .columns(sample[*named_at].as_str(), width)
-                    .map_err(|expected| (*named_at, expected))?,
-                None => {
-                    if let Some(unnamed) = titles.clone().map(|(at, _)| at).find(|title| {
-                        let shape = self.shape(&sample[*title]);
-                        shape.len() == width && shape.iter().all(|is_number| !is_number)
-                    }) {
-                        let expected = "a header with x, y and z expected, other names found; call the columns of the \
-                                        coordinates x, y and z, or delete the line";
-                        return Err((unnamed, expected.to_owned()));
-                    }
-                    None
-                }
+            let named = header.as_ref().map(|(named_at, header)| {
+                let columns = header.columns(&sample[*named_at], width);
+                columns.map_err(|expected| (*named_at, expected))
+            });
+            let (columns, misnamed) = match named {
+                Some(Ok(columns)) => (columns, None),
+                Some(Err(refusal)) => (None, Some(refusal)),
+                None => (None, self.unnamed(titles, width)),
             };
             let is_named = columns.is_some();
             let columns = columns.unwrap_or([0, 1, 2]);
@@ -179,13 +166,10 @@ impl Dialect {
             };
             let broken = points()
                 .find_map(|(at, line)| layout.point(line).err().map(|expected| (at, expected)));
-            if broken.is_none() && !is_named {
-                let all: Vec<Vec<&str>> =
-                    points().map(|(_, line)| self.words(line).collect()).collect();
-                if let Some(expected) = self.ambiguous(&all, width) {
-                    return Err((at, expected));
-                }
-            }
+            let ambiguous = (broken.is_none() && !is_named).then(|| {
+                let points = points().map(|(_, line)| self.words(line).collect());
+                Some((at, self.ambiguous(&points.collect::<Vec<Vec<&str>>>(), width)?))
+            });
             let thousands = self.has_decimal_comma.then(|| {
                 let words = points().flat_map(|(_, line)| self.words(line));
                 let mut commas = words.filter(|word| word.contains(',')).peekable();
@@ -196,9 +180,25 @@ impl Dialect {
                 );
                 is_open.then_some((at, expected))
             });
-            return Ok(Some(Attempt { layout, broken, thousands: thousands.flatten() }));
+            let doubt = misnamed.or(ambiguous.flatten()).or(thousands.flatten());
+            return Some(Attempt { layout, broken, doubt });
         }
-        Ok(None)
+        None
+    }
+
+    /// The title that has a word for each column, but not x, y and z.
+    fn unnamed<'a>(
+        self,
+        mut titles: impl Iterator<Item = (usize, &'a str)>,
+        width: usize,
+    ) -> Option<Refusal> {
+        let (at, _) = titles.find(|(_, title)| {
+            let shape = self.shape(title);
+            shape.len() == width && shape.iter().all(|is_number| !is_number)
+        })?;
+        let expected = "a header with x, y and z expected, other names found; call the columns of the coordinates \
+                        x, y and z, or delete the line";
+        Some((at, expected.to_owned()))
     }
 
     /// Whether a line is a point: its coordinates are numbers, and so are all its columns, or else those of the
