@@ -260,3 +260,24 @@ fn advice_about_given_matches_names_no_parameter_of_our_own_features() {
     );
     assert!(!said.out.contains("surf."), "{}", said.out);
 }
+
+#[test]
+fn keypoints_of_resized_photos_are_named_with_the_factor() {
+    let folder = TempDir::new().expect("a folder");
+    let line = "run street --query 70 --reference 62 --method fb --export-matches .";
+    assert_eq!(run_in(folder.path(), line).code, Some(0));
+    let path = folder.path().join("000070_000062_matches.txt");
+    let text = fs::read_to_string(&path).expect("our own");
+    let half = |line: &str| {
+        let numbers = line.split(' ').map(|word| word.parse::<f32>().expect("a number") / 2.0);
+        numbers.map(|number| number.to_string()).collect::<Vec<_>>().join(" ") + "\n"
+    };
+    let lines = text.lines().filter(|line| !line.starts_with('#'));
+    write(&path, lines.map(half).collect::<String>());
+    let line = "run street --query 70 --reference 62 --method fb --matches .";
+    let said = run_in(folder.path(), line).out;
+    has(&said, "X1 The matches seem to be of photos resized by about 0.49");
+    // The matches themselves are those of no resized photo.
+    write(&path, text);
+    assert!(!run_in(folder.path(), line).out.contains("resized"));
+}

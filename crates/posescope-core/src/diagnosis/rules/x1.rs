@@ -1,10 +1,12 @@
 //! X1: the ground truth, a calibration or the units are suspect.
 
 mod camera;
+mod resized;
 
 use nalgebra::{Quaternion, Translation3, UnitQuaternion};
 
 use self::camera::{camera_by_fb, camera_by_matches, camera_of_both};
+use self::resized::resized;
 use super::*;
 use crate::camera::Intrinsics;
 use crate::diagnosis::axes::other_axes;
@@ -14,6 +16,10 @@ use crate::stats::median;
 pub(super) const RULE: Rule = Rule {
     title: "a calibration, a pose convention or the ground truth is suspect",
     advice: "check calibration, pose convention and units; `posescope doctor` does",
+    advice_on: |evidence| {
+        let is_resized = evidence.pointer("/query/part").is_some();
+        is_resized.then_some("scale the keypoints to the size of the photos, or match photos of that size")
+    },
     applies_to: Family::ALL,
     needs_truth: false,
     test: Test::Method(test),
@@ -41,6 +47,10 @@ fn test(case: &Case<'_>) -> Option<Diagnosis> {
     }
     match case.family {
         Family::Features | Family::Guided => {
+            // Keypoints of a resized photo look like another camera, or like a wrong truth.
+            if let Some(found) = resized(case) {
+                return Some(found);
+            }
             let matches = case.matches()?;
             // Seen by a wrong camera, the depths of the right cloud look wrong too.
             poses(case)
