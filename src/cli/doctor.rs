@@ -141,17 +141,26 @@ pub fn report(scene: &dyn Scene, found: &Examination, width: Option<usize>) -> S
             line("answer", &format!("cannot be judged: the clouds have steps of {step} m"));
         }
         (_, None) => line("answer", "not checked: no frame has a photo, a pose and a cloud"),
-        (_, Some(Fit::Unexplained)) => line("answer", &format!("does not fit: {UNEXPLAINED}")),
+        (None, Some(Fit::Unexplained)) => line("answer", &format!("does not fit: {UNEXPLAINED}")),
+        (Some(_), Some(Fit::Unexplained)) => {
+            line(
+                "answer",
+                "does not fit as stated, and what is named above does not explain all of it",
+            );
+        }
         (Some(_), Some(_)) => line("answer", "does not fit as stated"),
-        (None, Some(Fit::Fits)) => line(
-            "answer",
-            "fits: no usual mistake explains the photos better; small errors of the calibration are not seen",
-        ),
-        (None, Some(Fit::NoSharedView)) => line(
-            "answer",
-            "cannot be judged: no two compared photos share a view, so that poses and units cannot be checked; take \
-             frames that are closer together",
-        ),
+        (None, Some(Fit::Fits)) => {
+            line(
+                "answer",
+                "fits: no usual mistake explains the photos better; small errors are not seen",
+            );
+        }
+        (None, Some(Fit::NoSharedView)) => {
+            line(
+                "answer",
+                "cannot be judged: no two compared photos share a view; take frames that are closer",
+            );
+        }
     }
     text
 }
@@ -165,8 +174,7 @@ fn numbers(agreement: &Agreement) -> String {
         value.map_or("–".to_owned(), |value| format!("{:.0} %", 100.0 * value))
     };
     format!(
-        "the poses explain {} of the features that photos share, grey values between photos correlate by {}, depth \
-         edges on image edges {} (log ratio); higher is better",
+        "the poses explain {} of shared features, grey values correlate by {}, depth edges {} (log ratio)",
         share(agreement.motions),
         number(agreement.carried.map(f64::tanh)),
         number(agreement.edges)

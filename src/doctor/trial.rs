@@ -21,9 +21,10 @@ const AS_GOOD: f64 = 0.9;
 const AS_GOOD_WITH_NUMBERS: f64 = 0.7;
 
 /// What sound scenes reach at least where photos share a view: the share of the shared features that the poses explain,
-/// and the correlation of grey values, as Fisher's z.
+/// the correlation of grey values, as Fisher's z, and the log ratio of edges.
 const FITTING_MOTIONS: f64 = 0.4;
 const FITTING_CARRIED: f64 = 0.35;
+const FITTING_EDGES: f64 = 0.1;
 
 /// A reading that fits better than the scene as stated.
 #[derive(Clone, Debug)]
@@ -66,18 +67,19 @@ impl Sample {
         /// How many mistakes are found one after the other.
         const MISTAKES: usize = 2;
         let stated = self.agreement();
-        let (mut sample, mut found) = (self, Vec::new());
+        let (mut sample, mut found, mut fit) = (self, Vec::new(), None);
         while found.len() < MISTAKES
             && let Some((finding, change)) = sample.cloud_by_motions().or_else(|| sample.best())
         {
             found.push(finding);
-            // A lens is no camera without distortion.
+            // No scene can be read with another lens, so nothing further is found.
             if matches!(change, Change::Lens(_)) {
+                fit = Some(Fit::Fits);
                 break;
             }
             sample = sample.read_as(&change);
         }
-        let fit = sample.fit();
+        let fit = fit.unwrap_or_else(|| sample.fit());
         let chained = found
             .into_iter()
             .rev()
@@ -93,8 +95,10 @@ impl Sample {
     fn fit(&self) -> Fit {
         let stated = self.agreement();
         let [pairs, shared, motions] = self.pairs();
+        // Photos that are taken close together have like grey values at any depth.
+        let has_edges = stated.edges.is_some_and(|ratio| ratio >= FITTING_EDGES);
         let fits = stated.motions.is_some_and(|share| share >= FITTING_MOTIONS)
-            || stated.carried.is_some_and(|z| z >= FITTING_CARRIED);
+            || has_edges && stated.carried.is_some_and(|z| z >= FITTING_CARRIED);
         if fits {
             Fit::Fits
         } else if pairs > 0 && 4 * shared.max(motions) >= pairs {
@@ -236,11 +240,13 @@ fn judged(reading: Reading, stated: &[Agreement], scores: &[Agreement]) -> Optio
     let (before, after) = (Agreement::mean(stated), Agreement::mean(scores));
     log::debug!("{:?} {}: {gain:?} {before:?} {after:?}", reading.mistake, reading.remedy);
     let judged = Judged { gain: gain?, reading, otherwise: after };
-    explains(&before, &after).then_some(judged)
+    explains(&before, &after, judged.reading.change.has_numbers()).then_some(judged)
 }
 
 /// Whether a reading reaches what scenes without a mistake reach, in what was bad before.
-fn explains(before: &Agreement, after: &Agreement) -> bool {
+///
+/// Numbers that are chosen find some edges by chance.
+fn explains(before: &Agreement, after: &Agreement, has_numbers: bool) -> bool {
     /// What sound scenes reach in their edges, and how far below it is bad, where photos share no view.
     const EDGES: f64 = 0.2;
     const EDGES_GAINED: f64 = 0.2;
@@ -252,7 +258,7 @@ fn explains(before: &Agreement, after: &Agreement) -> bool {
     let has_edges = of(after.edges) >= EDGES && of(after.edges) - of(before.edges) >= EDGES_GAINED;
     // Depths that are taken for others may draw photos together, but not onto their edges.
     let keeps_edges = before.edges.is_none_or(|edges| of(after.edges) >= edges - EDGES_LOST);
-    is_kept && keeps_edges && (is_shared || has_edges)
+    is_kept && keeps_edges && (is_shared || has_edges && !has_numbers)
 }
 
 /// The mean gain of a reading, if it is significant.

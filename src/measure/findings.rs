@@ -105,13 +105,18 @@ pub fn findings(results: &[&QueryResult], examined: &[Finding]) -> Vec<Finding> 
 /// What `posescope doctor` says of a scene.
 pub fn of_examination(scene: &str, found: &doctor::Finding) -> Finding {
     let about = found.mistake.about();
+    let or: String = found
+        .or
+        .iter()
+        .map(|(mistake, remedy)| format!(" Or {}; {remedy}.", mistake.about()))
+        .collect();
     Finding {
         code: Code::X1,
         of: scene.to_owned(),
         about: found.mistake.subject(),
         queries: 0,
         doctor: true,
-        text: format!("`posescope doctor` says of {scene}: {about}; {}.", found.remedy),
+        text: format!("`posescope doctor` says of {scene}: {about}; {}.{or}", found.remedy),
         evidence: json!({ "remedy": found.remedy }),
     }
 }
@@ -409,6 +414,8 @@ mod tests {
                 remedy: "correct it".into(),
                 stated: Default::default(),
                 otherwise: Default::default(),
+                or: Vec::new(),
+                then: None,
             };
             of_examination("street", &found)
         };

@@ -15,13 +15,12 @@ use crate::planted::{Fault, Planted};
 use crate::small_sequence::SmallSequence;
 
 /// What each fault is to be called; half a pixel is less than clouds and photos agree by.
-const EXPECTED: [(Fault, Option<Mistake>); 26] = [
+const EXPECTED: [(Fault, Option<Mistake>); 25] = [
     (Fault::Nothing, None),
     (Fault::InversePose, Some(Mistake::InversePose)),
     (Fault::InverseRotation, Some(Mistake::InversePose)),
     (Fault::PoseAxes, Some(Mistake::PoseAxes)),
     (Fault::OpenGlAxes, Some(Mistake::PoseAxes)),
-    (Fault::PoseOneLineOff, Some(Mistake::PoseOfNeighbour)),
     (Fault::CloudAxes, Some(Mistake::CloudAxes)),
     (Fault::FiveTimesTheDepth, Some(Mistake::Units)),
     (Fault::UpsideDown, Some(Mistake::TurnedPhotos)),
@@ -101,6 +100,17 @@ fn are_named(is_planted: impl Fn(Fault) -> bool) {
     }
 }
 
+/// It takes photos that are sharp enough, and a speed that changes.
+#[test]
+#[ignore = "takes half a minute; .ci/nightly runs it"]
+fn poses_that_are_one_line_off_are_named() {
+    let street = Street::new("overcast", Size::Full).expect("is built in");
+    let found = examine(&Planted::new(&street, Fault::PoseOneLineOff, 0, 40));
+    let named = found.finding.map(|one| (one.mistake, one.remedy));
+    let remedy = "give each frame the pose of the next line".to_owned();
+    assert_eq!(named, Some((Mistake::PoseOfNeighbour, remedy)));
+}
+
 #[test]
 fn two_mistakes_are_found_one_after_the_other() {
     let street = Street::new("overcast", Size::Half).expect("is built in");
@@ -127,13 +137,15 @@ fn frames_far_apart_are_not_accused() {
     }
 }
 
-/// Clouds of another place fit no photo, and no reading makes them fit.
+/// No reading makes depths fit that are noise.
 #[test]
-fn clouds_of_another_place_are_a_misfit_that_nothing_explains() {
+fn depths_of_noise_are_a_misfit_that_nothing_explains() {
     let street = Street::new("overcast", Size::Half).expect("is built in");
-    let elsewhere = Planted::new(&street, Fault::CloudOfAnotherPlace, 0, 24);
-    let found = examine(&elsewhere);
-    assert_eq!(found.finding.as_ref().map(|one| one.mistake), None);
+    let noise = Planted::new(&street, Fault::DepthsOfNoise, 0, 24);
+    let found = examine(&noise);
+    println!("{:?}", found.agreement);
+    let named = found.finding.as_ref().map(|one| (one.mistake, &one.remedy, one.otherwise));
+    assert_eq!(named, None);
     assert_eq!(found.fit, Some(Fit::Unexplained));
     assert!(found.is_broken());
 }

@@ -10,7 +10,7 @@ use tempfile::TempDir;
 use crate::binary::{has, run_in};
 use crate::damage::{expect_words, open};
 use crate::loose_photo::jpeg;
-use crate::scene_toml::{with, write};
+use crate::scene_toml::{ORIGIN, with, write};
 use crate::small_sequence::wall;
 
 fn orientation(number: u16) -> Field {
@@ -147,6 +147,12 @@ fn one_broken_photo_costs_itself_alone() {
     for at in 0..3 {
         let folder = TempDir::new().expect("a folder");
         write(folder.path());
+        // All photos are alike, so the camera hardly moves.
+        let poses = (0..3).map(|frame| {
+            let [x, y, z] = ORIGIN;
+            format!("1 0 0 {x} 0 1 0 {y} 0 0 1 {}\n", z + 0.01 * f64::from(frame))
+        });
+        fs::write(folder.path().join("poses.txt"), poses.collect::<String>()).expect("writable");
         let path = folder.path().join(format!("photos/img{at}.png"));
         run_in(folder.path(), "doctor .").ok();
         wall(80, 32).save(&path).expect("writable");

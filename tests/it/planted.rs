@@ -34,7 +34,7 @@ pub enum Fault {
     QuaternionOrder,
     HalfPixel,
     CloudOneFrameOff,
-    CloudOfAnotherPlace,
+    DepthsOfNoise,
     DegreesForRadians,
     RadiansForDegrees,
     LeftForRight,
@@ -217,8 +217,6 @@ impl Scene for Planted<'_> {
     fn cloud(&self, frame: usize) -> Result<Cloud, SceneError> {
         let of = match self.fault {
             Fault::CloudOneFrameOff => self.at[frame] + 1,
-            // Each of another one, so that no motion fits.
-            Fault::CloudOfAnotherPlace => (7 * self.at[frame] + 150) % self.scene.frames().len(),
             _ => self.at[frame],
         };
         let cloud = self.scene.cloud(of)?;
@@ -228,6 +226,10 @@ impl Scene for Planted<'_> {
         Ok(match self.fault {
             Fault::CloudAxes => moved(&|p| Point3::new(p.z, -p.x, -p.y)),
             Fault::MillimetreClouds => moved(&|p| p * 1000.0),
+            Fault::DepthsOfNoise => {
+                let noise = |p: &Point3<f32>| 0.2 + 5.0 * (p.x * 91.7 + p.y * 37.3).sin().abs();
+                moved(&|p| p * noise(p))
+            }
             Fault::FiveTimesTheDepth => moved(&|p| p * 5.0),
             Fault::CentimetreClouds => moved(&|p| p * 100.0),
             Fault::LeftForRight => moved(&|p| Point3::new(p.x + BASELINE_M as f32, p.y, p.z)),

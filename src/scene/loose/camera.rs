@@ -113,7 +113,7 @@ fn of_list(
     let lines = lines.collect::<Result<Vec<_>, SceneError>>()?;
     let fits = |name: &str| {
         stem(name) == stem(wanted)
-            && (agree(without_extension(name), wanted) || !wanted.contains('/'))
+            && (agree(wanted, without_extension(name)) || !wanted.contains('/'))
     };
     let mut fitting = lines.into_iter().filter(|(_, (name, _))| fits(name));
     let (Some((line, (_, camera))), None) = (fitting.next(), fitting.next()) else {

@@ -9,7 +9,9 @@ pub(super) const FEW_MATCHES: usize = 8;
 pub(super) const RULE: Rule = Rule {
     title: "too few true matches",
     advice: "raise fb.ratio or get more keypoints; other light needs another method",
-    advice_of_matches: Some("let the matcher keep more matches, or use another reference or method"),
+    advice_of_matches: Some(
+        "let the matcher keep more matches, or use another reference or method",
+    ),
     applies_to: Family::MATCHING,
     test: Test::Method(test),
     decided_at: DecidedAt::Stage(Stage::Match),

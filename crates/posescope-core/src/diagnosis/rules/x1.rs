@@ -18,7 +18,9 @@ pub(super) const RULE: Rule = Rule {
     advice: "check calibration, pose convention and units; `posescope doctor` does",
     advice_on: |evidence| {
         let is_resized = evidence.pointer("/query/part").is_some();
-        is_resized.then_some("scale the keypoints to the size of the photos, or match photos of that size")
+        is_resized.then_some(
+            "scale the keypoints to the size of the photos, or match photos of that size",
+        )
     },
     applies_to: Family::ALL,
     needs_truth: false,

@@ -76,8 +76,7 @@ mod tests {
     use super::*;
 
     fn corner_of(size: [u32; 2]) -> Option<Corner> {
-        let camera =
-            Intrinsics { fx: 1.0, fy: 1.0, cx: 0.0, cy: 0.0, width: 1296, height: 1936 };
+        let camera = Intrinsics { fx: 1.0, fy: 1.0, cx: 0.0, cy: 0.0, width: 1296, height: 1936 };
         // A grid that fills a photo of this size.
         let places: Vec<[f32; 2]> = (0..64)
             .map(|at| {
