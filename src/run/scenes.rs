@@ -8,7 +8,7 @@ use crate::scene::{self, Scene, SceneError};
 
 /// The scenes of a run, opened.
 pub struct Scenes {
-    /// The scenes of the references, in the order of [`RunFile::scenes`].
+    /// The scenes of the references, in the order of [`RunFile::scenes`](super::RunFile::scenes).
     pub references: Vec<Arc<dyn Scene>>,
     /// The scenes of the queries, in the order of [`Protocol::query_scene`]. Empty if queries and references come
     /// from the same scene and no photo is degraded.

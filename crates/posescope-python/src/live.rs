@@ -10,7 +10,7 @@ use posescope::run::{
     EstimatesFile, FolderError, Judgement, Judging, Protocol, QueryCamera, RUN_SCHEMA, Reference,
     RunFile, ScenePair, publish, read_run,
 };
-use posescope::scene::write_matches;
+use posescope::scene::{PixelMaps, write_matches};
 use posescope_core::features::FoundMatches;
 use posescope_core::{Method, Params};
 use pyo3::exceptions::PyOSError;
@@ -47,16 +47,19 @@ pub fn check_matches(matches: GivenMatches<'_>) -> PyResult<()> {
     found("matches", &matches).map(drop)
 }
 
-/// Saves the matches of a query with a reference as `--matches` reads them.
+/// Saves the matches of a query with a reference of a scene as `--matches` reads them.
 #[pyfunction]
 pub fn save_matches(
+    scene: &Scene,
     folder: PathBuf,
     query: &str,
     reference: &str,
     matches: GivenMatches<'_>,
 ) -> PyResult<()> {
     let FoundMatches { query: points, reference: others, decisions } = found("matches", &matches)?;
-    write_matches(&folder, (query, &points), (reference, &others), &decisions)
+    // The queries' photos are written as they are given.
+    let maps = [&PixelMaps::default(), &PixelMaps::of(scene.opened.scene.as_ref())];
+    write_matches(&folder, (query, &points), (reference, &others), &decisions, maps)
         .map_err(|error| PyOSError::new_err(format!("{}: {error}", folder.display())))
 }
 

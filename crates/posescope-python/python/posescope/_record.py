@@ -240,7 +240,8 @@ class Recording:
                 for folder, matches in (("matches", logged.matches), ("inliers", logged.inliers)):
                     if matches is not None:
                         into = os.fspath(self._path / folder)
-                        _posescope.save_matches(into, logged.name, logged.reference_name or "", matches)
+                        reference = logged.reference_name or ""
+                        _posescope.save_matches(self._scene, into, logged.name, reference, matches)
             except Exception as error:  # noqa: BLE001
                 self._broken = self._broken or error
 
