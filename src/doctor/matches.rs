@@ -16,7 +16,7 @@ use crate::solver::Correspondence;
 
 /// The strongest features of a photo that are used.
 const FEATURES: usize = 1500;
-/// The greatest ratio of distances of a match. True matches are told from false ones by the poses that they agree on.
+/// The greatest ratio of distances of a match. True matches agree on a motion, and false ones do not.
 const RATIO: f32 = 0.9;
 /// How far from where a pose says that it is a match counts half \[px\].
 const HALF_PX: f64 = 2.5;

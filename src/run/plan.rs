@@ -163,7 +163,7 @@ impl Plan {
 impl EvaluationRequest<'_> {
     /// The queries of the scenes.
     fn of_scenes(&self, given: &Protocol) -> Result<Plan, PlanError> {
-        // A wrong parameter is said before a large scene is opened.
+        // Check the parameters first: opening a large scene takes long.
         with_config(Params::default(), self.config, self.assignments)?;
         let scenes = Scenes::open(self.scenes, &given.query_scene, given.format.as_deref())?;
         let first = scenes.references.first();

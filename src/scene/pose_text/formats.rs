@@ -9,7 +9,7 @@ use super::super::lines::{Line, TextFile, excerpt, pose};
 use super::{Key, Row};
 use crate::geometry::{Pose, pose_from_matrix};
 
-/// A format whose lines are told by their words.
+/// A format that is recognised by the words of its lines.
 pub(super) struct Format {
     pub name: &'static str,
     /// What a line is made of.
