@@ -23,6 +23,7 @@ const AS_GOOD_WITH_NUMBERS: f64 = 0.7;
 /// What sound scenes reach at least where photos share a view: the share of the shared features that the poses explain,
 /// the correlation of grey values, as Fisher's z, and the log ratio of edges.
 const FITTING_MOTIONS: f64 = 0.4;
+const FITTING_MOTIONS_IN_ROOMS: f64 = 0.25;
 const FITTING_CARRIED: f64 = 0.35;
 const FITTING_EDGES: f64 = 0.1;
 
@@ -157,7 +158,7 @@ impl Sample {
                 let judged = judged(reading, &stated, &scores)?;
                 let gain = CHOSEN * judged.gain;
                 let is_telling = gain >= TELLING_GAIN_OF_NUMBERS
-                    && self.explains_more(&testing, &judged.reading.change);
+                    && self.explains_more(&testing, &judged, &Agreement::mean(&stated));
                 is_telling.then_some(Judged { gain, ..judged })
             }));
         }
@@ -189,13 +190,15 @@ impl Sample {
         Some((finding, reading.change))
     }
 
-    /// Whether the features agree on motions of their own, whatever the poses are, better than as stated. Poses that are a
-    /// little off make another camera or cloud fit them, but not the features.
-    fn explains_more(&self, anchors: &[usize], change: &Change) -> bool {
+    /// Whether something that does not rest on the poses speaks for a reading: depth edges fall on edges of the photos, or
+    /// the features agree better on motions of their own. Poses that are a little off make another camera or cloud fit
+    /// them, but neither of these.
+    fn explains_more(&self, anchors: &[usize], judged: &Judged, stated: &Agreement) -> bool {
         /// How much better, as a share.
         const MORE: f64 = 1.01;
+        let change = &judged.reading.change;
         // Motions are found with a camera that bends nothing.
-        if matches!(change, Change::Lens(_)) {
+        if matches!(change, Change::Lens(_)) || gains_edges(stated, &judged.otherwise) {
             return true;
         }
         let explained = |change: &Change| -> f64 {
@@ -247,18 +250,25 @@ fn judged(reading: Reading, stated: &[Agreement], scores: &[Agreement]) -> Optio
 ///
 /// Numbers that are chosen find some edges by chance.
 fn explains(before: &Agreement, after: &Agreement, has_numbers: bool) -> bool {
-    /// What sound scenes reach in their edges, and how far below it is bad, where photos share no view.
-    const EDGES: f64 = 0.2;
-    const EDGES_GAINED: f64 = 0.2;
     const EDGES_LOST: f64 = 0.12;
     let of = |number: Option<f64>| number.unwrap_or(0.0);
-    let is_shared = of(after.motions) >= FITTING_MOTIONS && of(after.carried) >= FITTING_CARRIED;
+    let gains_edges = gains_edges(before, after);
+    // The poses of rooms explain less of what a rolling shutter shows.
+    let least = if gains_edges { FITTING_MOTIONS_IN_ROOMS } else { FITTING_MOTIONS };
+    let is_shared = of(after.motions) >= least && of(after.carried) >= FITTING_CARRIED;
     // What fitted may not get worse.
     let is_kept = of(after.motions) > of(before.motions) - 0.05;
-    let has_edges = of(after.edges) >= EDGES && of(after.edges) - of(before.edges) >= EDGES_GAINED;
     // Depths that are taken for others may draw photos together, but not onto their edges.
     let keeps_edges = before.edges.is_none_or(|edges| of(after.edges) >= edges - EDGES_LOST);
-    is_kept && keeps_edges && (is_shared || has_edges && !has_numbers)
+    is_kept && keeps_edges && (is_shared || gains_edges && !has_numbers)
+}
+
+/// Whether depth edges reach what those of sound scenes reach, and did not before.
+fn gains_edges(before: &Agreement, after: &Agreement) -> bool {
+    const EDGES: f64 = 0.2;
+    const GAINED: f64 = 0.2;
+    let of = |number: Option<f64>| number.unwrap_or(0.0);
+    of(after.edges) >= EDGES && of(after.edges) - of(before.edges) >= GAINED
 }
 
 /// The mean gain of a reading, if it is significant.
