@@ -1,8 +1,10 @@
-//! Cloud files: PLY, PCD, LAS, LAZ and text (XYZ, CSV, PTS, PTX), detected by their content.
+//! Cloud files: PLY, PCD, LAS, LAZ, E57 and text (XYZ, CSV, PTS, PTX), detected by their content.
 //!
 //! Counts in headers are checked against the size of the file before anything is allocated.
 
 mod collector;
+mod decoding;
+mod e57;
 mod las;
 mod pcd;
 mod ply;
@@ -15,7 +17,7 @@ use std::path::Path;
 use nalgebra::{Point3, Vector3};
 
 pub(super) use collector::Note;
-pub use las::is_decoding;
+pub use decoding::is_decoding;
 
 use self::collector::Collector;
 
@@ -55,21 +57,18 @@ pub(super) fn read(path: &Path) -> Result<MapCloud, SceneError> {
     let file = File::open(path).map_err(io)?;
     let size = file.metadata().map_err(io)?.len();
     BufReader::new(file).take(4096).read_to_end(&mut start).map_err(io)?;
-    if start.starts_with(b"ASTM-E57") {
-        let expected = "a cloud in PLY, PCD, LAS, LAZ or text format expected, E57 found; convert it with CloudCompare \
-                        or by `pdal translate a.e57 a.laz`";
-        return Err(content(path, expected));
-    }
     let read = if start.starts_with(b"ply\n") || start.starts_with(b"ply\r") {
         ply::read
     } else if start.starts_with(b"LASF") {
         las::read
+    } else if start.starts_with(b"ASTM-E57") {
+        e57::read
     } else if pcd::is_pcd(&start) {
         pcd::read
     } else if let Err(expected) = text_start(&start) {
         return Err(content(path, &expected));
     } else if start.contains(&0) {
-        return Err(content(path, "a cloud in PLY, PCD, LAS, LAZ or text format expected"));
+        return Err(content(path, "a cloud in PLY, PCD, LAS, LAZ, E57 or text format expected"));
     } else {
         return text::read(path);
     };

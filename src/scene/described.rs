@@ -42,7 +42,7 @@ const FILE: &str = "scene.toml";
 pub(super) const ENTRY: SceneFormat = SceneFormat {
     name: "toml",
     about: "anything else: a scene.toml, or the folder with it, that names images, poses, camera and \
-            cloud (PLY, PCD, LAS, LAZ, PTS, PTX, text)",
+            cloud (PLY, PCD, LAS, LAZ, E57, PTS, PTX, text)",
     recognizes: |argument| description_of(Path::new(argument)).is_file(),
     open: |argument| open(&description_of(Path::new(argument))),
 };
@@ -385,6 +385,10 @@ impl Clouds for DescribedClouds {
     fn place<'a>(&'a self, index: usize, _frame: &'a Frame) -> &'a Path {
         let file = self.files.get(index).and_then(Option::as_deref);
         file.unwrap_or(&self.place)
+    }
+
+    fn is_in_world(&self, _index: usize) -> bool {
+        self.map.is_some() || self.camera_from_cloud.is_none()
     }
 
     fn facts(&self) -> CloudFacts {

@@ -37,7 +37,13 @@ pub(super) fn common_size<'a>(photos: &'a [PathBuf]) -> Result<((u32, u32), &'a 
 
 /// Decodes an image.
 pub(super) fn decode(path: &Path) -> Result<DynamicImage, SceneError> {
-    reader(path)?.decode().map_err(SceneError::image(path))
+    let image = reader(path)?.decode().map_err(SceneError::image(path))?;
+    if matches!(image, DynamicImage::ImageRgb32F(_) | DynamicImage::ImageRgba32F(_)) {
+        let expected = "a photo with values of 8 or 16 bits expected, floating-point values found; \
+                        convert it, for example by `magick a.tif -depth 16 a.png`";
+        return Err(SceneError::expected(path, expected));
+    }
+    Ok(image)
 }
 
 fn reader(path: &Path) -> Result<ImageReader<BufReader<File>>, SceneError> {
@@ -45,13 +51,13 @@ fn reader(path: &Path) -> Result<ImageReader<BufReader<File>>, SceneError> {
     let mut file = BufReader::new(File::open(path).map_err(io)?);
     if let Some((format, command)) = unread_format(file.fill_buf().map_err(io)?) {
         let expected = format!(
-            "a photo in PNG or JPEG format expected, {format} found; convert it, for example by `{command}`"
+            "a photo in PNG, JPEG, TIFF or WebP format expected, {format} found; convert it, for example by `{command}`"
         );
         return Err(SceneError::expected(path, expected));
     }
     let reader = ImageReader::new(file).with_guessed_format().map_err(io)?;
     if reader.format().is_none() {
-        let expected = "a photo in PNG or JPEG format expected, other content found";
+        let expected = "a photo in PNG, JPEG, TIFF or WebP format expected, other content found";
         return Err(SceneError::expected(path, expected));
     }
     Ok(reader)
@@ -65,10 +71,6 @@ fn unread_format(start: &[u8]) -> Option<(&'static str, &'static str)> {
         Some(("AVIF", "avifdec a.avif a.png"))
     } else if brands.iter().any(|brand| is_at(4, b"ftyp") && is_at(8, brand.as_bytes())) {
         Some(("HEIC", "heif-convert a.heic a.jpg"))
-    } else if is_at(0, b"RIFF") && is_at(8, b"WEBP") {
-        Some(("WebP", "dwebp a.webp -o a.png"))
-    } else if is_at(0, b"II*\0") || is_at(0, b"MM\0*") {
-        Some(("TIFF", "magick a.tif a.png"))
     } else {
         None
     }

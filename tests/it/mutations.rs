@@ -336,4 +336,14 @@ fn no_damage_to_a_photo_or_its_camera_makes_their_reader_panic() {
         };
         mutate(name, std::slice::from_ref(file), || read().map_err(|error| vec![error]));
     }
+    for ending in ["png", "tif", "webp"] {
+        let path = folder.path().join(format!("a.{ending}"));
+        wall(WIDTH, HEIGHT).save(&path).expect("writable");
+        let camera = Some(scene::CameraArgument::File(cameras.clone()));
+        fs::write(&cameras, "1 PINHOLE 160 64 100 100 80 32\n").expect("writable");
+        let photos = LoosePhotos { paths: vec![path.clone()], camera };
+        let read = || photos.open()?.photo(0).map(drop);
+        assert!(read().is_ok(), "{:?}", read());
+        mutate(ending, &[path], || read().map_err(|error| vec![error]));
+    }
 }

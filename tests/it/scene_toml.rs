@@ -285,7 +285,21 @@ pub fn write_clouds(folder: &Path) -> Vec<String> {
         las(&folder.join(name), &[]);
         names.push(name.to_owned());
     }
+    e57(&folder.join("map.e57"));
+    names.push("map.e57".to_owned());
     names
+}
+
+fn e57(path: &Path) {
+    use e57::{E57Writer, Record, RecordValue};
+    let mut writer = E57Writer::from_file(path, "wall").expect("writable");
+    let xyz = vec![Record::CARTESIAN_X_F64, Record::CARTESIAN_Y_F64, Record::CARTESIAN_Z_F64];
+    let mut scan = writer.add_pointcloud("scan", xyz).expect("a scan");
+    for point in points() {
+        scan.add_point(point.map(RecordValue::Double).to_vec()).expect("a point");
+    }
+    scan.finalize().expect("written");
+    writer.finalize().expect("written");
 }
 
 #[test]
@@ -406,7 +420,7 @@ fn what_is_wrong_with_a_description_is_named_with_its_line() {
         map.xyz | text 1 2 3\n1 2 x\n | map.xyz:2 ~ `x`
         map.xyz | text heading\n | map.xyz ~ none found
         map.xyz | text \x00\x00\x00 | map.xyz ~ PLY, PCD
-        map.xyz | text ASTM-E57\x01\x00 | map.xyz ~ E57 found ~ pdal translate
+        map.xyz | text ASTM-E57\x01\x00 | map.xyz ~ E57
         map.xyz | text LASF | map.xyz ~ LAS
         "#,
     );

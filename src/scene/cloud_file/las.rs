@@ -1,14 +1,13 @@
 //! LAS and LAZ.
 
-use std::cell::Cell;
 use std::fs::File;
 use std::io::{BufReader, Read, Seek, SeekFrom};
-use std::panic::catch_unwind;
 use std::path::Path;
 
 use las::{Header, Reader};
 use laz::{LazItem, LazItemType, LazVlr};
 
+use super::decoding::decoded;
 use super::{Collector, MapCloud, expect_room};
 
 /// Points per decoded batch.
@@ -16,24 +15,12 @@ const BATCH: u64 = 65_536;
 /// The smallest size of an uncompressed point \[bytes\].
 const MIN_RECORD: u64 = 20;
 
-thread_local! {
-    static IS_DECODING: Cell<bool> = const { Cell::new(false) };
-}
-
-/// Whether a panic of this thread is the decoder's, which is caught and says nothing but that a file is damaged.
-pub fn is_decoding() -> bool {
-    IS_DECODING.get()
-}
-
 /// Reads the points. The decoder panics on damaged data, which becomes an error.
 pub(super) fn read(path: &Path, size: u64) -> Result<MapCloud, String> {
-    IS_DECODING.set(true);
-    let read = catch_unwind(|| decoded(path, size));
-    IS_DECODING.set(false);
-    read.unwrap_or_else(|_| Err("decodable points expected; the file is damaged".to_owned()))
+    decoded(|| points(path, size))
 }
 
-fn decoded(path: &Path, size: u64) -> Result<MapCloud, String> {
+fn points(path: &Path, size: u64) -> Result<MapCloud, String> {
     let text = |error: las::Error| error.to_string();
     let file = File::open(path).map_err(|error| error.to_string())?;
     let mut file = BufReader::new(file);
