@@ -31,6 +31,6 @@ parameters! {
         pub radius_slack: f64 = 0.1 => number("radius_slack", "", 0.0..=100.0),
         /// The least probability of being within 1 m with which a pose is accepted: streets that look alike
         /// agree on poses beyond chance. 0 accepts what chance does not explain.
-        pub least_probability: f64 = 0.9 => number("least_probability", "", 0.0..=1.0),
+        pub least_probability: f64 = 0.7 => number("least_probability", "", 0.0..=1.0),
     }
 }
