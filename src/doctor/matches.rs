@@ -173,6 +173,16 @@ pub(super) fn motion(lifted: &[Correspondence], camera: &Intrinsics) -> Option<M
         .then_some(Motion { there_from_here: found.pose, explained })
 }
 
+/// The motion that the matches agree on, if a pose explains enough of them that it may be this one.
+pub(super) fn motion_near(
+    lifted: &[Correspondence],
+    camera: &Intrinsics,
+    there_from_here: &Pose,
+) -> Option<Motion> {
+    let is_likely = explained(lifted, camera, there_from_here) >= MIN_LIFTED as f64 / 4.0;
+    if is_likely { motion(lifted, camera) } else { None }
+}
+
 /// The share of the matches that agree on any motion which a pose explains; `None` where nothing agrees on one, and too
 /// few have a depth.
 pub(super) fn share_explained(

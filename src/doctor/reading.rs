@@ -123,6 +123,8 @@ pub(super) struct Reading {
 /// The change to the stated numbers.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Change {
+    /// None: the scene as stated.
+    None,
     /// The pose of each frame.
     Pose(fn(&Pose) -> Pose),
     /// The pose of a frame, from the whole trajectory.
@@ -164,7 +166,10 @@ impl Change {
 
     /// Whether it changes nothing but poses.
     pub(super) fn is_of_poses(&self) -> bool {
-        matches!(self, Self::Pose(_) | Self::Poses(_) | Self::Axes(_) | Self::InvertedAxes(_))
+        matches!(
+            self,
+            Self::None | Self::Pose(_) | Self::Poses(_) | Self::Axes(_) | Self::InvertedAxes(_)
+        )
     }
 
     pub(super) fn pose(&self, frame: usize, poses: &[Option<Pose>]) -> Option<Pose> {

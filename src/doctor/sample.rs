@@ -9,10 +9,12 @@ use rayon::prelude::*;
 
 use super::agreement::{EdgeMap, Seen, carried_agreement, edge_agreement, edge_map, project};
 use super::matches::{
-    DepthCells, Motion, SharedFeature, features, is_view_shared, motion, share_explained, shared,
+    DepthCells, Motion, SharedFeature, features, is_view_shared, motion, motion_near,
+    share_explained, shared,
 };
 use super::reading::Change;
 use crate::camera::Intrinsics;
+use crate::cloud::Cloud;
 use crate::features::Features;
 use crate::geometry::Pose;
 use crate::scene::{Scene, SceneError};
@@ -54,7 +56,10 @@ struct Seeing {
 }
 
 /// The compared frames, with all poses.
-pub(super) struct Sample {
+pub(super) struct Sample<'a> {
+    scene: &'a dyn Scene,
+    /// Whether the poses decide what of the clouds is seen.
+    has_map: bool,
     pub(super) poses: Vec<Option<Pose>>,
     pub(super) sights: BTreeMap<usize, Sight>,
     pub(super) clouds: BTreeMap<usize, Vec<Point3<f64>>>,
@@ -101,14 +106,19 @@ pub(super) fn mean(numbers: impl Iterator<Item = f64>) -> Option<f64> {
     (!numbers.is_empty()).then(|| numbers.iter().sum::<f64>() / numbers.len() as f64)
 }
 
+fn thinned(cloud: &Cloud) -> Vec<Point3<f64>> {
+    let step = cloud.points.len().div_ceil(MAX_POINTS).max(1);
+    cloud.points.iter().step_by(step).map(|point| point.cast()).collect()
+}
+
 pub(super) fn partners(anchor: usize, count: usize) -> impl Iterator<Item = usize> {
     let frames = PARTNERS.iter().filter_map(move |&step| anchor.checked_add_signed(step));
     frames.filter(move |&frame| frame < count).take(PARTNERS_OF_EACH)
 }
 
-impl Sample {
+impl<'a> Sample<'a> {
     /// Reads frames with pose and cloud, spread over the scene.
-    pub(super) fn read(scene: &dyn Scene) -> Self {
+    pub(super) fn read(scene: &'a dyn Scene) -> Self {
         let count = scene.frames().len();
         let poses: Vec<Option<Pose>> = (0..count).map(|frame| scene.pose(frame)).collect();
         let references: Vec<usize> =
@@ -150,9 +160,7 @@ impl Sample {
                 {
                     match scene.cloud(frame) {
                         Ok(cloud) => {
-                            let step = cloud.points.len().div_ceil(MAX_POINTS).max(1);
-                            let points = cloud.points.iter().step_by(step);
-                            place.insert(points.map(|point| point.cast()).collect());
+                            place.insert(thinned(&cloud));
                         }
                         Err(error) => unreadable.push(error.to_string()),
                     }
@@ -163,8 +171,12 @@ impl Sample {
         unreadable.dedup();
         let is_readable =
             |anchor: &usize| sights.contains_key(anchor) && clouds.contains_key(anchor);
-        let anchors = anchors.into_iter().filter(is_readable).collect();
+        let anchors: Vec<usize> = anchors.into_iter().filter(is_readable).collect();
+        let at = |frame: usize| scene.cloud_at(frame, &poses[frame]?);
+        let has_map = anchors.first().is_some_and(|&anchor| at(anchor).is_some());
         let mut sample = Self {
+            scene,
+            has_map,
             poses,
             sights,
             clouds,
@@ -216,12 +228,11 @@ impl Sample {
     pub(super) fn read_as(mut self, change: &Change) -> Self {
         let frames = 0..self.poses.len();
         let poses = frames.map(|frame| change.pose(frame, &self.poses)).collect();
-        let clouds = self.anchors.iter().filter_map(|&anchor| {
-            let cloud = self.clouds.get(&change.cloud_of(anchor)?)?;
-            Some((anchor, change.points(cloud)))
-        });
+        let clouds = self.anchors.iter();
+        let clouds = clouds.filter_map(|&anchor| Some((anchor, self.cloud(anchor, change)?)));
         self.clouds = clouds.collect();
         self.poses = poses;
+        self.has_map &= change.is_of_poses();
         for sight in self.sights.values_mut() {
             sight.camera = change.camera(&sight.camera).0;
         }
@@ -236,9 +247,29 @@ impl Sample {
         Some((&sight.gray, seen.collect()))
     }
 
+    /// The points of a frame in its camera's frame. Of a map, those in view of the pose in this reading.
+    fn cloud(&self, anchor: usize, change: &Change) -> Option<Vec<Point3<f64>>> {
+        let mut pose = change.pose(anchor, &self.poses);
+        match *change {
+            _ if !self.has_map => {}
+            Change::Size(times) => {
+                let pose = pose.as_mut()?;
+                pose.translation.vector /= times;
+                let cloud = thinned(&self.scene.cloud_at(anchor, pose)?);
+                return Some(change.points(&cloud));
+            }
+            Change::None => {}
+            _ if change.is_of_poses() => {
+                return Some(thinned(&self.scene.cloud_at(anchor, &pose?)?));
+            }
+            _ => {}
+        }
+        Some(change.points(self.clouds.get(&change.cloud_of(anchor)?)?))
+    }
+
     fn seeing(&self, anchor: usize, change: &Change) -> Option<Seeing> {
         let sight = self.sights.get(&anchor)?;
-        let points = change.points(self.clouds.get(&change.cloud_of(anchor)?)?);
+        let points = self.cloud(anchor, change)?;
         let (camera, k1) = change.camera(&sight.camera);
         let seen: Vec<Option<Seen>> =
             points.iter().map(|point| project(&camera, k1, point)).collect();
@@ -260,9 +291,10 @@ impl Sample {
     }
 
     fn score(&self, anchor: usize, change: &Change) -> Agreement {
-        // Poses alone leave the cloud where it is in its photo.
-        let anew = if change.is_of_poses() { None } else { self.seeing(anchor, change) };
-        let as_stated = || self.stated.get(&anchor).filter(|_| change.is_of_poses());
+        // Poses alone leave a cloud that is not of a map where it is in its photo.
+        let is_kept = change.is_of_poses() && (!self.has_map || matches!(change, Change::None));
+        let anew = if is_kept { None } else { self.seeing(anchor, change) };
+        let as_stated = || self.stated.get(&anchor).filter(|_| is_kept);
         match anew.as_ref().or_else(as_stated) {
             Some(seeing) => self.score_of(anchor, seeing, change),
             None => Agreement::default(),
@@ -293,6 +325,12 @@ impl Sample {
                 carried_agreement((&sight.gray, &seen), (&other.gray, &carried_to), seeing.least);
             // Points that are out of view of the partner do not agree.
             carried.push(agreement.unwrap_or(0.0));
+            // The features were lifted by the part of the map that the stated pose sees.
+            let by_features = if self.has_map && !matches!(change, Change::None) {
+                motion_near(lifted, &camera, &there_from_here)
+            } else {
+                *by_features
+            };
             motions.extend(share_explained(
                 lifted,
                 &camera,
@@ -314,10 +352,10 @@ impl Sample {
         [shared().count(), shared().filter(|shared| *shared).count(), motions]
     }
 
-    /// How much larger the motions by the features are than the stated ones; `None` where these do not agree on it.
-    pub(super) fn scale(&self) -> Option<f64> {
-        /// Half of the ratios differ by less, as a share to either side.
-        const SPREAD: f64 = 0.05;
+    /// How much larger the motions by the features are than the stated ones, and the standard error of its logarithm;
+    /// `None` where they do not agree on it.
+    pub(super) fn scale(&self) -> Option<(f64, f64)> {
+        const LARGEST_ERROR: f64 = 0.08;
         const MIN_RATIOS: usize = 4;
         let ratios = self.anchors.iter().flat_map(|anchor| {
             let partners = self.partners.get(anchor).into_iter().flatten();
@@ -336,10 +374,12 @@ impl Sample {
             return None;
         }
         let quantile = |share: f64| ratios.get((share * (ratios.len() - 1) as f64) as usize);
-        let agrees = quantile(0.75)? - quantile(0.25)? < 2.0 * SPREAD;
-        agrees.then_some(quantile(0.5)?.exp())
+        // That of the median of normally distributed ratios, by their interquartile range.
+        let error = 0.93 * (quantile(0.75)? - quantile(0.25)?) / (ratios.len() as f64).sqrt();
+        log::debug!("motions are {:.3} times the stated ones, ± {error:.3}", quantile(0.5)?.exp());
+        (error < LARGEST_ERROR).then_some((quantile(0.5)?.exp(), error))
     }
 }
 
 /// The reading as stated.
-pub(super) const AS_STATED: Change = Change::Pose(|pose| *pose);
+pub(super) const AS_STATED: Change = Change::None;

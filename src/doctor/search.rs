@@ -10,7 +10,7 @@ const MIN_PX: f64 = 8.0;
 /// What another step of a search must gain.
 const STEP_GAIN: f64 = 0.04;
 
-impl Sample {
+impl Sample<'_> {
     /// The readings with a free number, each with the number that fits best.
     pub(super) fn searched(&self, choosing: &[usize]) -> Vec<Reading> {
         let mut found = Vec::new();

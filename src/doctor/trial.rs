@@ -62,7 +62,7 @@ struct Judged {
     otherwise: Agreement,
 }
 
-impl Sample {
+impl Sample<'_> {
     /// The agreement of the scene as stated, whether it fits, and the mistake that explains it if it does not.
     pub(super) fn diagnose(self) -> (Agreement, Fit, Option<Finding>) {
         /// How many mistakes are found one after the other.
@@ -97,9 +97,13 @@ impl Sample {
         let stated = self.agreement();
         let [pairs, shared, motions] = self.pairs();
         // Photos that are taken close together have like grey values at any depth.
-        let has_edges = stated.edges.is_some_and(|ratio| ratio >= FITTING_EDGES);
-        let fits = stated.motions.is_some_and(|share| share >= FITTING_MOTIONS)
-            || has_edges && stated.carried.is_some_and(|z| z >= FITTING_CARRIED);
+        let least = |number: Option<f64>, least: f64| number.is_some_and(|number| number >= least);
+        let has_more = match stated.edges {
+            Some(edges) => edges >= FITTING_EDGES,
+            None => least(stated.motions, FITTING_MOTIONS_IN_ROOMS),
+        };
+        let fits = least(stated.motions, FITTING_MOTIONS)
+            || has_more && least(stated.carried, FITTING_CARRIED);
         if fits {
             Fit::Fits
         } else if pairs > 0 && 4 * shared.max(motions) >= pairs {
@@ -215,9 +219,13 @@ impl Sample {
         const SAME: f64 = 0.08;
         /// The factor of a unit is met as closely.
         const OF_UNIT: f64 = 0.03;
-        let measured = self.scale().filter(|times| times.ln().abs() > SAME)?;
+        let (measured, error) = self.scale()?;
+        if measured.ln().abs() <= SAME.max(3.0 * error) {
+            return None;
+        }
         let units = [1e3, 1e2, 1e-3, 1e-2, FOOT_M, 1.0 / FOOT_M, 5.0, 0.2];
-        let unit = units.into_iter().find(|unit| (measured / unit).ln().abs() < OF_UNIT);
+        let off = OF_UNIT.max(2.0 * error);
+        let unit = units.into_iter().find(|unit| (measured / unit).ln().abs() < off);
         let times = unit.unwrap_or(measured);
         let remedy = match unit {
             Some(1e3 | 1e2) if self.has_far_clouds() => {
@@ -251,10 +259,14 @@ fn judged(reading: Reading, stated: &[Agreement], scores: &[Agreement]) -> Optio
 /// Numbers that are chosen find some edges by chance.
 fn explains(before: &Agreement, after: &Agreement, has_numbers: bool) -> bool {
     const EDGES_LOST: f64 = 0.12;
+    /// A reading whose poses explain this many times as many features is no chance fit.
+    const MANY_TIMES: f64 = 4.0;
     let of = |number: Option<f64>| number.unwrap_or(0.0);
     let gains_edges = gains_edges(before, after);
     // The poses of rooms explain less of what a rolling shutter shows.
-    let least = if gains_edges { FITTING_MOTIONS_IN_ROOMS } else { FITTING_MOTIONS };
+    let is_many = of(after.motions) >= MANY_TIMES * of(before.motions);
+    let is_clear = gains_edges || is_many && !has_numbers;
+    let least = if is_clear { FITTING_MOTIONS_IN_ROOMS } else { FITTING_MOTIONS };
     let is_shared = of(after.motions) >= least && of(after.carried) >= FITTING_CARRIED;
     // What fitted may not get worse.
     let is_kept = of(after.motions) > of(before.motions) - 0.05;

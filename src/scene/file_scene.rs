@@ -18,6 +18,7 @@ use crate::image::Photo;
 pub(super) const NO_CLOUD: &str = "no frame of this scene has one";
 
 /// A frame of a scene.
+#[derive(Clone)]
 pub(super) struct Frame {
     /// Its name in results and recordings.
     pub name: String,
@@ -90,6 +91,11 @@ pub(super) trait Clouds: Send + Sync {
     /// What is known of the files, once a cloud was read.
     fn facts(&self) -> CloudFacts {
         CloudFacts::default()
+    }
+
+    /// Whether the cloud of a frame is in the world's frame, so that the pose decides what of it the camera sees.
+    fn is_in_world(&self, _index: usize) -> bool {
+        false
     }
 
     /// Reads the cloud of a frame that has one, in the camera's frame \[m\].
@@ -238,6 +244,15 @@ impl<C: Clouds> Scene for FileScene<C> {
             });
         }
         self.clouds.read(frame, &self.frames[frame])
+    }
+
+    fn cloud_at(&self, frame: usize, world_from_camera: &Pose) -> Option<Cloud> {
+        if !self.clouds.has(frame) || !self.clouds.is_in_world(frame) {
+            return None;
+        }
+        let moved =
+            Frame { world_from_camera: Some(*world_from_camera), ..self.frames[frame].clone() };
+        self.clouds.read(frame, &moved).ok()
     }
 
     fn lengths(&self) -> Lengths {

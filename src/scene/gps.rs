@@ -208,7 +208,7 @@ fn similarity(pairs: &[(Vector3<f64>, Vector3<f64>)]) -> Option<Similarity3<f64>
 }
 
 impl Scene for Located {
-    posescope_core::inner_scene!(scene: name, frames, other_name, pixel_map, intrinsics, pose, time_s, has_cloud, photo, cloud, query, reference, fingerprint, lengths, cloud_facts, as_degraded);
+    posescope_core::inner_scene!(scene: name, frames, other_name, pixel_map, intrinsics, pose, time_s, has_cloud, photo, cloud, cloud_at, query, reference, fingerprint, lengths, cloud_facts, as_degraded);
 
     fn position(&self, frame: usize) -> Option<Point3<f64>> {
         let known = self.positions.get(&frame).copied();

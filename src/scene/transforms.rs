@@ -300,6 +300,10 @@ impl Clouds for TransformsClouds {
         )
     }
 
+    fn is_in_world(&self, index: usize) -> bool {
+        self.depths[index].is_none()
+    }
+
     /// Depth images are metric. Models that were made from photos have no scale.
     fn lengths(&self) -> Lengths {
         let has_depths = self.depths.iter().any(Option::is_some);

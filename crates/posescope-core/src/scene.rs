@@ -75,6 +75,12 @@ pub trait Scene: Send + Sync {
     /// When there is none, or it cannot be used.
     fn cloud(&self, frame: usize) -> Result<Cloud, SceneError>;
 
+    /// The cloud of a frame as if its camera had another pose: the part of a map that it would see. `None` for a cloud that
+    /// was scanned with the frame and is the same at any pose, and where there is none.
+    fn cloud_at(&self, _frame: usize, _world_from_camera: &Pose) -> Option<Cloud> {
+        None
+    }
+
     /// The frame as a query.
     ///
     /// # Errors

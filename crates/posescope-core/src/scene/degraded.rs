@@ -35,7 +35,7 @@ impl DegradedScene {
 }
 
 impl Scene for DegradedScene {
-    crate::inner_scene!(scene: name, frames, other_name, pixel_map, intrinsics, pose, position, time_s, has_cloud, lengths, cloud_facts, cloud);
+    crate::inner_scene!(scene: name, frames, other_name, pixel_map, intrinsics, pose, position, time_s, has_cloud, lengths, cloud_facts, cloud, cloud_at);
 
     fn photo(&self, frame: usize) -> Result<Photo, SceneError> {
         let photo = self.scene.photo(frame)?;

@@ -134,7 +134,7 @@ impl<'a> CachedScene<'a> {
 }
 
 impl Scene for CachedScene<'_> {
-    crate::inner_scene!(scene: name, frames, other_name, pixel_map, intrinsics, pose, position, time_s, has_cloud, photo, cloud, as_degraded, lengths, cloud_facts, fingerprint);
+    crate::inner_scene!(scene: name, frames, other_name, pixel_map, intrinsics, pose, position, time_s, has_cloud, photo, cloud, cloud_at, as_degraded, lengths, cloud_facts, fingerprint);
 
     fn query(&self, frame: usize) -> Result<Arc<Query>, SceneError> {
         Ok(Arc::clone(&self.frame(frame)?.query))

@@ -60,6 +60,9 @@ macro_rules! inner_scene {
     (@ $scene:tt cloud) => {
         $crate::inner_scene!(@ $scene cloud(frame: usize) -> Result<$crate::cloud::Cloud, $crate::scene::SceneError>);
     };
+    (@ $scene:tt cloud_at) => {
+        $crate::inner_scene!(@ $scene cloud_at(frame: usize, world_from_camera: &$crate::geometry::Pose) -> Option<$crate::cloud::Cloud>);
+    };
     (@ $scene:tt query) => {
         $crate::inner_scene!(@ $scene query(frame: usize) -> Result<std::sync::Arc<$crate::problem::Query>, $crate::scene::SceneError>);
     };
@@ -78,9 +81,9 @@ macro_rules! inner_scene {
     (@ $scene:tt fingerprint) => {
         $crate::inner_scene!(@ $scene fingerprint() -> u64);
     };
-    (@ $scene:tt $method:ident($($frame:ident: usize)?) -> $out:ty) => {
-        fn $method(&self $(, $frame: usize)?) -> $out {
-            self.$scene.$method($($frame)?)
+    (@ $scene:tt $method:ident($($argument:ident: $type:ty),*) -> $out:ty) => {
+        fn $method(&self $(, $argument: $type)*) -> $out {
+            self.$scene.$method($($argument),*)
         }
     };
     ($scene:tt: $($method:ident),+ $(,)?) => {
