@@ -68,14 +68,12 @@ fn verdict(scene: &dyn Scene, found: &Examination) -> String {
     if let Some(finding) = &found.finding {
         return format!("{name}: {}; {}", finding.mistake.about(), finding.remedy);
     }
-    if found.fit == Some(Fit::Unexplained) {
-        return format!("{name}: {UNEXPLAINED}");
-    }
     let broken = found.remarks.iter().find_map(|remark| match remark {
         Remark::Broken(why) => Some(why.as_str()),
         Remark::Odd(_) => None,
     });
-    format!("{name}: {}", broken.unwrap_or("the scene is unusable"))
+    let misfit = (found.fit == Some(Fit::Unexplained)).then_some(UNEXPLAINED);
+    format!("{name}: {}", broken.or(misfit).unwrap_or("the scene is unusable"))
 }
 
 /// The findings in words, a line each, in lines of at most this many characters.

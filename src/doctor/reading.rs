@@ -111,6 +111,10 @@ impl Mistake {
     }
 }
 
+/// The remedy for depth images of 1000 for one metre that are read as those of TUM.
+pub(super) const READ_WITH_5000: &str = "multiply the coordinates of clouds by 5; if these are depth images that are \
+                                         read with 5000 for one metre, 1000 is one metre";
+
 /// A way to read a scene, as if a mistake had been made.
 #[derive(Clone, Debug)]
 pub(super) struct Reading {
@@ -272,6 +276,7 @@ pub(super) fn readings() -> Vec<Reading> {
         reading(M::Units, "divide the positions of poses by 1000", Change::Size(1e3)),
         reading(M::Units, "divide the positions of poses by 100", Change::Size(1e2)),
         reading(M::Units, "multiply the positions of poses by 0.3048", Change::Size(1.0 / FOOT_M)),
+        reading(M::Units, READ_WITH_5000, Change::Size(5.0)),
         reading(
             M::WrongCamera,
             "halve the camera parameters, which are those of photos of twice the size",

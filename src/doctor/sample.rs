@@ -31,6 +31,7 @@ const MAX_POINTS: usize = 40_000;
 const CARRIED: usize = 4;
 
 /// A photo with its edges, its features and its camera.
+#[derive(Clone)]
 pub(super) struct Sight {
     gray: GrayImage,
     edges: EdgeMap,
@@ -39,12 +40,14 @@ pub(super) struct Sight {
 }
 
 /// A frame beside an anchor, and the features that both photos share.
+#[derive(Clone)]
 struct Partner {
     frame: usize,
     shared: Vec<SharedFeature>,
 }
 
 /// A cloud in the photo of its frame, in some reading.
+#[derive(Clone)]
 struct Seeing {
     edges: Option<f64>,
     /// Points that are carried to other frames, and where the photo shows them.
@@ -56,6 +59,7 @@ struct Seeing {
 }
 
 /// The compared frames, with all poses.
+#[derive(Clone)]
 pub(super) struct Sample<'a> {
     scene: &'a dyn Scene,
     /// Whether the poses decide what of the clouds is seen.

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::reading::{Change, FOOT_M, Mistake, Reading, readings};
+use super::reading::{Change, FOOT_M, Mistake, READ_WITH_5000, Reading, readings};
 use super::sample::{AS_STATED, Agreement, Sample};
 
 /// The least mean gain of another reading over the frames.
@@ -65,12 +65,26 @@ struct Judged {
 impl Sample<'_> {
     /// The agreement of the scene as stated, whether it fits, and the mistake that explains it if it does not.
     pub(super) fn diagnose(self) -> (Agreement, Fit, Option<Finding>) {
+        let stated = self.agreement();
+        // It does not count on the poses, so it may be chance unless the scene fits in the end.
+        let by_motions = self.cloud_by_motions().and_then(|(finding, change)| {
+            let (fit, rest) = self.clone().read_as(&change).chained();
+            (fit == Fit::Fits).then(|| (fit, Finding { then: rest.map(Box::new), ..finding }))
+        });
+        let (fit, found) = match by_motions {
+            Some((fit, finding)) => (fit, Some(finding)),
+            None => self.chained(),
+        };
+        (stated, fit, found)
+    }
+
+    /// The best reading, and what explains the rest; with whether the scene fits in the end.
+    fn chained(self) -> (Fit, Option<Finding>) {
         /// How many mistakes are found one after the other.
         const MISTAKES: usize = 2;
-        let stated = self.agreement();
         let (mut sample, mut found, mut fit) = (self, Vec::new(), None);
         while found.len() < MISTAKES
-            && let Some((finding, change)) = sample.cloud_by_motions().or_else(|| sample.best())
+            && let Some((finding, change)) = sample.best()
         {
             found.push(finding);
             // No scene can be read with another lens, so nothing further is found.
@@ -80,12 +94,8 @@ impl Sample<'_> {
             }
             sample = sample.read_as(&change);
         }
-        let fit = fit.unwrap_or_else(|| sample.fit());
-        let chained = found
-            .into_iter()
-            .rev()
-            .reduce(|then, finding| Finding { then: Some(Box::new(then)), ..finding });
-        (stated, fit, chained)
+        let chain = |then, finding| Finding { then: Some(Box::new(then)), ..finding };
+        (fit.unwrap_or_else(|| sample.fit()), found.into_iter().rev().reduce(chain))
     }
 
     fn agreement(&self) -> Agreement {
@@ -236,9 +246,7 @@ impl Sample<'_> {
             Some(5.0) => "divide the coordinates of clouds by 5; if these are depth images that are read with 1000 \
                           for one metre, 5000 is one metre"
                 .to_owned(),
-            Some(0.2) => "multiply the coordinates of clouds by 5; if these are depth images that are read with 5000 \
-                          for one metre, 1000 is one metre"
-                .to_owned(),
+            Some(0.2) => READ_WITH_5000.to_owned(),
             _ => format!("divide the coordinates of clouds, or multiply the positions of poses, by {times:.3}"),
         };
         Some(Reading { mistake: Mistake::Units, remedy, change: Change::Size(1.0 / times) })

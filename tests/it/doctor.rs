@@ -100,6 +100,30 @@ fn are_named(is_planted: impl Fn(Fault) -> bool) {
     }
 }
 
+/// The poses decide what of a map is seen, so it is cut anew for each reading.
+#[test]
+#[ignore = "takes half a minute; .ci/nightly runs it"]
+fn mistakes_of_poses_are_named_with_one_map_for_all_frames() {
+    let street = Street::new("overcast", Size::Half).expect("is built in");
+    let faults = [
+        Fault::Nothing,
+        Fault::InversePose,
+        Fault::OpenGlAxes,
+        Fault::PoseAxes,
+        Fault::QuaternionOrder,
+        Fault::ReversedPoses,
+    ];
+    for fault in faults {
+        let folder = TempDir::new().expect("a folder");
+        Planted::new(&street, fault, 0, 40).write_with_map(folder.path());
+        let found = examine(open(folder.path()).as_ref());
+        let named = found.finding.as_ref().map(|finding| finding.mistake);
+        println!("{fault:?}: {named:?} {:?}", found.agreement);
+        let expected = EXPECTED.iter().find(|(of, _)| *of == fault).and_then(|(_, named)| *named);
+        assert_eq!(named, expected, "{fault:?}");
+    }
+}
+
 /// It takes photos that are sharp enough, and a speed that changes.
 #[test]
 #[ignore = "takes half a minute; .ci/nightly runs it"]
