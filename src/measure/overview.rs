@@ -24,7 +24,7 @@ pub struct Overview {
 /// How many results of a method have each grade.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Bar {
-    /// The method, with its fusion.
+    /// The method as it is typed, with its fusion.
     pub name: String,
     /// In the order of [`Grade::ALL`].
     pub counts: [usize; Grade::ALL.len()],
@@ -52,7 +52,7 @@ impl Bar {
 impl Overview {
     /// Of the results of a run, and of what `posescope doctor` says of its scenes.
     pub fn of(results: &[&QueryResult], examined: &[Finding]) -> Self {
-        let bars = grouped(results.iter().map(|result| (label(result), *result)));
+        let bars = grouped(results.iter().map(|result| (result.method_name(), *result)));
         let bars = bars.into_iter().map(|(name, results)| {
             let of = |grade| results.iter().filter(|one| one.grade == grade).count();
             let errors: Vec<f64> =
@@ -91,12 +91,6 @@ pub fn worst_first(results: &[QueryResult]) -> Vec<usize> {
     failures
 }
 
-/// The method as people write it, with its fusion.
-fn label(result: &QueryResult) -> String {
-    let fusion = result.fusion.map(|fusion| format!(" {fusion}"));
-    format!("{}{}", result.method.label(), fusion.unwrap_or_default())
-}
-
 /// How many results have each primary cause.
 fn causes<'a>(results: impl Iterator<Item = &'a &'a QueryResult>) -> Vec<(Code, usize)> {
     let primary = results.filter_map(|result| Some((result.diagnosis.first()?.code, ())));
@@ -124,10 +118,13 @@ fn headline(results: &[&QueryResult], bars: &[Bar]) -> String {
     let mut words = match good {
         0 if total == 1 => "No method is right for the query.".to_owned(),
         0 => format!("No method is right for any of {total} {queries}."),
+        _ if bars.len() > 1 => {
+            format!("Best method: {name}, right for {good} of {total} {queries}.")
+        }
         _ => format!("{name} is right for {good} of {total} {queries}."),
     };
     // Where none is right, all failures count.
-    let is_counted = |result: &QueryResult| good == 0 || label(result) == *name;
+    let is_counted = |result: &QueryResult| good == 0 || result.method_name() == *name;
     let whose = if good == 0 { "the" } else { "its" };
     let failed: Vec<&&QueryResult> =
         results.iter().filter(|result| is_counted(result) && result.grade.is_failure()).collect();
@@ -171,16 +168,18 @@ mod tests {
         assert_eq!(
             overview.headline,
             format!(
-                "MI is right for 2 of 3 queries. Most frequent cause of its failures: {} (1 of 1).",
+                "Best method: mi, right for 2 of 3 queries. Most frequent cause of its failures: {} (1 of 1).",
                 Code::D3.title()
             )
         );
+        let one = Overview::of(&all[..2], &[]);
+        assert_eq!(one.headline, "fb is right for 1 of 2 queries.");
         let counts: Vec<_> = overview
             .bars
             .iter()
             .map(|bar| (bar.name.as_str(), bar.count(Grade::Right), bar.total()))
             .collect();
-        assert_eq!(counts, [("FB", 1, 2), ("MI", 2, 3)]);
+        assert_eq!(counts, [("fb", 1, 2), ("mi", 2, 3)]);
         assert_eq!(overview.causes, [(Code::D3, 1)]);
         let wrong = Overview::of(&[&rows[3], &rows[1]], &[]);
         let title = Code::D3.title();

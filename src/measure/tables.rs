@@ -191,7 +191,7 @@ impl Dimension {
             Self::Pair => group.scenes(),
             Self::References => group.scene.clone(),
             Self::Queries => group.query_scene.as_ref().unwrap_or(&group.scene).clone(),
-            Self::Method => one.method.label(),
+            Self::Method => one.method.to_string(),
             Self::Radius => group.setting.map_or(String::new(), |one| one.radius_m.to_string()),
             Self::Count => group.setting.map_or(String::new(), |one| one.references.to_string()),
             Self::Fusion => group.fusion.map_or(String::new(), |fusion| fusion.to_string()),
@@ -416,7 +416,7 @@ fn verdicts(measures: &[Measures]) -> Option<Table> {
     let mut table = Table::new("verdicts", caption, head.into_iter().chain(columns));
     table.shared = 1;
     for one in measures {
-        let head = [one.group.to_string(), one.method.label(), one.queries.to_string()];
+        let head = [one.group.to_string(), one.method.to_string(), one.queries.to_string()];
         let shares = codes.iter().map(|code| {
             let count = one.verdicts.get(code).copied().unwrap_or_default();
             format!("{:.1}", 100.0 * one.share(count))
@@ -429,7 +429,7 @@ fn verdicts(measures: &[Measures]) -> Option<Table> {
 /// The hybrid's lead in success rate over each other method in percentage points, as the mean over all pairs of
 /// scenes, for us and for the paper (the averages in its abstract). `None` without a hybrid.
 fn advantage(measures: &[Measures]) -> Option<Table> {
-    let header = ["HY over", "pairs of scenes", "points", "points (paper)"];
+    let header = ["hy over", "pairs of scenes", "points", "points (paper)"];
     let caption = "The hybrid's lead in success rate, in percentage points, averaged over the pairs of scenes";
     let mut table = Table::new("advantage", caption, header);
     let hybrids: Vec<&Measures> = measures.iter().filter(|one| one.method == Method::HY).collect();
@@ -453,7 +453,7 @@ fn advantage(measures: &[Measures]) -> Option<Table> {
             0 => NOTHING.to_owned(),
             count => format!("{:.1}", points.iter().sum::<f64>() / count as f64),
         };
-        table.push([method.label(), ours.len().to_string(), mean(&ours), mean(&papers)]);
+        table.push([method.to_string(), ours.len().to_string(), mean(&ours), mean(&papers)]);
     }
     (!hybrids.is_empty() && !table.rows.is_empty()).then_some(table)
 }

@@ -72,7 +72,7 @@ fn the_summary_of_a_step_is_appended_where_there_is_one() {
     assert!(text.starts_with("# before\n### ❌ posescope: kitti/42"), "{text}");
     has(
         &text,
-        "| `median(time)@fb < 60` | passed | ~ | `success@fb > 0.9` | failed | ~ | FB | 66.7 |",
+        "| `median(time)@fb < 60` | passed | ~ | `success@fb > 0.9` | failed | ~ | fb | 66.7 |",
     );
     assert!(text.len() < 4000);
     // Where nobody can write, the run goes on.

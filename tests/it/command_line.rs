@@ -241,7 +241,7 @@ fn an_evaluation_fits_eighty_columns_and_in_a_pipe_a_hundred() {
     assert!(piped.lines().all(|line| line.chars().count() <= 100), "{piped}");
     for text in [narrow, piped] {
         assert!(!text.contains('|'), "{text}");
-        has(&text, "FB ~ MI ~ median error ~ Report: ~ --table summary");
+        has(&text, "fb ~ mi ~ median error ~ Right: ~ Trusted: ~ Report: ~ --table summary");
     }
 }
 

@@ -78,7 +78,7 @@ fn a_run_folder_holds_what_is_promised() {
     let said = sequence.run(&format!("{STRICT} run")).ok();
     has(
         &said.out,
-        "method ~ wrong ~ trusted ~ mostly ~ Worst queries: ~ posescope view run --query ~ Report: run/report.html",
+        "method ~ wrong ~ trusted ~ mostly ~ Right: within ~ Failures: ~ posescope view run --query ~ --method ~ Report: run/report.html",
     );
     assert!(said.out.lines().all(|line| line.chars().count() <= 100), "{}", said.out);
     let (files, recordings) = timeless(&out);

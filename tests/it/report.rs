@@ -105,7 +105,7 @@ fn eval_leaves_a_report_that_needs_nothing_else() {
          id=\"plots\" ~ id=\"figures\" ~ id=\"asked\"",
     );
     // The bars count every result, with its grade in words.
-    has(&page, "role=\"img\" aria-label=\"FB: ~ no pose\" ~ aria-label=\"MI: ");
+    has(&page, "role=\"img\" aria-label=\"fb: ~ no pose\" ~ aria-label=\"mi: ");
     // The worst failures are open, the greatest error first; a cause in the table leads to them.
     let (_, open) = page.split_once("id=\"failures\"").expect("failures");
     let (open, _) = open.split_once("id=\"queries\"").expect("results");

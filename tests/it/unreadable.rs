@@ -26,7 +26,7 @@ fn a_photo_that_cannot_be_read_costs_its_queries_alone_and_is_tried_again() {
         3,
         "queries were not localised ~ 000002.png ~ --resume ~ gate `right@fb >= 2` failed",
     );
-    has(&said.out, "FB ~ PM");
+    has(&said.out, "fb ~ pm");
     for file in ["summary.json", "junit.xml", "report.html"] {
         assert!(sequence.path().join("run").join(file).is_file(), "{file}");
     }
@@ -83,7 +83,7 @@ fn a_file_that_cannot_be_written_takes_no_other_away() {
     fs::create_dir(run.join("junit.xml")).expect("writable");
     let said = sequence.run(&format!("{EVAL} run --resume"));
     let said = said.fails(3, "junit.xml");
-    has(&said.out, "FB ~ PM");
+    has(&said.out, "fb ~ pm");
     assert!(run.join("summary.json").is_file() && run.join("report.html").is_file());
 }
 

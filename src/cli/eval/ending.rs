@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use posescope::diagnosis::Grade;
+use posescope::diagnosis::{Grade, confidence};
 use posescope::localize::QueryResult;
 use posescope::measure::{Bar, Finding, Overview, Report, worst_first};
 use posescope::report::repeat_command;
@@ -13,7 +13,7 @@ use posescope::table::{Table, wrapped};
 
 /// The most characters of a line.
 const WIDEST: usize = 100;
-/// Failures with the command that opens each.
+/// The most failures that are listed, each with the command that opens it.
 const WORST: usize = 3;
 
 /// The text, in lines that fit a terminal of this width.
@@ -23,7 +23,9 @@ pub fn ending(run: &RunFile, report: &Report, folder: &Path, width: Option<usize
     let lines = |text: &str| wrapped(text, width, "  ");
     let overview = Overview::of(&results.iter().collect::<Vec<_>>(), &[]);
     let table = methods(&overview.bars).in_words_of(report.results.unit());
-    let mut text = lines(&overview.headline) + "\n" + &table.to_text(Some(width)) + "\n";
+    let mut text = lines(&overview.headline) + "\n" + &table.to_text(Some(width));
+    let meanings = report.results.unit().words(&meanings(run, &overview.bars));
+    text += &(meanings.lines().map(lines).collect::<String>() + "\n");
     for Finding { text: found, .. } in &report.findings {
         text += &lines(&format!("Finding: {found}"));
     }
@@ -64,18 +66,47 @@ fn methods(bars: &[Bar]) -> Table {
     table
 }
 
-/// The worst failures, each of another query, with the commands that open them.
+/// What the columns of the table count, in lines.
+fn meanings(run: &RunFile, bars: &[Bar]) -> String {
+    let right = run.protocol.right;
+    let (metres, degrees) = (right.translation_m, right.rotation_deg);
+    let measured = format!(
+        "Right: within {metres} m and {degrees}° of the truth. Median error: over all poses, right or wrong.\n"
+    );
+    let trusted = format!(
+        "Trusted: by the method's own evidence at least {} likely within {} m.\n",
+        confidence::percent(confidence::TRUSTED_FROM),
+        confidence::WITHIN_M
+    );
+    let is_measured = bars.iter().any(|bar| bar.median_m.is_some());
+    if is_measured { measured + &trusted } else { trusted }
+}
+
+/// The worst failures, each of another query, with the commands that open them. One without a pose is among them
+/// if there is any.
 fn worst(run: &RunFile, results: &[QueryResult], folder: &Path, width: usize) -> String {
+    let failures: Vec<&QueryResult> =
+        worst_first(results).into_iter().map(|at| &results[at]).collect();
     let mut seen = BTreeSet::new();
-    let worst = worst_first(results).into_iter().map(|at| &results[at]);
-    let worst: Vec<&QueryResult> = worst
-        .filter(|one| seen.insert((&one.scene, &one.query_scene, &one.query)))
-        .take(WORST)
-        .collect();
-    let mut text = String::new();
-    if !worst.is_empty() {
-        text += "Worst queries:\n";
+    let distinct =
+        failures.iter().filter(|one| seen.insert((&one.scene, &one.query_scene, &one.query)));
+    let mut worst: Vec<&QueryResult> = distinct.copied().take(WORST).collect();
+    let is_missing = |one: &QueryResult| one.grade == Grade::NoPose;
+    let missing = failures.iter().find(|one| is_missing(one));
+    if let Some(missing) = missing.filter(|_| !worst.iter().any(|one| is_missing(one))) {
+        worst.truncate(WORST - 1);
+        worst.push(missing);
     }
+    if worst.is_empty() {
+        return String::new();
+    }
+    let missing = failures.iter().filter(|one| is_missing(one)).count();
+    let wrong = failures.len() - missing;
+    let mut text = wrapped(
+        &format!("Failures: {wrong} wrong, {missing} without a pose. The worst:"),
+        width,
+        "  ",
+    );
     for one in worst {
         let off = one.off().map_or_else(|| one.grade.to_string(), |off| format!("{off} off"));
         let cause = one.diagnosis.first().map(|found| format!(", {}", found.code.title()));
@@ -84,7 +115,13 @@ fn worst(run: &RunFile, results: &[QueryResult], folder: &Path, width: usize) ->
         text += &wrapped(&line, width, "    ");
         text += &format!("    {}\n", opening(run, one, folder));
     }
-    if text.is_empty() { text } else { text + "\n" }
+    let all = [
+        "results",
+        &folder.display().to_string(),
+        "--where",
+        "grade = wrong or grade = \"no pose\"",
+    ];
+    text + &format!("All failures: {}\n\n", command_line(&all.map(str::to_owned)))
 }
 
 /// The command that opens a query: in the run, whose window shows its first pair of scenes, or alone.
@@ -98,6 +135,8 @@ fn opening(run: &RunFile, result: &QueryResult, folder: &Path) -> String {
             folder,
             "--query".to_owned(),
             result.query.clone(),
+            "--method".to_owned(),
+            result.method.to_string(),
         ]);
     }
     repeat_command(run, result).replacen("posescope run", "posescope view", 1)

@@ -52,7 +52,7 @@ fn the_papers_own_cells_give_the_averages_of_its_abstract() {
         })
         .collect();
     let tables = tables(&RunResults::of(rows, 10.0), Some("large"));
-    assert_eq!(lines(&tables, "advantage"), ["FB | 25 | 100.0 | 25.1", "MI | 25 | 50.0 | 5.8"]);
+    assert_eq!(lines(&tables, "advantage"), ["fb | 25 | 100.0 | 25.1", "mi | 25 | 50.0 | 5.8"]);
 }
 
 #[test]
@@ -80,21 +80,21 @@ fn the_single_table_has_medians_over_queries_solved_by_all_and_the_papers_figure
             "solved by all (paper) | 406 | 328",
             "solved by all (%) | 100.0 | 50.0",
             "solved by all (%) (paper) | 89 | 72",
-            "FB | 0.200 | 0.500",
-            "FB (paper) | 0.13 | 0.40",
-            "MI | 3.000 | 20.000",
-            "MI (paper) | 1.56 | 5.41",
+            "fb | 0.200 | 0.500",
+            "fb (paper) | 0.13 | 0.40",
+            "mi | 3.000 | 20.000",
+            "mi (paper) | 1.56 | 5.41",
         ]
     );
     // The greatest Euler angle of the canned errors is half of their metres.
     let rotation = lines(&tables, "single-rotation-kitti-00");
-    assert_eq!(rotation[4], "FB | 0.100 | 0.250");
-    assert_eq!(rotation[5], "FB (paper) | 1.76 | 3.83");
+    assert_eq!(rotation[4], "fb | 0.100 | 0.250");
+    assert_eq!(rotation[5], "fb (paper) | 1.76 | 3.83");
     let solved = [
-        "FB (solved) | 100.0 | 50.0",
-        "FB (success) | 100.0 | 50.0",
-        "MI (solved) | 100.0 | 100.0",
-        "MI (success) | 100.0 | 50.0",
+        "fb (solved) | 100.0 | 50.0",
+        "fb (success) | 100.0 | 50.0",
+        "mi (solved) | 100.0 | 100.0",
+        "mi (success) | 100.0 | 50.0",
     ];
     assert_eq!(lines(&tables, "single-solved-kitti-00"), solved);
     // Failures are infinite: half of the queries at 15 m is within no limit for fb.
@@ -121,16 +121,16 @@ fn the_multi_table_has_the_rmse_over_all_queries_that_each_fusion_solved() {
     assert_eq!(
         lines(&tables, "multi-rmse-street")[..4],
         [
-            "FB | avg | 3.000 | 1.500 | 13.000 | 6.500",
-            "FB | avg (median) | 3.000 | 1.500 | 12.000 | 6.000",
-            "FB | r-wavg | 3.000 | 1.500 | 0.707 | 0.354",
-            "FB | r-wavg (median) | 3.000 | 1.500 | 0.700 | 0.350",
+            "fb | avg | 3.000 | 1.500 | 13.000 | 6.500",
+            "fb | avg (median) | 3.000 | 1.500 | 12.000 | 6.000",
+            "fb | r-wavg | 3.000 | 1.500 | 0.707 | 0.354",
+            "fb | r-wavg (median) | 3.000 | 1.500 | 0.700 | 0.350",
         ]
     );
     let solved = lines(&tables, "multi-solved-street");
     assert_eq!(
         solved[..2],
-        ["FB | avg (solved) | 50.0 | 100.0", "FB | avg (success) | 50.0 | 50.0"]
+        ["fb | avg (solved) | 50.0 | 100.0", "fb | avg (success) | 50.0 | 50.0"]
     );
 }
 
@@ -148,17 +148,17 @@ fn the_large_table_and_the_confusion_matrix_place_every_pair() {
     assert_eq!(
         lines(&tables, "large"),
         [
-            "kitti/01 | FB | 1 | 100.0 | 3.000 | 1.500 | 3.000 | 1.500 | 84.5 | 0.494 | 0.567",
-            "kitti/01 | MI | 1 | 100.0 | 4.000 | 2.000 | 4.000 | 2.000 | 60.0 | 0.980 | 0.353",
-            "kitti/01 ← rain | FB | 1 | 0.0 | – | – | – | – | – | – | –",
-            "kitti/01 ← rain | MI | 1 | 100.0 | 6.000 | 3.000 | 6.000 | 3.000 | – | – | –",
+            "kitti/01 | fb | 1 | 100.0 | 3.000 | 1.500 | 3.000 | 1.500 | 84.5 | 0.494 | 0.567",
+            "kitti/01 | mi | 1 | 100.0 | 4.000 | 2.000 | 4.000 | 2.000 | 60.0 | 0.980 | 0.353",
+            "kitti/01 ← rain | fb | 1 | 0.0 | – | – | – | – | – | – | –",
+            "kitti/01 ← rain | mi | 1 | 100.0 | 6.000 | 3.000 | 6.000 | 3.000 | – | – | –",
         ]
     );
     assert_eq!(
         lines(&tables, "confusion"),
         [
-            "kitti/01 | FB | 100.0 | 3.000 | 1.500 | 0.0 | – | –",
-            "kitti/01 | MI | 100.0 | 4.000 | 2.000 | 100.0 | 6.000 | 3.000",
+            "kitti/01 | fb | 100.0 | 3.000 | 1.500 | 0.0 | – | –",
+            "kitti/01 | mi | 100.0 | 4.000 | 2.000 | 100.0 | 6.000 | 3.000",
         ]
     );
 }
@@ -169,7 +169,7 @@ fn the_large_table_has_no_columns_for_figures_that_the_paper_does_not_have() {
     let tables = tables(&RunResults::of(rows, 10.0), Some("large"));
     assert_eq!(
         lines(&tables, "large"),
-        ["street | FB | 1 | 100.0 | 3.000 | 1.500 | 3.000 | 1.500"]
+        ["street | fb | 1 | 100.0 | 3.000 | 1.500 | 3.000 | 1.500"]
     );
     assert!(tables.iter().all(|table| !table.to_markdown().contains("paper")));
 }
