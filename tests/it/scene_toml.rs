@@ -10,7 +10,7 @@ use posescope::geometry::Pose;
 use posescope::scene::Scene;
 use tempfile::TempDir;
 
-use crate::binary::{arg, has};
+use crate::binary::{arg, has, run_in};
 use crate::damage;
 use crate::damage::open;
 use crate::small_sequence::wall;
@@ -476,4 +476,24 @@ fn the_length_of_a_compressed_layer_is_not_believed() {
     with(folder.path(), "map.xyz", "layered.laz");
     let error = open(folder.path()).cloud(0).expect_err("is too long");
     has(&error.to_string(), "a chunk of points");
+}
+
+/// The decoder adds the sizes of a point's parts. It panics where they are too large for the sum, which is the file's
+/// mistake and no bug of ours.
+#[test]
+fn a_cloud_at_which_the_decoder_panics_is_named_in_one_line() {
+    let folder = TempDir::new().expect("a folder");
+    write(folder.path());
+    let path = folder.path().join("layered.laz");
+    las(&path, &[]);
+    let mut bytes = fs::read(&path).expect("just written");
+    let points = u32::from_le_bytes([96, 97, 98, 99].map(|at: usize| bytes[at])) as usize;
+    // Type, size and version of both parts are the last before the points.
+    let size = points - 12 + 2;
+    bytes[size..size + 2].copy_from_slice(&u16::MAX.to_le_bytes());
+    fs::write(&path, bytes).expect("writable");
+    with(folder.path(), "map.xyz", "layered.laz");
+    let said = run_in(folder.path(), "run . --query img1 --reference img0");
+    let said = said.fails_in_one_line(3, "layered.laz");
+    assert!(!said.err.contains("internal error"), "{}", said.err);
 }
