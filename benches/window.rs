@@ -135,7 +135,7 @@ fn scrubbing(bencher: Bencher) {
 /// The window with the 3-D view alone, at the end of MI's search.
 fn in_space(window: &mut Window) -> egui::Pos2 {
     window.state_mut().app_state_mut().select_method(Method::MI);
-    window.state_mut().app_state_mut().show_alone(Some("space"));
+    window.state_mut().app_state_mut().show_alone(Some(app::ViewName::Space));
     window.run_steps(3);
     window.get_by_label_contains("3-D view of").rect().center()
 }
@@ -258,9 +258,7 @@ fn filter_10000_results(bencher: Bencher) {
 fn own_frame_of_10000_results(bencher: Bencher, view: &str) {
     with_window(|window| {
         let mut batch = ManyResults::write(window).open(window);
-        let mut entries = app::views::ALL.iter();
-        let entry = entries.find(|entry| entry.name == view).expect("a view");
-        batch.state_mut().app_state_mut().show_alone(Some(entry.name));
+        batch.state_mut().app_state_mut().show_alone(app::ViewName::find(view));
         batch.run_steps(3);
         bencher.bench_local(|| draw_own(&mut batch));
     });

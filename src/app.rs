@@ -33,6 +33,7 @@ mod state;
 mod textures;
 mod theme;
 mod view_context;
+mod view_name;
 mod view_options;
 pub mod views;
 mod window;
@@ -49,6 +50,7 @@ pub use shown::{ShownReason, ShownView};
 pub use state::{AppState, Note};
 pub(crate) use view_context::Sends;
 pub use view_context::ViewContext;
+pub use view_name::ViewName;
 pub use view_options::{Arrangement, CompareMode, Tab, ViewOptions};
 pub use window::{WindowError, has_display, open, open_lesson};
 
@@ -138,6 +140,9 @@ impl App {
             let is_error = written.is_err();
             self.state.note(written.unwrap_or_else(|why| why), is_error);
         }
+        for opened in self.state.opener.poll() {
+            self.take_opened(opened);
+        }
         self.obey();
         let title = self.state.setup.title();
         if title != self.title {
@@ -222,7 +227,7 @@ impl App {
                     .show(ui, |ui| frame::storyboard::ui(ui, context));
                 if options.shows_queries && sizes.has_sides {
                     fixed(Panel::left("queries"), sizes.queries, Margin::same(6))
-                        .show(ui, |ui| panes.show(ui, views::QUERIES, context));
+                        .show(ui, |ui| panes.show(ui, ViewName::Queries, context));
                 }
                 if options.shows_inspector && sizes.has_sides {
                     fixed(Panel::right("inspector"), sizes.inspector, Margin::symmetric(10, 6))
@@ -245,7 +250,7 @@ impl App {
                 central.show(ui, |ui| {
                     canvas = ui.max_rect();
                     if context.options.lockstep.is_some() {
-                        panes.show(ui, "lockstep", context);
+                        panes.show(ui, ViewName::Lockstep, context);
                     } else {
                         frame::canvas::ui(ui, context, panes, 2);
                     }
@@ -289,5 +294,10 @@ impl eframe::App for App {
 
     fn ui(&mut self, ui: &mut egui::Ui, _frame: &mut eframe::Frame) {
         self.content(ui);
+    }
+
+    /// A recording that is being written is not cut off.
+    fn on_exit(&mut self) {
+        self.state.recorder.finish();
     }
 }

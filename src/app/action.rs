@@ -10,8 +10,10 @@ use super::command::Queue;
 use super::save::SaveTarget;
 use super::state::AppState;
 use super::view_context::{Sends, ViewContext};
+use super::view_name::ViewName;
 use super::view_options::Arrangement;
 use super::view_options::{CompareMode, Tab};
+use crate::measure::is_equal;
 use crate::session::RunMode;
 
 /// What an action is for. The list of keys is in these groups.
@@ -107,7 +109,7 @@ use Group::{Camera, Compare, Lesson, Look, Query, Run, Show, Window};
 /// Every action, in the order of the list of keys.
 // A line for each: broken up, the table would be four times as long.
 #[rustfmt::skip]
-pub static ACTIONS: &[Action] = &[
+pub const ACTIONS: &[Action] = &[
     once(Run, &[key(Key::Space)], "Run or pause", |app| app.state.run_or_pause()),
     once(Run, &[key(Key::F5)], "Run to the next breakpoint", |app| app.state.go_on()),
     once(Run, &[key(Key::F9)], "Run to the end, past all breakpoints", |app| app.state.run_to_end()),
@@ -144,7 +146,7 @@ pub static ACTIONS: &[Action] = &[
     once(Query, &[key(Key::Slash)], "Filter the queries, the parameters or the results", |app| app.state.focus_filter()),
     switch(Query, &[], "Run all queries, or stop", |app| app.state.queries.run_all(&app.state.setup), |state| state.queries.progress().is_some()),
     switch(Show, &[key(Key::G)], "Ground truth", |app| app.state.options.shows_truth ^= true, |state| state.options.shows_truth),
-    once(Show, &[key(Key::V)], "3-D view and back", |app| app.state.toggle("space")),
+    once(Show, &[key(Key::V)], "3-D view and back", |app| app.state.toggle(ViewName::Space)),
     switch(Show, &[key(Key::B)], "Blink between query and synthetic view", |app| app.state.options.blinking ^= true, |state| state.options.blinking),
     switch(Show, &[key(Key::F)], "Dense map of all positions and headings", |app| app.state.options.shows_dense_map ^= true, |state| state.options.shows_dense_map),
     switch(Show, &[key(Key::M)], "The canvas alone", |app| app.state.show_alone(None), |state| state.options.is_alone),
@@ -200,12 +202,19 @@ pub(super) fn of(text: &str) -> Option<&'static Action> {
     ACTIONS.iter().find(|action| action.text == text)
 }
 
-/// What an action does, with its keys.
-pub(super) fn tooltip(ctx: &egui::Context, text: &str) -> String {
-    of(text).map(|action| action.tooltip(ctx)).unwrap_or_default()
-}
-
 impl Action {
+    /// The action that has this text. A text that no action has does not compile in a `const`.
+    pub(super) const fn named(text: &str) -> &'static Self {
+        let mut at = 0;
+        while at < ACTIONS.len() {
+            if is_equal(ACTIONS[at].text, text) {
+                return &ACTIONS[at];
+            }
+            at += 1;
+        }
+        panic!("no action has this text")
+    }
+
     /// Its keys as people read them, separated by commas; nothing where it has none.
     pub(super) fn keys_text(&self, ctx: &egui::Context) -> String {
         let keys = self.keys.iter().map(|keys| ctx.format_shortcut(keys));
@@ -230,9 +239,8 @@ impl Action {
     }
 }
 
-/// A button that does the action of this text; its tooltip comes from the table.
-pub(super) fn button(ui: &mut Ui, context: &ViewContext<'_>, name: &str, text: &str) {
-    let Some(action) = of(text) else { return };
+/// A button that does the action; its tooltip comes from the table.
+pub(super) fn button(ui: &mut Ui, context: &ViewContext<'_>, name: &str, action: &'static Action) {
     let button = Button::selectable((action.is_on)(context.state), name).frame_when_inactive(true);
     ui.add(button).on_hover_text(action.tooltip(ui.ctx())).sends(context, action.run);
 }
@@ -242,11 +250,11 @@ pub(super) fn toggle(
     ui: &mut Ui,
     context: &ViewContext<'_>,
     name: &str,
-    text: &'static str,
+    action: &'static Action,
 ) -> Response {
-    let is_on = of(text).is_some_and(|action| (action.is_on)(context.state));
-    let response = ui.selectable_label(is_on, name).on_hover_text(tooltip(ui.ctx(), text));
-    response.sends(context, move |app| app.act(text));
+    let is_on = (action.is_on)(context.state);
+    let response = ui.selectable_label(is_on, name).on_hover_text(action.tooltip(ui.ctx()));
+    response.sends(context, action.run);
     response
 }
 

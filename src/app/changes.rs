@@ -6,6 +6,7 @@ use super::queries::Queries;
 use super::run_pictures::RunPictures;
 use super::selection::Results;
 use super::state::{AppState, KeptRun};
+use super::view_name::ViewName;
 use super::view_options::Arrangement;
 use super::view_options::{CompareMode, Tab};
 use crate::diagnosis::DecidedAt;
@@ -125,10 +126,10 @@ impl AppState {
     }
 
     /// Shows a view on the canvas, in the inspector or alone, wherever its place is.
-    pub fn show_view(&mut self, name: &'static str) {
+    pub fn show_view(&mut self, name: ViewName) {
         match name {
-            super::views::PARAMETERS => self.show_tab(Tab::Parameters),
-            "log" => self.show_tab(Tab::Log),
+            ViewName::Parameters => self.show_tab(Tab::Parameters),
+            ViewName::Log => self.show_tab(Tab::Log),
             _ => {
                 self.options.shows_why = false;
                 self.options.large = Some((self.shown_stage(), name));
@@ -143,7 +144,7 @@ impl AppState {
     }
 
     /// Gives all the room to a view; without one to the canvas, or back to all parts of the window.
-    pub fn show_alone(&mut self, view: Option<&'static str>) {
+    pub fn show_alone(&mut self, view: Option<ViewName>) {
         self.options.is_alone = view.is_some() || !self.options.is_alone;
         self.options.alone = view;
     }
@@ -157,7 +158,7 @@ impl AppState {
     }
 
     /// Shows a view on the canvas, or what was there before.
-    pub(super) fn toggle(&mut self, name: &'static str) {
+    pub(super) fn toggle(&mut self, name: ViewName) {
         let here = (self.shown_stage(), name);
         if self.options.large == Some(here) {
             self.options.large = None;

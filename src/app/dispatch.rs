@@ -9,6 +9,8 @@ use super::lesson::Given;
 use super::navigation::{Anchor, Navigation};
 use super::save::{Asking, SaveTarget};
 use super::saved::SavedSession;
+use super::state::Opened;
+use super::view_name::ViewName;
 use super::view_options::Arrangement;
 
 impl App {
@@ -90,20 +92,16 @@ impl App {
 
     /// Shows what the present page of the lesson is about.
     fn show_page(&mut self) {
-        let Some(open) = &mut self.lesson else { return };
+        let Some(open) = &self.lesson else { return };
         match open.other_setup(&self.state.setup) {
-            Ok(Some(setup)) => {
-                let navigation = Navigation::towards(Anchor::Moment(open.moment().clone()));
-                self.state.change_setup(setup, navigation);
-            }
-            Ok(None) => self.state.seek(open.moment().clone()),
-            Err(error) => self.state.note(error.to_string(), true),
+            Some(job) => self.state.open(job),
+            None => self.state.seek(open.moment().clone()),
         }
         // The truth would be an answer.
         self.state.options.shows_truth = open.asked().is_none();
         let page = open.page();
         self.state.options.lockstep = page.lockstep;
-        let named = page.show.iter().filter_map(|name| super::views::name_of(name));
+        let named = page.show.iter().filter_map(|word| ViewName::find(word));
         let named: Vec<_> = named.collect();
         self.state.options.presented = Some(named).filter(|named| !named.is_empty());
     }
@@ -120,7 +118,7 @@ impl App {
             SaveTarget::Picture => self.pictures.ask(&self.state.ctx, path, None),
             SaveTarget::Canvas => self.pictures.ask(&self.state.ctx, path, Some(self.canvas)),
             SaveTarget::Session => self.save_session(&path),
-            SaveTarget::Restored => self.restore_session(&path),
+            SaveTarget::Restored => self.restore_session(path),
         }
     }
 
@@ -133,17 +131,36 @@ impl App {
         }
     }
 
-    fn restore_session(&mut self, path: &Path) {
-        let restored = SavedSession::read(path).and_then(|saved| {
-            let setup = saved.setup(&self.state.setup)?;
-            Ok((setup, saved.cursor, saved.layout))
+    fn restore_session(&mut self, path: PathBuf) {
+        self.state.note(format!("Opening the session {} …", path.display()), false);
+        let present = self.state.setup.clone();
+        self.state.open(move || {
+            Opened::Session(
+                SavedSession::read(&path)
+                    .and_then(|saved| Ok((saved.setup(&present)?, saved.cursor, saved.layout))),
+            )
         });
-        match restored {
-            Ok((setup, cursor, layout)) => {
+    }
+
+    /// Takes over what was opened; `None` stands for a panic.
+    pub(super) fn take_opened(&mut self, opened: Option<Opened>) {
+        match opened {
+            Some(Opened::Session(Ok((setup, cursor, layout)))) => {
                 self.state.restore(setup, cursor);
                 self.arrange(layout);
+                self.state.note("The session is restored", false);
             }
-            Err(why) => self.state.note(why, true),
+            Some(Opened::Page(variant, Ok(setup))) => {
+                if let Some(open) = &mut self.lesson
+                    && open.take(variant, &setup)
+                {
+                    let navigation = Navigation::towards(Anchor::Moment(open.moment().clone()));
+                    self.state.change_setup(setup, navigation);
+                }
+            }
+            Some(Opened::Session(Err(why))) => self.state.note(why, true),
+            Some(Opened::Page(_, Err(error))) => self.state.note(error.to_string(), true),
+            None => self.state.note("internal error while scenes were opened", true),
         }
     }
 }

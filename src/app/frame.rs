@@ -10,18 +10,18 @@ pub(super) mod storyboard;
 pub(super) mod toolbar;
 pub(super) mod verdicts;
 
-use std::collections::BTreeMap;
-
 use egui::{RichText, Ui};
 
 use super::theme;
 use super::view_context::{Sends, ViewContext};
+use super::view_name::ViewName;
 use super::views::{self, View};
 use crate::session::Part;
 
 /// The views with what they remember: a zoom, a filter. Both runs that are compared share it.
 pub(super) struct Panes {
-    views: BTreeMap<&'static str, Box<dyn View>>,
+    /// In the order of [`views::ALL`].
+    views: Vec<Box<dyn View>>,
     /// The part whose proof has a small panel that was made large, and that panel.
     swapped: Option<(Part, usize)>,
 }
@@ -29,16 +29,13 @@ pub(super) struct Panes {
 impl Panes {
     pub(super) fn new() -> Self {
         let views = views::ALL.iter();
-        Self { views: views.map(|entry| (entry.name, (entry.new)())).collect(), swapped: None }
+        Self { views: views.map(|entry| (entry.new)()).collect(), swapped: None }
     }
 
     /// Draws a view of the run that is shown.
-    pub(super) fn show(&mut self, ui: &mut Ui, name: &str, context: &ViewContext<'_>) {
-        let Some(view) = self.views.get_mut(name) else {
-            ui.weak(format!("There is no view `{name}`"));
-            return;
-        };
-        ui.push_id(name.to_owned(), |ui| view.ui(ui, context));
+    pub(super) fn show(&mut self, ui: &mut Ui, name: ViewName, context: &ViewContext<'_>) {
+        let view = &mut self.views[name as usize];
+        ui.push_id(name.word(), |ui| view.ui(ui, context));
     }
 }
 

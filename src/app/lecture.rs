@@ -2,7 +2,7 @@
 
 use egui::{Align, Button, Layout, RichText, Ui};
 
-use super::action;
+use super::action::Action;
 use super::frame::storyboard::part_name;
 use super::theme;
 use super::view_context::{Sends, ViewContext};
@@ -44,12 +44,18 @@ pub(super) fn ui(ui: &mut Ui, context: &ViewContext<'_>) {
             ui.add(egui::Label::new(RichText::new(first).size(LARGE).color(color)).wrap());
             ui.add(egui::Label::new(RichText::new(second).size(SMALL).weak()).truncate());
         });
-        let texts = match context.options.lockstep {
-            Some(_) => ["All methods one step back", "All methods one step on"],
-            None => ["Previous stage", "Next stage"],
+        let actions = match context.options.lockstep {
+            Some(_) => {
+                const {
+                    [
+                        Action::named("All methods one step back"),
+                        Action::named("All methods one step on"),
+                    ]
+                }
+            }
+            None => const { [Action::named("Previous stage"), Action::named("Next stage")] },
         };
-        for (name, action) in ["◀", "▶"].into_iter().zip(texts.into_iter().filter_map(action::of))
-        {
+        for (name, action) in ["◀", "▶"].into_iter().zip(actions) {
             let button = ui.add_sized([52.0, 34.0], Button::new(name));
             button.on_hover_text(action.tooltip(ui.ctx())).sends(context, action.run);
         }

@@ -7,17 +7,18 @@ use egui::{Key, Modifiers, ProgressBar, RichText, ScrollArea, Ui};
 use egui_commonmark::{CommonMarkCache, CommonMarkViewer};
 
 use super::App;
-use super::action;
+use super::action::{Action, button};
 use super::command::Queue;
 use super::setup::Setup;
+use super::state::Opened;
 use super::theme;
 use super::view_context::{Sends, ViewContext};
 use crate::geometry::Pose;
 use crate::grid::Offset;
-use crate::lesson::{Answer, Lesson, Moment, Page, Question, SettingError, named_scenes};
+use crate::lesson::{Answer, Lesson, Moment, Page, Question, named_scenes};
 use crate::method::Method;
 use crate::scene::Scene;
-use crate::session::{Part, RunState};
+use crate::session::{Job, Part, RunState};
 
 /// Width of the panel \[points\].
 pub(super) const WIDTH: f32 = 330.0;
@@ -91,19 +92,32 @@ impl OpenLesson {
         }
     }
 
-    /// What the present page localises, where that is something else than before.
-    pub(super) fn other_setup(&mut self, setup: &Setup) -> Result<Option<Setup>, SettingError> {
+    /// What opens the scenes of the present page, where that localises something else than before.
+    pub(super) fn other_setup(
+        &self,
+        setup: &Setup,
+    ) -> Option<impl FnOnce() -> Opened + Send + 'static> {
         let wanted = self.page().variant.clone();
         if wanted == self.variant {
-            return Ok(None);
+            return None;
         }
-        let opened = |name: &str| self.scenes.get(name).cloned();
-        let mut open = self.lesson.setting(&wanted).open(&opened)?;
-        open.frames = Arc::clone(&setup.frames);
-        self.variant = wanted;
-        let setup = Setup::of_lesson(open, setup.folder.clone());
-        self.remember(&setup);
-        Ok(Some(setup))
+        let (setting, scenes) = (self.lesson.setting(&wanted).clone(), self.scenes.clone());
+        let (frames, folder) = (Arc::clone(&setup.frames), setup.folder.clone());
+        Some(move || {
+            let job = setting.open(&|name| scenes.get(name).cloned());
+            let setup = job.map(|job| Setup::of_lesson(Job { frames, ..job }, folder));
+            Opened::Page(wanted, setup)
+        })
+    }
+
+    /// Remembers the scenes that were opened for a page; whether the present page waits for them.
+    pub(super) fn take(&mut self, variant: String, setup: &Setup) -> bool {
+        self.remember(setup);
+        let is_wanted = variant == self.page().variant;
+        if is_wanted {
+            self.variant = variant;
+        }
+        is_wanted
     }
 
     /// The question that waits for an answer.
@@ -164,13 +178,15 @@ impl OpenLesson {
         let progress = ProgressBar::new(number as f32 / pages as f32).desired_height(6.0);
         ui.add(progress);
         ui.horizontal(|ui| {
-            let turn = |ui: &mut Ui, is_on: bool, name: &str, text: &str| {
-                ui.add_enabled_ui(is_on, |ui| action::button(ui, context, name, text));
+            let turn = |ui: &mut Ui, is_on: bool, name: &str, action: &'static Action| {
+                ui.add_enabled_ui(is_on, |ui| button(ui, context, name, action));
             };
-            turn(ui, number > 1, "◀ Back", "Previous page");
+            turn(ui, number > 1, "◀ Back", const { Action::named("Previous page") });
             ui.label(format!("page {number} of {pages}"));
-            turn(ui, number < pages, "Next ▶", "Next page");
-            if matches!(context.state.run_state(), RunState::Loading | RunState::Running) {
+            turn(ui, number < pages, "Next ▶", const { Action::named("Next page") });
+            let is_running =
+                matches!(context.state.run_state(), RunState::Loading | RunState::Running);
+            if is_running || context.state.is_opening() {
                 ui.spinner();
             }
         });

@@ -7,7 +7,8 @@ use super::command::Queue;
 use super::setup::Setup;
 use super::state::AppState;
 use super::textures::rgb_image;
-use crate::sink::rerun::{Identity, RecordError, Recorder, Targets};
+use crate::session::Run;
+use crate::sink::rerun::{Identity, Recorder, Targets};
 
 /// Something that leaves the window for a file, or comes from one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -116,39 +117,19 @@ impl Asking {
 }
 
 impl AppState {
-    /// Tells the run to a recording, from the history: nothing is computed anew.
-    fn record(&self, targets: &Targets) -> Result<(), RecordError> {
-        let (run, setup) = (self.run(), &self.setup);
-        if run.loaded.is_none() {
-            return Ok(());
-        }
-        let identity = Identity {
-            scene: setup.references.name().to_owned(),
-            query_scene: (!setup.is_one_drive()).then(|| setup.queries.name().to_owned()),
-            queries: vec![setup.query_name().to_owned()],
-            references: setup.reference_names(),
-            configuration: run.params.to_toml(),
-            degraded: setup.task.protocol.degrade,
-            seed: setup.task.protocol.seed,
-        };
-        let mut recorder = Recorder::open(targets, &identity, &setup.task.protocol.methods)?;
-        run.replay(&mut recorder);
-        recorder.close()
-    }
-
     pub(super) fn save_recording(&mut self, path: PathBuf) {
         let done = format!("Recording: {}", path.display());
-        self.record_to(&Targets { save: Some(path), ..Targets::default() }, done);
+        self.record_to(Targets { save: Some(path), ..Targets::default() }, done);
     }
 
     pub(super) fn stream_recording(&mut self) {
         let targets = Targets { connect: Some(String::new()), ..Targets::default() };
-        self.record_to(&targets, "The run was sent to the Rerun viewer".to_owned());
+        self.record_to(targets, "The run was sent to the Rerun viewer".to_owned());
     }
 
     pub(super) fn spawn_viewer(&mut self) {
         let targets = Targets { spawn: true, ..Targets::default() };
-        self.record_to(&targets, "A Rerun viewer shows the run".to_owned());
+        self.record_to(targets, "A Rerun viewer shows the run".to_owned());
     }
 
     pub(super) fn copy_command_line(&mut self) {
@@ -156,19 +137,41 @@ impl AppState {
         self.note("The command line is on the clipboard", false);
     }
 
-    /// Records the run, and says how that went.
-    fn record_to(&mut self, targets: &Targets, done: String) {
-        if let Some(folder) = targets.save.as_deref().and_then(Path::parent)
-            && let Err(error) = std::fs::create_dir_all(folder)
-        {
-            self.note(format!("{}: {error}", folder.display()), true);
+    /// Records the run beside the window's thread; a note says how that went.
+    fn record_to(&mut self, targets: Targets, done: String) {
+        if self.run().loaded.is_none() {
+            self.note("There is nothing to record yet: no photo has been read", true);
             return;
         }
-        match self.record(targets) {
-            Ok(()) => self.note(done, false),
-            Err(error) => self.note(error.to_string(), true),
-        }
+        self.note("Recording the run …", false);
+        let (run, setup) = (self.run().clone(), self.setup.clone());
+        self.recorder.ask(move |emit| {
+            emit(record(&run, &setup, &targets).map(|()| done));
+        });
     }
+}
+
+/// Records a run from its history: nothing is computed anew.
+fn record(run: &Run, setup: &Setup, targets: &Targets) -> Result<(), String> {
+    if let Some(folder) = targets.save.as_deref().and_then(Path::parent) {
+        std::fs::create_dir_all(folder)
+            .map_err(|error| format!("{}: {error}", folder.display()))?;
+    }
+    let identity = Identity {
+        scene: setup.references.name().to_owned(),
+        query_scene: (!setup.is_one_drive()).then(|| setup.queries.name().to_owned()),
+        queries: vec![setup.query_name().to_owned()],
+        references: setup.reference_names(),
+        configuration: run.params.to_toml(),
+        degraded: setup.task.protocol.degrade,
+        seed: setup.task.protocol.seed,
+    };
+    let recorder = Recorder::open(targets, &identity, &setup.task.protocol.methods);
+    let recorded = recorder.and_then(|mut recorder| {
+        run.replay(&mut recorder);
+        recorder.close()
+    });
+    recorded.map_err(|error| error.to_string())
 }
 
 /// What to say of pictures that were asked for and have been written.

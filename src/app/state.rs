@@ -15,10 +15,11 @@ use super::selection::{BatchResults, KnownResults, Results};
 use super::setup::Setup;
 use super::shown::ShownReason;
 use super::textures::Textures;
-use super::view_options::{CompareMode, ViewOptions};
+use super::view_options::{Arrangement, CompareMode, ViewOptions};
+use super::worker::Worker;
 use crate::event::Side;
 use crate::geometry::Pose;
-use crate::lesson::Moment;
+use crate::lesson::{Moment, SettingError};
 use crate::localize::QueryResult;
 use crate::run::Protocol;
 use crate::session::{Breakpoints, Part, Run, RunMode, RunState, Session, Span};
@@ -78,6 +79,18 @@ pub struct AppState {
     pub results: BatchResults,
     /// The results that the window was opened with, which a restored session goes back to.
     first_results: Results,
+    /// Records runs; its answers are notes.
+    pub(super) recorder: Worker<Result<String, String>>,
+    /// Opens other scenes.
+    pub(super) opener: Worker<Opened>,
+}
+
+/// Scenes that were opened beside the window's thread, as setups.
+pub(super) enum Opened {
+    /// Those of a saved session, with its cursor and layout.
+    Session(Result<(Setup, usize, Arrangement), String>),
+    /// Those of a page of the lesson that localises this.
+    Page(String, Result<Setup, SettingError>),
 }
 
 impl AppState {
@@ -89,7 +102,6 @@ impl AppState {
             session,
             pictures: RunPictures::new(&ctx),
             opens_at_cause: true,
-            ctx,
             navigation: Navigation::default(),
             kept: None,
             options: ViewOptions {
@@ -106,7 +118,10 @@ impl AppState {
             textures: Textures::default(),
             results: BatchResults::default(),
             first_results: Results::new(),
+            recorder: Worker::new("recorder", &ctx),
+            opener: Worker::new("opener", &ctx),
             setup,
+            ctx,
         }
     }
 
@@ -194,6 +209,11 @@ impl AppState {
                 self.on_run_end();
             }
         }
+        for recorded in self.recorder.poll() {
+            let said = recorded.unwrap_or_else(|| Err("internal error while recording".to_owned()));
+            let is_error = said.is_err();
+            self.note(said.unwrap_or_else(|why| why), is_error);
+        }
         for (query, outcome) in self.queries.poll() {
             match outcome {
                 Ok(results) => self.results.insert(query, results),
@@ -221,9 +241,24 @@ impl AppState {
         self.queries.thumbnail(side, frame, (!is_loading).then_some(&self.setup))
     }
 
-    /// Whether anything of what the views show is still worked out, beside a run.
+    /// Whether other scenes are being opened: those of a session, or of a page of the lesson.
+    pub fn is_opening(&self) -> bool {
+        self.opener.is_busy()
+    }
+
+    /// Opens other scenes beside the window's thread. What was to be opened before is not wanted any more.
+    pub(super) fn open(&mut self, job: impl FnOnce() -> Opened + Send + 'static) {
+        self.opener.forget();
+        self.opener.ask(move |emit| {
+            emit(job());
+        });
+    }
+
+    /// Whether anything is still done beside a run: for what the views show, or for a file.
     pub fn is_working_out(&self) -> bool {
         self.is_probing()
+            || self.recorder.is_busy()
+            || self.is_opening()
             || self.scoring.is_tracing()
             || self.scoring.is_filling()
             || self.queries.is_painting()

@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::view_name::ViewName;
 use crate::event::Stage;
 use crate::measure::Migration;
 
@@ -19,12 +20,9 @@ pub enum Arrangement {
 }
 
 impl Arrangement {
-    /// All arrangements, with their titles and the texts of their actions.
-    pub const ALL: [(Self, &'static str, &'static str); 3] = [
-        (Self::Inspect, "Inspect", "Inspect one query"),
-        (Self::Lecture, "Lecture", "Lecture"),
-        (Self::Batch, "Batch", "Batch of results"),
-    ];
+    /// All arrangements, with their titles.
+    pub const ALL: [(Self, &'static str); 3] =
+        [(Self::Inspect, "Inspect"), (Self::Lecture, "Lecture"), (Self::Batch, "Batch")];
 }
 
 /// Which of two runs is shown.
@@ -69,13 +67,13 @@ pub struct ViewOptions {
     /// Whether the canvas shows why the selected result is what it is, in place of its stage.
     pub shows_why: bool,
     /// A view that was made large at a stage.
-    pub large: Option<(Option<Stage>, &'static str)>,
+    pub large: Option<(Option<Stage>, ViewName)>,
     /// Views that a page of a lesson shows, in place of those of the stage.
-    pub presented: Option<Vec<&'static str>>,
+    pub presented: Option<Vec<ViewName>>,
     /// Whether the canvas has all the room.
     pub is_alone: bool,
     /// The view that has all the room; without one the canvas as it is.
-    pub alone: Option<&'static str>,
+    pub alone: Option<ViewName>,
     /// Whether the list of queries is shown.
     pub shows_queries: bool,
     /// Whether the inspector is shown.

@@ -24,6 +24,7 @@ mod surface;
 mod synthetic;
 
 use super::view_context::ViewContext;
+use super::view_name::ViewName;
 use crate::event::DebugEvent;
 use crate::method::Method;
 use crate::session::Span;
@@ -36,25 +37,14 @@ pub trait View {
 
 /// A view as the registry has it.
 pub struct Entry {
-    /// The name in saved layouts.
-    pub name: &'static str,
+    /// The name in the program and in lessons.
+    pub name: ViewName,
     /// The title on its tab.
     pub title: &'static str,
     /// What the view shows, in one phrase.
     pub about: &'static str,
     /// Makes the view.
     pub new: fn() -> Box<dyn View>,
-}
-
-/// Name of the list of queries.
-pub(super) const QUERIES: &str = "queries";
-/// Name of the list of parameters.
-pub(super) const PARAMETERS: &str = "parameters";
-
-/// The registered name that equals a name from elsewhere.
-pub(super) fn name_of(name: &str) -> Option<&'static str> {
-    let mut names = ALL.iter().map(|entry| entry.name);
-    names.find(|known| *known == name)
 }
 
 /// The part of the run in which a method reports events of a type, and the cursor in it. A hybrid at the cursor may
@@ -70,82 +60,105 @@ fn part_with<'a, E: DebugEvent + 'static>(
     }
 }
 
-/// Every view, in the order of the menu.
+/// Every view, in the order of the names.
 pub const ALL: &[Entry] = &[
-    entry::<queries::QueriesView>(QUERIES, "Queries", "all queries with what is known of them"),
+    entry::<queries::QueriesView>(
+        ViewName::Queries,
+        "Queries",
+        "all queries with what is known of them",
+    ),
     entry::<batch::BatchView>(
-        "batch",
+        ViewName::Batch,
         "Batch",
         "the results of all queries in a table: filter, sort, open",
     ),
     entry::<references::ReferencesView>(
-        "references",
+        ViewName::References,
         "References",
         "which frames the query is localised against, and how their poses are fused",
     ),
     entry::<parameters::ParametersView>(
-        PARAMETERS,
+        ViewName::Parameters,
         "Parameters",
         "every parameter with unit, range and meaning",
     ),
-    entry::<breakpoints::BreakpointsView>("breakpoints", "Breakpoints", "where a run is to stop"),
+    entry::<breakpoints::BreakpointsView>(
+        ViewName::Breakpoints,
+        "Breakpoints",
+        "where a run is to stop",
+    ),
     entry::<images::ImagesView>(
-        "images",
+        ViewName::Images,
         "Images",
         "both photos, their matches, and where each feature ended",
     ),
     entry::<retrieval::RetrievalView>(
-        "retrieval",
+        ViewName::Retrieval,
         "Retrieval",
         "frames that resemble the query, and what in them lies alike",
     ),
     entry::<synthetic::SynthesisView>(
-        "synthetic",
+        ViewName::Synthetic,
         "Synthetic",
         "the synthetic view beside the query, and what the cost makes of them",
     ),
     entry::<space::SpaceView>(
-        "space",
+        ViewName::Space,
         "3-D",
         "where reference, truth and estimates stand in the coloured cloud",
     ),
     entry::<ransac::RansacView>(
-        "ransac",
+        ViewName::Ransac,
         "RANSAC",
         "likelihood and inliers of every hypothesis, the test of the best",
     ),
     entry::<surface::SurfaceView>(
-        "surface",
+        ViewName::Surface,
         "Cost surface",
         "cost and coverage of every position tried, minima, slices",
     ),
     entry::<histogram::HistogramView>(
-        "histogram",
+        ViewName::Histogram,
         "Histogram",
         "joint histogram and entropies of MI, residuals of PM",
     ),
     entry::<fusion::FusionView>(
-        "fusion",
+        ViewName::Fusion,
         "Fusion",
         "what each reference gives alone, its weight, and the fused pose",
     ),
     entry::<charts::ChartsView>(
-        "charts",
+        ViewName::Charts,
         "Charts",
         "the results of all queries: scatter of two measures, recall, verdicts",
     ),
     entry::<lockstep::LockstepView>(
-        "lockstep",
+        ViewName::Lockstep,
         "Lock-step",
         "all methods beside each other, each as many steps into its work",
     ),
-    entry::<log::LogView>("log", "Log", "every decision in words"),
+    entry::<log::LogView>(ViewName::Log, "Log", "every decision in words"),
 ];
 
 const fn entry<V: View + Default + 'static>(
-    name: &'static str,
+    name: ViewName,
     title: &'static str,
     about: &'static str,
 ) -> Entry {
     Entry { name, title, about, new: || Box::<V>::default() }
+}
+
+/// Every name has its view.
+const _: () = {
+    assert!(ALL.len() == ViewName::ALL.len());
+    let mut at = 0;
+    while at < ALL.len() {
+        assert!(ALL[at].name as usize == at);
+        at += 1;
+    }
+};
+
+/// The view of a name.
+pub(super) fn entry_of(name: ViewName) -> &'static Entry {
+    &ALL[name as usize]
 }

@@ -92,6 +92,15 @@ impl<A: Send + 'static> Worker<A> {
     pub(super) fn is_busy(&self) -> bool {
         self.waiting > 0
     }
+
+    /// Waits until all jobs are done, whose answers nobody wants.
+    pub(super) fn finish(&mut self) {
+        while self.is_busy()
+            && let Ok((_, message)) = self.answers.recv()
+        {
+            self.waiting -= usize::from(matches!(message, Message::End { .. }));
+        }
+    }
 }
 
 impl<A> Drop for Worker<A> {

@@ -256,7 +256,7 @@ fn saving_asks_where_and_offers_a_name_that_says_what_it_is() {
     send(&mut window, |app| app.ask_where(SaveTarget::Recording));
     // Keys belong to the field meanwhile: no view changes for them.
     press(&mut window, Modifiers::NONE, Key::Enter);
-    window.run_steps(3);
+    wait(&mut window, |app| !app.app_state().is_working_out());
     assert!(name.exists());
     assert!(is_said(&window, "Recording: "));
 }

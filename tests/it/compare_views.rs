@@ -3,7 +3,7 @@
 use egui::{Key, Modifiers};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
-use posescope::app::{App, KnownResults, Results, Tab};
+use posescope::app::{App, KnownResults, Results, Tab, ViewName};
 use posescope::diagnosis::Code;
 use posescope::event::{Event, Stage};
 use posescope::localize::QueryResult;
@@ -15,7 +15,7 @@ use crate::window::{
     app, finished, is_said, press, results, run_until_idle, send, setup, window_with_results,
 };
 
-fn show(window: &mut Harness<'_, App>, view: &'static str) {
+fn show(window: &mut Harness<'_, App>, view: ViewName) {
     window.state_mut().app_state_mut().show_alone(Some(view));
     window.run_steps(4);
 }
@@ -74,7 +74,7 @@ fn over_a_run() -> Harness<'static, App> {
 #[test]
 fn results_are_drawn_as_the_condition_chooses_them() {
     let mut window = over_a_run();
-    show(&mut window, "charts");
+    show(&mut window, ViewName::Charts);
     // What has no error is not drawn.
     let known: Vec<QueryResult> = {
         let known = app(&window).results.values().flatten();
@@ -102,7 +102,7 @@ fn results_are_drawn_as_the_condition_chooses_them() {
     let words = format!("MI ok, {}: {right} of {all}", known[0].scene);
     window.get_by_label(&words).click();
     window.run_steps(3);
-    show(&mut window, "charts");
+    show(&mut window, ViewName::Charts);
     window.get_by_label("Scatter").click();
     window.run_steps(3);
     assert!(is_said(&window, &drawn(&is_it)));
@@ -223,7 +223,7 @@ fn verdicts_that_became_others_are_a_matrix_and_a_click_shows_their_queries() {
 
 /// Shows the matrix of the verdicts since the results A.
 fn since_a(window: &mut Harness<'_, App>) {
-    show(window, "charts");
+    show(window, ViewName::Charts);
     for name in ["Verdicts", "since A"] {
         window.get_by_label(name).click();
         window.run_steps(3);
@@ -235,7 +235,7 @@ fn results_are_kept_and_those_that_follow_are_held_against_them() {
     let mut window = over_a_run();
     since_a(&mut window);
     assert!(is_said(&window, "Nothing to compare with"));
-    show(&mut window, "batch");
+    show(&mut window, ViewName::Batch);
     window.get_by_label("Keep results as A").click();
     window.run_steps(3);
     since_a(&mut window);
@@ -243,7 +243,7 @@ fn results_are_kept_and_those_that_follow_are_held_against_them() {
     // Nothing is right any more within a hair.
     send(&mut window, |app| app.app_state_mut().set_param("grid.coarse_step", "3"));
     run_until_idle(&mut window);
-    show(&mut window, "batch");
+    show(&mut window, ViewName::Batch);
     window.get_by_label("Forget A").click();
     window.run_steps(3);
     since_a(&mut window);
@@ -253,7 +253,7 @@ fn results_are_kept_and_those_that_follow_are_held_against_them() {
 #[test]
 fn recall_says_how_many_are_right_within_the_tolerance_of_the_run() {
     let mut window = over_a_run();
-    show(&mut window, "charts");
+    show(&mut window, ViewName::Charts);
     window.get_by_label("Recall").click();
     window.run_steps(3);
     let state = app(&window);

@@ -3,13 +3,13 @@
 use egui::accesskit::Role;
 use egui_kittest::kittest::Queryable as _;
 use image::imageops;
-use posescope::app::{SaveTarget, Setup};
+use posescope::app::{SaveTarget, Setup, ViewName};
 use posescope::image::Degradation;
 use posescope::scene;
 
 use crate::binary::has;
 use crate::small_sequence::{HEIGHT, SmallSequence, WIDTH, wall};
-use crate::window::{app, finish, finished, run_until_idle, send, setup};
+use crate::window::{app, finish, finished, run_until_idle, save, send, setup};
 
 /// The lines of `run --json -` without what says that the photo was degraded.
 fn results(sequence: &SmallSequence, words: &str) -> (String, usize) {
@@ -90,7 +90,7 @@ fn query_photo(setup: &Setup) -> image::GrayImage {
 fn a_slider_degrades_the_photo_runs_again_and_is_kept_in_the_session() {
     let mut window = finished(setup());
     let taken = query_photo(&app(&window).setup);
-    send(&mut window, |app| app.app_state_mut().show_view("parameters"));
+    send(&mut window, |app| app.app_state_mut().show_view(ViewName::Parameters));
     let invert = window.get_by_role_and_label(Role::CheckBox, "invert");
     invert.click_accesskit();
     window.run_steps(2);
@@ -122,7 +122,7 @@ fn a_slider_degrades_the_photo_runs_again_and_is_kept_in_the_session() {
     run_until_idle(&mut window);
     let setup = &app(&window).setup;
     assert_eq!(query_photo(setup), taken);
-    send(&mut window, |app| app.save(SaveTarget::Restored, path));
+    save(&mut window, SaveTarget::Restored, &path);
     run_until_idle(&mut window);
     let state = app(&window);
     assert_eq!(degraded(state), "invert");

@@ -7,7 +7,7 @@
 use egui::accesskit::Role;
 use egui_kittest::Harness;
 use egui_kittest::kittest::NodeT as _;
-use posescope::app::{App, Arrangement, Setup, views};
+use posescope::app::{App, Arrangement, Setup, ViewName, views};
 use posescope::method::Method;
 use posescope::session::{RunMode, RunState};
 
@@ -16,12 +16,13 @@ use crate::walls_scene::GREY;
 use crate::window::{app, run_until_idle, send, setup, setup_at, wait};
 
 /// The views whose point is pixels.
-const PICTURES: [&str; 4] = ["images", "synthetic", "space", "surface"];
+const PICTURES: [ViewName; 4] =
+    [ViewName::Images, ViewName::Synthetic, ViewName::Space, ViewName::Surface];
 /// Room of the window \[points\].
 const SIZE: [f32; 2] = [760.0, 520.0];
 
 /// Brings a view before all others and waits until it is complete.
-fn show(window: &mut Harness<'_, App>, view: &'static str) {
+fn show(window: &mut Harness<'_, App>, view: ViewName) {
     window.state_mut().app_state_mut().show_alone(Some(view));
     // What is in sight asks for its thumbnails.
     window.run_steps(2);
@@ -32,7 +33,7 @@ fn show(window: &mut Harness<'_, App>, view: &'static str) {
 /// Goes through the moments of a run, and tells each with the views that have something to say then.
 fn at_every_moment(
     window: &mut Harness<'_, App>,
-    mut see: impl FnMut(&mut Harness<'_, App>, &str, &[&str]),
+    mut see: impl FnMut(&mut Harness<'_, App>, &str, &[ViewName]),
 ) {
     run_until_idle(window);
     see(window, "waiting", &[]);
@@ -49,13 +50,14 @@ fn at_every_moment(
     send(window, |app| app.app_state_mut().set_fusions(all));
     wait(window, |app| *app.app_state().run_state() == RunState::Finished);
     window.state_mut().act("To the last step");
-    see(window, "fused", &["references", "fusion", "space"]);
+    see(window, "fused", &[ViewName::References, ViewName::Fusion, ViewName::Space]);
 }
 
 /// The views of a moment that are seen: in pictures or in words.
-fn seen(of: &[&str], in_pictures: bool) -> impl Iterator<Item = &'static str> {
-    let names = views::ALL.iter().map(|entry| entry.name);
-    let wanted: Vec<&'static str> = names
+fn seen(of: &[ViewName], in_pictures: bool) -> impl Iterator<Item = ViewName> {
+    let wanted: Vec<ViewName> = ViewName::ALL
+        .iter()
+        .copied()
         .filter(|name| of.is_empty() || of.contains(name))
         .filter(|name| PICTURES.contains(name) == in_pictures)
         .collect();
@@ -71,7 +73,7 @@ fn every_picture_looks_as_it_did() {
     at_every_moment(&mut window, |window, moment, of| {
         for view in seen(of, true) {
             show(window, view);
-            let compared = judge.compare(window, &format!("{view}-{moment}"));
+            let compared = judge.compare(window, &format!("{}-{moment}", view.word()));
             unlike.extend(compared.err());
         }
     });
@@ -161,7 +163,7 @@ fn every_view_says_what_it_said() {
         for view in seen(of, false) {
             show(window, view);
             let said = words(window);
-            settings.bind(|| insta::assert_snapshot!(format!("{view}-{moment}"), said));
+            settings.bind(|| insta::assert_snapshot!(format!("{}-{moment}", view.word()), said));
         }
     });
 }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use egui::{Pos2, Rect, Vec2};
 use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
-use posescope::app::App;
+use posescope::app::{App, ViewName};
 use posescope::event::{
     DebugEvent, DepthsLifted, FeaturesClassified, FeaturesDetected, MatchesDecided,
     MinimumAssessed, Side, ViewRendered,
@@ -18,7 +18,7 @@ use crate::two_walls::CAMERA;
 use crate::window::{app, finished, run_until_idle, send, setup, wait, window};
 
 /// The small world after its run, at the end of a method, with a view in front.
-fn at_end(method: Method, view: &'static str) -> Harness<'static, App> {
+fn at_end(method: Method, view: ViewName) -> Harness<'static, App> {
     let mut window = finished(setup());
     send(&mut window, |app| app.app_state_mut().select_method(method));
     send(&mut window, |app| app.app_state_mut().show_alone(Some(view)));
@@ -78,7 +78,7 @@ fn lonely_inlier(window: &Harness<'_, App>) -> (usize, Pos2) {
 fn before_detection_there_are_just_the_photos() {
     let mut window = window(setup());
     run_until_idle(&mut window);
-    send(&mut window, |app| app.app_state_mut().show_view("images"));
+    send(&mut window, |app| app.app_state_mut().show_view(ViewName::Images));
     window.get_by_label("No features yet: FB finds them first");
     window.get_by_label("query photo 000001");
     window.get_by_label("reference photo 000000");
@@ -87,7 +87,7 @@ fn before_detection_there_are_just_the_photos() {
 
 #[test]
 fn the_funnel_counts_every_feature_and_hides_the_states_that_are_clicked() {
-    let mut window = at_end(Method::FB, "images");
+    let mut window = at_end(Method::FB, ViewName::Images);
     let states = latest::<FeaturesClassified>(&window).states;
     let count = |name: &str| states.iter().filter(|state| state.name() == name).count();
     for name in FeatureState::NAMES {
@@ -116,7 +116,7 @@ fn the_funnel_counts_every_feature_and_hides_the_states_that_are_clicked() {
 
 #[test]
 fn a_clicked_match_shows_the_numbers_that_were_told_about_it() {
-    let mut window = at_end(Method::FB, "images");
+    let mut window = at_end(Method::FB, ViewName::Images);
     let (feature, place) = lonely_inlier(&window);
     click(&mut window, place);
     assert_eq!(app(&window).options.selected_feature, Some(feature));
@@ -152,7 +152,7 @@ fn a_clicked_match_shows_the_numbers_that_were_told_about_it() {
 
 #[test]
 fn a_match_is_compared_with_the_truth_while_the_truth_is_shown() {
-    let mut window = at_end(Method::FB, "images");
+    let mut window = at_end(Method::FB, ViewName::Images);
     let (feature, _) = lonely_inlier(&window);
     send(&mut window, |app| {
         app.app_state_mut().options.selected_feature = Some(feature);
@@ -166,7 +166,7 @@ fn a_match_is_compared_with_the_truth_while_the_truth_is_shown() {
 
 #[test]
 fn both_photos_zoom_together_and_a_double_click_shows_them_whole() {
-    let mut window = at_end(Method::FB, "images");
+    let mut window = at_end(Method::FB, ViewName::Images);
     let (feature, whole) = lonely_inlier(&window);
     let area = window.get_by_label("query photo 000001").rect();
     window.hover_at(area.center());
@@ -200,7 +200,7 @@ fn both_photos_zoom_together_and_a_double_click_shows_them_whole() {
 
 #[test]
 fn the_synthetic_view_shows_the_recorded_cost_and_place() {
-    let mut window = at_end(Method::MI, "synthetic");
+    let mut window = at_end(Method::MI, ViewName::Synthetic);
     for method in [Method::MI, Method::PM] {
         send(&mut window, |app| app.app_state_mut().select_method(method));
         let event = latest::<ViewRendered>(&window);
@@ -224,7 +224,7 @@ fn the_synthetic_view_shows_the_recorded_cost_and_place() {
 
 #[test]
 fn a_pose_of_ones_own_has_the_costs_of_both_methods() {
-    let mut window = at_end(Method::MI, "synthetic");
+    let mut window = at_end(Method::MI, ViewName::Synthetic);
     let truth = app(&window).run().loaded.as_ref().expect("loaded").truth;
     send(&mut window, |app| {
         app.app_state_mut().camera = truth;
@@ -243,7 +243,7 @@ fn a_pose_of_ones_own_has_the_costs_of_both_methods() {
 
 #[test]
 fn the_pictures_of_the_synthetic_view_are_chosen_by_name_and_blink_with_the_query() {
-    let mut window = at_end(Method::MI, "synthetic");
+    let mut window = at_end(Method::MI, ViewName::Synthetic);
     let common = ["query", "view", "blend", "residual"];
     for (method, own) in [(Method::MI, "shares"), (Method::PM, "weights")] {
         send(&mut window, |app| app.app_state_mut().select_method(method));
@@ -267,7 +267,7 @@ fn the_pictures_of_the_synthetic_view_are_chosen_by_name_and_blink_with_the_quer
 
 #[test]
 fn both_views_draw_at_every_moment_of_a_run() {
-    let mut window = at_end(Method::FB, "images");
+    let mut window = at_end(Method::FB, ViewName::Images);
     send(&mut window, |app| {
         app.app_state_mut().options.selected_feature = Some(0);
     });
@@ -275,7 +275,7 @@ fn both_views_draw_at_every_moment_of_a_run() {
     // Every moment of FB's story, and some of the long searches.
     let mut cursor = 0;
     while cursor < len {
-        for view in ["images", "synthetic"] {
+        for view in [ViewName::Images, ViewName::Synthetic] {
             window.state_mut().app_state_mut().show_alone(Some(view));
             send(&mut window, |app| app.app_state_mut().move_cursor(cursor));
         }
@@ -285,7 +285,7 @@ fn both_views_draw_at_every_moment_of_a_run() {
 
 #[test]
 fn the_synthetic_view_is_whole_in_a_narrow_window() {
-    let mut window = at_end(Method::MI, "synthetic");
+    let mut window = at_end(Method::MI, ViewName::Synthetic);
     for width in [500.0, 700.0, 1100.0] {
         window.set_size(Vec2::new(width, 600.0));
         window.run_steps(4);

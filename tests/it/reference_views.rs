@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
-use posescope::app::{App, SaveTarget, Setup};
+use posescope::app::{App, SaveTarget, Setup, ViewName};
 use posescope::camera::Intrinsics;
 use posescope::cloud::Cloud;
 use posescope::event::KindSet;
@@ -22,9 +22,9 @@ use posescope::trace::{Cancelled, Record, Sink};
 use crate::binary::has;
 use crate::recording::{chunks, timelines};
 use crate::walls_scene::Walls;
-use crate::window::{app, finish, finished, is_said, results, run_until_idle, send, setup};
+use crate::window::{app, finish, finished, is_said, results, run_until_idle, save, send, setup};
 
-fn maximize(window: &mut Harness<'_, App>, view: &'static str) {
+fn maximize(window: &mut Harness<'_, App>, view: ViewName) {
     send(window, |app| app.app_state_mut().show_alone(Some(view)));
 }
 
@@ -45,7 +45,7 @@ fn index(file: &Path, params: &Params) {
 #[test]
 fn references_are_chosen_by_hand_and_their_poses_fused() {
     let mut window = finished(setup());
-    maximize(&mut window, "references");
+    maximize(&mut window, ViewName::References);
     assert!(is_said(&window, "1 of 2 frames within 3 m"));
     window.get_by_role_and_label(egui::Role::CheckBox, "000002").click();
     window.run_steps(2);
@@ -72,7 +72,7 @@ fn references_are_chosen_by_hand_and_their_poses_fused() {
     }
     let folder = tempfile::tempdir().expect("a folder");
     let recording = folder.path().join("fused.rrd");
-    send(&mut window, |app| app.save(SaveTarget::Recording, recording.clone()));
+    save(&mut window, SaveTarget::Recording, &recording);
     let recorded = timelines(&chunks(&recording));
     assert!(recorded.contains_key(&entities::fusion_weights(Method::FB)));
     assert!(!recorded.contains_key(entities::RETRIEVAL_TABLE));
@@ -81,7 +81,7 @@ fn references_are_chosen_by_hand_and_their_poses_fused() {
     has(&command, "--reference 000000 --reference 000002");
     has(&command, "--fusion wavg");
 
-    maximize(&mut window, "fusion");
+    maximize(&mut window, ViewName::Fusion);
     send(&mut window, |app| app.act("To the last step"));
     assert!(is_said(&window, "HY, 2 references"));
     let error = fused[3].error.expect("the truth is known");
@@ -90,7 +90,7 @@ fn references_are_chosen_by_hand_and_their_poses_fused() {
     assert!(is_said(&window, "FB, 2 references"));
 
     // Without a second reference there is nothing to fuse, but a fusion of one is its pose.
-    maximize(&mut window, "references");
+    maximize(&mut window, ViewName::References);
     window.get_by_role_and_label(egui::Role::CheckBox, "000002").click();
     window.run_steps(2);
     window.get_by_role_and_label(egui::Role::CheckBox, "000000").click();
@@ -108,7 +108,7 @@ fn references_may_be_as_far_away_as_the_prior_allows() {
     let mut window = finished(narrow);
     assert_eq!(pick(&mut window, Selection::Nearest(2)), RunState::Finished);
     assert_eq!(app(&window).setup.chosen.frames, [2, 0]);
-    maximize(&mut window, "references");
+    maximize(&mut window, ViewName::References);
     assert!(is_said(&window, "2 of 2 frames within 3 m"));
 }
 
@@ -123,7 +123,7 @@ fn references_are_ranked_by_their_matches() {
     assert!(scores.len() == 2 && scores[0] >= scores[1], "{scores:?}");
     let run = app(&window).run();
     assert_eq!(run.spans()[0].part, Part::Retrieval);
-    maximize(&mut window, "retrieval");
+    maximize(&mut window, ViewName::Retrieval);
     assert!(is_said(&window, "1 of 2 frames are references, ranked by feature matches"));
     // What a setting changes does not change the references.
     let key = "fb.ratio".to_owned();
@@ -153,13 +153,13 @@ fn references_are_found_by_an_index_and_a_missing_one_is_named() {
     let chosen = &app(&window).setup.chosen;
     assert_eq!(chosen.frames.len(), 2);
     assert_eq!(results(&window).len(), 2 * Method::PAPER.len());
-    maximize(&mut window, "retrieval");
+    maximize(&mut window, ViewName::Retrieval);
     assert!(is_said(&window, "2 of 2 frames are references, ranked by visual words"));
     let ranking = app(&window).setup.chosen.ranking.clone();
     let first = &ranking.expect("an index ranks").frames[0];
     let found = first.ranked.verification().expect("the walls are the same");
     let recording = folder.path().join("ranked.rrd");
-    send(&mut window, |app| app.save(SaveTarget::Recording, recording.clone()));
+    save(&mut window, SaveTarget::Recording, &recording);
     assert!(timelines(&chunks(&recording)).contains_key(entities::RETRIEVAL_TABLE));
     let name = format!("{} matches with {}", found.matches.len(), first.name);
     assert!(is_said(&window, &name), "{name}");

@@ -2,7 +2,7 @@
 
 use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
-use posescope::app::App;
+use posescope::app::{App, ViewName};
 use posescope::cost::Explanation;
 use posescope::event::{ConsensusJudged, DebugEvent, HypothesisTried, PoseScored, ViewRendered};
 use posescope::grid::{DenseSurface, Offset, Phase};
@@ -13,7 +13,7 @@ use crate::binary::has;
 use crate::window::{app, finished, run_until_idle, send, setup, wait};
 
 /// The small world after all of its run, with a view in front.
-fn after(view: &'static str) -> Harness<'static, App> {
+fn after(view: ViewName) -> Harness<'static, App> {
     let mut window = finished(setup());
     send(&mut window, |app| app.app_state_mut().show_alone(Some(view)));
     window
@@ -92,7 +92,7 @@ fn words(scored: &PoseScored) -> String {
 
 #[test]
 fn hovering_a_cell_tells_its_recorded_cost_and_sends_its_pose() {
-    let mut window = after("surface");
+    let mut window = after(ViewName::Surface);
     move_to_end(&mut window, Method::MI);
     let scored = told::<PoseScored>(&window, Method::MI);
     let mut seen = Vec::new();
@@ -123,7 +123,7 @@ fn hovering_a_cell_tells_its_recorded_cost_and_sends_its_pose() {
 
 #[test]
 fn a_map_that_is_left_by_the_pointer_or_by_a_key_shows_no_pose() {
-    let mut window = after("surface");
+    let mut window = after(ViewName::Surface);
     move_to_end(&mut window, Method::MI);
     let pointed_at = |window: &mut Harness<'static, App>| {
         hover(window, "Cost map", 0.5, 0.5).expect("a cell");
@@ -136,14 +136,14 @@ fn a_map_that_is_left_by_the_pointer_or_by_a_key_shows_no_pose() {
     window.run_steps(3);
     assert_eq!(app(&window).hovered, None);
     pointed_at(&mut window);
-    send(&mut window, |app| app.app_state_mut().show_alone(Some("space")));
+    send(&mut window, |app| app.app_state_mut().show_alone(Some(ViewName::Space)));
     window.run_steps(2);
     assert_eq!(app(&window).hovered, None);
 }
 
 #[test]
 fn a_click_takes_the_camera_to_the_cell() {
-    let mut window = after("surface");
+    let mut window = after(ViewName::Surface);
     move_to_end(&mut window, Method::PM);
     hover(&mut window, "Cost map", 0.25, 0.5).expect("a cell");
     let hovered = app(&window).hovered;
@@ -159,7 +159,7 @@ fn a_click_takes_the_camera_to_the_cell() {
 
 #[test]
 fn the_maps_fill_as_the_cursor_goes_and_a_cell_of_half_a_search_is_as_recorded() {
-    let mut window = after("surface");
+    let mut window = after(ViewName::Surface);
     let scored = told::<PoseScored>(&window, Method::MI);
     for &(at, ref event) in scored.iter().filter(|(_, event)| !event.phase.is_yaw()).step_by(11) {
         move_to(&mut window, at);
@@ -182,7 +182,7 @@ fn the_maps_fill_as_the_cursor_goes_and_a_cell_of_half_a_search_is_as_recorded()
 
 #[test]
 fn the_nmi_that_is_shown_is_one_less_the_recorded_cost() {
-    let mut window = after("histogram");
+    let mut window = after(ViewName::Histogram);
     for (at, view) in told::<ViewRendered>(&window, Method::MI) {
         move_to(&mut window, at);
         let cost = view.comparison.score.cost.expect("textured walls");
@@ -199,7 +199,7 @@ fn the_nmi_that_is_shown_is_one_less_the_recorded_cost() {
 
 #[test]
 fn a_bin_under_the_pointer_tells_its_pairs() {
-    let mut window = after("histogram");
+    let mut window = after(ViewName::Histogram);
     let views = told::<ViewRendered>(&window, Method::MI);
     let (at, view) = views.last().expect("the result");
     move_to(&mut window, *at);
@@ -225,7 +225,7 @@ fn a_bin_under_the_pointer_tells_its_pairs() {
 
 #[test]
 fn the_residuals_of_pm_say_what_was_ignored() {
-    let mut window = after("histogram");
+    let mut window = after(ViewName::Histogram);
     move_to_end(&mut window, Method::PM);
     let views = told::<ViewRendered>(&window, Method::PM);
     let view = &views.last().expect("the result").1;
@@ -241,7 +241,7 @@ fn the_residuals_of_pm_say_what_was_ignored() {
 
 #[test]
 fn ransac_counts_the_trials_and_a_click_goes_to_one() {
-    let mut window = after("ransac");
+    let mut window = after(ViewName::Ransac);
     let trials = told::<HypothesisTried>(&window, Method::FB);
     for (made, (at, tried)) in trials.iter().enumerate().step_by(trials.len() / 5 + 1) {
         move_to(&mut window, *at);
@@ -262,7 +262,7 @@ fn ransac_counts_the_trials_and_a_click_goes_to_one() {
 
 #[test]
 fn the_acceptance_test_is_told_in_words() {
-    let mut window = after("ransac");
+    let mut window = after(ViewName::Ransac);
     let (at, judged) = told::<ConsensusJudged>(&window, Method::FB)[0].clone();
     assert!(judged.accepted);
     move_to(&mut window, at);
@@ -274,20 +274,20 @@ fn the_acceptance_test_is_told_in_words() {
 
 #[test]
 fn every_moment_of_a_run_can_be_drawn() {
-    let mut window = after("surface");
+    let mut window = after(ViewName::Surface);
     let records = app(&window).run().len();
     // Each view says what is missing, or names what it draws.
-    let views: [(&str, &[&str]); 3] = [
-        ("surface", &["Nothing is searched yet", "Cost map"]),
-        ("histogram", &["No synthetic view yet", "Joint histogram of", "Residuals of"]),
-        ("ransac", &["No hypothesis yet", "inliers by trial"]),
+    let views: [(ViewName, &[&str]); 3] = [
+        (ViewName::Surface, &["Nothing is searched yet", "Cost map"]),
+        (ViewName::Histogram, &["No synthetic view yet", "Joint histogram of", "Residuals of"]),
+        (ViewName::Ransac, &["No hypothesis yet", "inliers by trial"]),
     ];
     for (view, said) in views {
         send(&mut window, |app| app.app_state_mut().show_alone(Some(view)));
         for cursor in (0..records).step_by(9).chain([records - 1]) {
             move_to(&mut window, cursor);
             let count: usize = said.iter().map(|part| texts(&window, part).len()).sum();
-            assert_eq!(count, 1, "{view} at {cursor}");
+            assert_eq!(count, 1, "{view:?} at {cursor}");
         }
         window.check_accessibility();
     }
@@ -302,7 +302,7 @@ fn the_costs_from_the_result_to_the_truth_end_in_those_of_both() {
     }
     let mut window = finished(setup);
     move_to_end(&mut window, Method::MI);
-    send(&mut window, |app| app.app_state_mut().show_alone(Some("surface")));
+    send(&mut window, |app| app.app_state_mut().show_alone(Some(ViewName::Surface)));
     wait(&mut window, |app| {
         app.app_state().scoring.along(Method::MI).is_some() && !app.app_state().scoring.is_tracing()
     });
@@ -354,7 +354,7 @@ fn filled_densely() -> Harness<'static, App> {
     }
     let mut window = finished(setup);
     move_to_end(&mut window, Method::MI);
-    window.state_mut().app_state_mut().show_alone(Some("surface"));
+    window.state_mut().app_state_mut().show_alone(Some(ViewName::Surface));
     window.key_press(egui::Key::F);
     window.run_steps(2);
     wait(&mut window, |app| {
@@ -465,7 +465,7 @@ fn a_dense_map_that_nobody_looks_at_stands_still_and_is_gone_on_with() {
     let mut setup = setup();
     setup.task.params.assign("grid.yaw_range=3").expect("a parameter");
     let mut window = finished(setup);
-    window.state_mut().app_state_mut().show_alone(Some("surface"));
+    window.state_mut().app_state_mut().show_alone(Some(ViewName::Surface));
     move_to_end(&mut window, Method::MI);
     // Many more hypotheses than can be scored between two frames.
     window.key_press(egui::Key::F);
@@ -474,7 +474,7 @@ fn a_dense_map_that_nobody_looks_at_stands_still_and_is_gone_on_with() {
         map.is_some_and(|map| map.surface.as_ref().expect("small").tried() > 0)
     };
     wait(&mut window, has_begun);
-    window.state_mut().app_state_mut().show_alone(Some("report"));
+    window.state_mut().app_state_mut().show_alone(Some(ViewName::Log));
     window.run_steps(4);
     assert!(!app(&window).scoring.is_filling());
     std::thread::sleep(std::time::Duration::from_millis(50));
@@ -484,7 +484,7 @@ fn a_dense_map_that_nobody_looks_at_stands_still_and_is_gone_on_with() {
     window.run_steps(2);
     assert_eq!(dense(&window).tried(), stood.tried());
     assert!(!stood.is_complete());
-    window.state_mut().app_state_mut().show_alone(Some("surface"));
+    window.state_mut().app_state_mut().show_alone(Some(ViewName::Surface));
     let is_done = |app: &App| {
         let map = app.app_state().scoring.dense_map(Method::MI);
         map.is_some_and(|map| map.surface.as_ref().expect("small").is_complete())
@@ -545,7 +545,7 @@ fn the_truth_is_seen_whatever_else_is_there() {
     };
     run_until_idle(&mut window);
     window.state_mut().app_state_mut().select_method(Method::MI);
-    send(&mut window, |app| app.app_state_mut().show_alone(Some("surface")));
+    send(&mut window, |app| app.app_state_mut().show_alone(Some(ViewName::Surface)));
     // The colour of the truth, which recordings have too.
     let [r, g, b] = posescope::palette::TRUTH;
     let truth = egui::Color32::from_rgb(r, g, b);

@@ -3,7 +3,7 @@
 
 use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
-use posescope::app::{App, Setup};
+use posescope::app::{App, Setup, ViewName};
 use posescope::method::Method;
 use posescope::session::{Part, RunMode};
 
@@ -13,7 +13,7 @@ use crate::window::{app, finished, run_until_idle, send, setup};
 /// A window after its run, with the view in front.
 fn after(setup: Setup) -> Harness<'static, App> {
     let mut window = finished(setup);
-    send(&mut window, |app| app.app_state_mut().show_alone(Some("space")));
+    send(&mut window, |app| app.app_state_mut().show_alone(Some(ViewName::Space)));
     window
 }
 
@@ -150,7 +150,7 @@ fn drawn() -> Option<PaintedWindow> {
     let setup = Setup { mode: RunMode::Running, ..setup() };
     let mut painted = painted(setup, [1500.0, 950.0])?;
     run_until_idle(&mut painted.window);
-    send(&mut painted.window, |app| app.app_state_mut().show_alone(Some("space")));
+    send(&mut painted.window, |app| app.app_state_mut().show_alone(Some(ViewName::Space)));
     Some(painted)
 }
 

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use nalgebra::Vector3;
-use posescope::app::{Results, Setup, Tab};
+use posescope::app::{Results, Setup, Tab, ViewName};
 use posescope::camera::Intrinsics;
 use posescope::diagnosis::{Code, Diagnosis, Evidence, Subject, Tolerance, diagnose};
 use posescope::geometry::Pose;
@@ -99,7 +99,7 @@ fn the_window_counts_the_failures_that_the_run_counts() {
         Setup { offered: results.keys().copied().filter(|query| *query < 3).collect(), ..setup() };
     let mut window = window_with_results(setup, results);
     run_until_idle(&mut window);
-    send(&mut window, |app| app.app_state_mut().show_alone(Some("queries")));
+    send(&mut window, |app| app.app_state_mut().show_alone(Some(ViewName::Queries)));
     assert!(is_said(&window, &format!("{failed} of 6 wrong")));
 }
 

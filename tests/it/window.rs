@@ -1,12 +1,15 @@
 //! The window, driven through its keys and its accessibility tree.
 
+use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use egui::{Key, Modifiers};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
-use posescope::app::{App, AppState, CompareMode, KnownResults, Results, SaveTarget, Setup, Tab};
+use posescope::app::{
+    App, AppState, CompareMode, KnownResults, Results, SaveTarget, Setup, Tab, ViewName,
+};
 use posescope::event::{Event, Stage};
 use posescope::localize::{Localizer, NoObserver, QueryResult, Request};
 use posescope::method::Method;
@@ -70,7 +73,8 @@ pub fn window_with_results(
 /// Draws frames until the worker needs somebody.
 pub fn run_until_idle(window: &mut Harness<'_, App>) -> RunState {
     wait(window, |app| {
-        !matches!(app.app_state().run_state(), RunState::Loading | RunState::Running)
+        let state = app.app_state();
+        !state.is_opening() && !matches!(state.run_state(), RunState::Loading | RunState::Running)
     });
     window.step();
     app(window).run_state().clone()
@@ -93,6 +97,13 @@ pub fn app<'a>(window: &'a Harness<'_, App>) -> &'a AppState {
 pub fn send(window: &mut Harness<'_, App>, command: impl FnOnce(&mut App)) {
     command(window.state_mut());
     window.run_steps(3);
+}
+
+/// Saves something in a file or takes it from there, and waits until that is done.
+#[track_caller]
+pub fn save(window: &mut Harness<'_, App>, target: SaveTarget, path: &Path) {
+    send(window, |app| app.save(target, path.to_owned()));
+    wait(window, |app| !app.app_state().is_working_out());
 }
 
 /// Draws frames until something is the case.
@@ -319,7 +330,7 @@ fn two_settings_are_compared_and_their_differences_marked() {
     assert_eq!(app(&window).options.compare_mode, CompareMode::Kept);
     press(&mut window, Modifiers::NONE, Key::X);
     assert_eq!(app(&window).options.compare_mode, CompareMode::Present);
-    window.state_mut().app_state_mut().show_view("parameters");
+    window.state_mut().app_state_mut().show_view(ViewName::Parameters);
     press(&mut window, Modifiers::NONE, Key::D);
     assert!(window.query_all_by_label("bins").next().is_some());
     // What is equal in both is not listed.
@@ -427,8 +438,28 @@ fn a_session_is_saved_and_restored() {
     assert_eq!(state.setup.task.params.changes(), ["fb.ratio=0.8"]);
     assert_eq!(state.cursor(), 40);
     std::fs::write(&path, "{}").expect("writable");
-    send(&mut window, |app| app.save(SaveTarget::Restored, path));
+    save(&mut window, SaveTarget::Restored, &path);
     assert!(is_said(&window, "session.json"));
+}
+
+/// A pipe that nobody writes to stands for a scene that takes long to open.
+#[cfg(unix)]
+#[test]
+fn the_window_goes_on_while_a_session_is_opened() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let [path, pipe] = ["session.json", "pipe"].map(|name| folder.path().join(name));
+    let mut window = finished(setup());
+    save(&mut window, SaveTarget::Session, &path);
+    let made = std::process::Command::new("mkfifo").arg(&pipe).status().expect("mkfifo");
+    assert!(made.success());
+    send(&mut window, |app| app.save(SaveTarget::Restored, pipe.clone()));
+    window.state_mut().app_state_mut().select_query(2);
+    window.step();
+    assert!(app(&window).is_opening() && app(&window).setup.query == 2);
+    std::fs::write(&pipe, std::fs::read(&path).expect("saved")).expect("somebody reads");
+    finish(&mut window);
+    assert_eq!(app(&window).setup.query, 1);
+    assert!(is_said(&window, "The session is restored"));
 }
 
 #[test]
@@ -444,8 +475,7 @@ fn a_restored_session_takes_no_frame_of_another_scene_for_its_own() {
     let elsewhere = saved.replace("\"walls\"", &format!("{scene:?}"));
     assert_ne!(saved, elsewhere);
     std::fs::write(&path, elsewhere).expect("writable");
-    window.state_mut().save(SaveTarget::Restored, path);
-    window.step();
+    save(&mut window, SaveTarget::Restored, &path);
     finish(&mut window);
     let photo = scene::open(scene, None).and_then(|scene| scene.photo(1));
     let loaded = app(&window).run().loaded.clone();
@@ -481,7 +511,7 @@ fn what_is_wrong_in_a_session_is_told_with_its_line() {
         let at = bad.find(to).expect("replaced");
         let line = bad[..at].matches('\n').count() + 1;
         std::fs::write(&path, &bad).expect("writable");
-        send(&mut window, |app| app.save(SaveTarget::Restored, path.clone()));
+        save(&mut window, SaveTarget::Restored, &path);
         // The schema is told without a line: it is about the whole file.
         let place = match from {
             "session/4" => "session.json: ".to_owned(),
@@ -521,9 +551,7 @@ fn a_session_keeps_the_format_and_the_index() {
     // A format that does not fit is refused as it would be on the command line.
     let saved = std::fs::read_to_string(&path).expect("saved");
     std::fs::write(&path, saved.replace("\"kitti\"", "\"rosbag\"")).expect("writable");
-    here.state_mut().save(SaveTarget::Restored, path);
-    here.step();
-    here.step();
+    save(&mut here, SaveTarget::Restored, &path);
     assert!(is_said(&here, "rosbag"));
 }
 
@@ -532,8 +560,18 @@ fn the_run_is_saved_as_a_recording_and_its_command_line_is_copied() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("run.rrd");
     let mut window = finished(setup());
-    send(&mut window, |app| app.save(SaveTarget::Recording, path.clone()));
-    assert!(path.metadata().expect("written").len() > 10_000);
+    window.state_mut().save(SaveTarget::Recording, path.clone());
+    assert!(app(&window).is_working_out(), "the window does not wait");
+    wait(&mut window, |app| !app.app_state().is_working_out());
+    assert!(is_said(&window, "Recording: "));
+    let size = path.metadata().expect("written").len();
+    assert!(size > 10_000);
+    // A recording that is begun is whole when the window has closed.
+    let last = folder.path().join("last.rrd");
+    window.state_mut().save(SaveTarget::Recording, last.clone());
+    eframe::App::on_exit(window.state_mut());
+    // Times of writing differ.
+    assert!(last.metadata().expect("written").len().abs_diff(size) < size / 100);
     assert_eq!(
         app(&window).setup.command_line(),
         "posescope run walls --query 000001 --radius 3 --reference 000000 --right 1m,5deg --seed 7"

@@ -5,7 +5,7 @@ use egui::epaint::ClippedShape;
 use egui::{Color32, Key, Modifiers, Pos2, Rect, Shape, TextureId};
 use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
-use posescope::app::{App, Setup, Tab, views};
+use posescope::app::{App, Setup, Tab, ViewName, views};
 use posescope::method::Method;
 use posescope::params::Params;
 use posescope::scale::Scale;
@@ -185,7 +185,7 @@ fn everywhere(window: &mut Harness<'_, App>, mut see: impl FnMut(&Harness<'_, Ap
     for entry in views::ALL {
         window.state_mut().app_state_mut().show_alone(Some(entry.name));
         settle(window);
-        see(window, entry.name);
+        see(window, entry.name.word());
     }
     window.state_mut().app_state_mut().show_alone(None);
     settle(window);
@@ -273,7 +273,7 @@ fn all_buttons_of_the_bars_are_in_the_window() {
 #[test]
 fn a_long_line_of_the_log_is_broken_and_none_is_cut() {
     let mut window = finished([820.0, 520.0], 1.0);
-    window.state_mut().app_state_mut().show_alone(Some("log"));
+    window.state_mut().app_state_mut().show_alone(Some(ViewName::Log));
     settle(&mut window);
     let shapes = &window.output().shapes;
     let log: Vec<Drawn> = texts(shapes);
@@ -286,7 +286,7 @@ fn a_long_line_of_the_log_is_broken_and_none_is_cut() {
 #[test]
 fn the_decision_at_the_cursor_stays_in_sight_when_the_window_shrinks() {
     let mut window = finished([820.0, 950.0], 1.0);
-    window.state_mut().app_state_mut().show_alone(Some("log"));
+    window.state_mut().app_state_mut().show_alone(Some(ViewName::Log));
     settle(&mut window);
     let found = results(&window);
     let found = found.iter().find(|result| result.method == Method::MI);
@@ -311,16 +311,16 @@ fn empty_views_say_what_to_do() {
     let mut waiting = crate::window::window(setup());
     run_until_idle(&mut waiting);
     for (view, words) in [
-        ("surface", "Nothing is searched yet"),
-        ("batch", "No query was run yet: Run all"),
-        ("charts", "No results match. Run all queries"),
-        ("fusion", "reference"),
+        (ViewName::Surface, "Nothing is searched yet"),
+        (ViewName::Batch, "No query was run yet: Run all"),
+        (ViewName::Charts, "No results match. Run all queries"),
+        (ViewName::Fusion, "reference"),
     ] {
         waiting.state_mut().app_state_mut().show_alone(Some(view));
         waiting.run_steps(3);
-        assert!(is_said(&waiting, words), "{view}");
+        assert!(is_said(&waiting, words), "{view:?}");
         // Nothing has failed before anything ran.
-        assert!(!is_said(&waiting, "failed:"), "{view}");
+        assert!(!is_said(&waiting, "failed:"), "{view:?}");
     }
 }
 

@@ -9,8 +9,9 @@ use super::inspector::capital;
 use super::verdicts::{split, words_of};
 use super::{Panes, canvas, proof::elided};
 use crate::app::App;
+use crate::app::action::Action;
 use crate::app::theme;
-use crate::app::{Sends, ViewContext};
+use crate::app::{Sends, ViewContext, ViewName};
 use crate::diagnosis::Grade;
 use crate::measure::Overview;
 use crate::palette;
@@ -37,7 +38,7 @@ pub(crate) fn left(ui: &mut Ui, context: &ViewContext<'_>, panes: &mut Panes) {
         };
         ui.button(text)
             .on_hover_text(help)
-            .sends(context, |app| app.act("Run all queries, or stop"));
+            .sends(context, const { Action::named("Run all queries, or stop") }.run);
     });
     ui.add_space(4.0);
     let rows = overview.bars.len().max(overview.causes.len()).min(MAX);
@@ -46,7 +47,7 @@ pub(crate) fn left(ui: &mut Ui, context: &ViewContext<'_>, panes: &mut Panes) {
     let (bars, causes) = area.split_left_right_at_fraction(0.5);
     draw_bars(ui, &overview, bars.with_max_x(bars.right() - 16.0));
     draw_causes(ui, &overview, causes);
-    panes.show(ui, "batch", context);
+    panes.show(ui, ViewName::Batch, context);
 }
 
 /// One bar for each method: right, unmeasured, wrong, no pose.
@@ -164,7 +165,7 @@ pub(crate) fn right(ui: &mut Ui, context: &ViewContext<'_>, panes: &mut Panes) {
     let lower = lower.with_min_y(lower.top() + 8.0);
     ui.scope_builder(UiBuilder::new().max_rect(lower), |ui| {
         ui.shrink_clip_rect(lower);
-        panes.show(ui, "charts", context);
+        panes.show(ui, ViewName::Charts, context);
     });
     ui.advance_cursor_after_rect(area);
 }

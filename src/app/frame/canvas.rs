@@ -5,7 +5,7 @@ use egui::{Rect, RichText, Sense, Ui, UiBuilder, vec2};
 use super::{Panes, proof, stage};
 use crate::app::theme;
 use crate::app::views;
-use crate::app::{Sends, ViewContext};
+use crate::app::{Sends, ViewContext, ViewName};
 
 /// Share of the width that the large picture takes where others stand beside it.
 const LARGE: f32 = 0.66;
@@ -14,10 +14,10 @@ const GAP: f32 = 8.0;
 const TITLE: f32 = 18.0;
 
 /// The views on the canvas: the large one first.
-pub(crate) fn scene(context: &ViewContext<'_>) -> Vec<&'static str> {
+pub(crate) fn scene(context: &ViewContext<'_>) -> Vec<ViewName> {
     let here = context.state.shown_stage();
     let of_stage = stage::scene(here);
-    let mut views: Vec<&'static str> = match &context.options.presented {
+    let mut views: Vec<ViewName> = match &context.options.presented {
         Some(presented) => presented.clone(),
         None => of_stage.to_vec(),
     };
@@ -48,7 +48,7 @@ pub(crate) fn ui(ui: &mut Ui, context: &ViewContext<'_>, panes: &mut Panes, most
         }
     };
     if let Some(first) = views.first() {
-        inside(ui, large, |ui| panes.show(ui, first, context));
+        inside(ui, large, |ui| panes.show(ui, *first, context));
     }
     let others = views.get(1..).unwrap_or_default();
     let height = (beside.height() - GAP * others.len().saturating_sub(1) as f32)
@@ -57,8 +57,8 @@ pub(crate) fn ui(ui: &mut Ui, context: &ViewContext<'_>, panes: &mut Panes, most
         let corner = beside.min + vec2(0.0, index as f32 * (height + GAP));
         let rect = Rect::from_min_size(corner, vec2(beside.width(), height));
         let (title, rest) = rect.split_top_bottom_at_y(rect.top() + TITLE);
-        small_title(ui, context, name, title);
-        inside(ui, rest, |ui| panes.show(ui, name, context));
+        small_title(ui, context, *name, title);
+        inside(ui, rest, |ui| panes.show(ui, *name, context));
     }
     ui.advance_cursor_after_rect(area);
 }
@@ -72,10 +72,9 @@ fn inside(ui: &mut Ui, rect: Rect, draw: impl FnOnce(&mut Ui)) {
 }
 
 /// The name above a small picture; a click makes it the large one.
-fn small_title(ui: &mut Ui, context: &ViewContext<'_>, name: &'static str, rect: Rect) {
-    let title =
-        views::ALL.iter().find(|entry| entry.name == name).map_or(name, |entry| entry.title);
-    let response = ui.interact(rect, ui.scope_id().with(("small", name)), Sense::click());
+fn small_title(ui: &mut Ui, context: &ViewContext<'_>, name: ViewName, rect: Rect) {
+    let title = views::entry_of(name).title;
+    let response = ui.interact(rect, ui.scope_id().with(("small", name.word())), Sense::click());
     let spoken = format!("Show {title} large");
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, &spoken));
     let color = if response.hovered() || response.has_focus() {

@@ -12,7 +12,7 @@ use super::storyboard::part_name;
 use super::verdicts::{short, split, words_of};
 use crate::app::theme;
 use crate::app::view_options::Tab;
-use crate::app::{Sends, ViewContext};
+use crate::app::{Sends, ViewContext, ViewName};
 use crate::diagnosis::{Code, Confidence, Diagnosis, Grade, confidence};
 use crate::localize::{Explanation, Helped, QueryResult};
 use crate::session::Run;
@@ -37,8 +37,8 @@ pub(crate) fn ui(ui: &mut Ui, context: &ViewContext<'_>, panes: &mut Panes) {
             let area = ScrollArea::vertical().id_salt("numbers").auto_shrink(false);
             area.show(ui, |ui| numbers::ui(ui, context));
         }
-        Tab::Parameters => panes.show(ui, "parameters", context),
-        Tab::Log => panes.show(ui, "log", context),
+        Tab::Parameters => panes.show(ui, ViewName::Parameters, context),
+        Tab::Log => panes.show(ui, ViewName::Log, context),
     }
 }
 

@@ -1,26 +1,26 @@
 //! What a stage says in a few words, and what is large and small while it is selected.
 
+use crate::app::ViewName;
 use crate::event::{Event, Stage};
 use crate::grid::Phase;
 use crate::trace::Record;
 
 /// The views of a stage: the first is large, the others stand beside it.
-pub(super) fn scene(stage: Option<Stage>) -> &'static [&'static str] {
+pub(super) fn scene(stage: Option<Stage>) -> &'static [ViewName] {
+    use ViewName::{Fusion, Histogram, Images, Ransac, Retrieval, Space, Surface, Synthetic};
     match stage {
-        None => &["images"],
+        None => &[Images],
         Some(stage) => match stage {
-            Stage::Retrieve => &["retrieval"],
-            Stage::Consensus | Stage::Accept => &["images", "ransac"],
-            Stage::Color => &["synthetic", "space"],
-            Stage::Search(_) | Stage::SearchCoarse | Stage::RefinePlane => {
-                &["surface", "synthetic"]
-            }
-            Stage::Descend => &["synthetic", "histogram"],
-            Stage::Assess => &["synthetic", "surface", "histogram"],
-            Stage::RefineSix | Stage::Judge => &["synthetic", "histogram", "space"],
-            Stage::Fuse => &["fusion", "space"],
+            Stage::Retrieve => &[Retrieval],
+            Stage::Consensus | Stage::Accept => &[Images, Ransac],
+            Stage::Color => &[Synthetic, Space],
+            Stage::Search(_) | Stage::SearchCoarse | Stage::RefinePlane => &[Surface, Synthetic],
+            Stage::Descend => &[Synthetic, Histogram],
+            Stage::Assess => &[Synthetic, Surface, Histogram],
+            Stage::RefineSix | Stage::Judge => &[Synthetic, Histogram, Space],
+            Stage::Fuse => &[Fusion, Space],
             // The estimator, and the steps of FB before the consensus.
-            _ => &["images"],
+            _ => &[Images],
         },
     }
 }

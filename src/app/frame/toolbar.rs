@@ -5,9 +5,9 @@ use egui::{Align, Button, Label, Layout, PopupCloseBehavior, Response, RichText,
 
 use super::Panes;
 use crate::app::Arrangement;
-use crate::app::action::{self, ACTIONS, Group, button};
+use crate::app::action::{ACTIONS, Action, Group, button};
 use crate::app::theme;
-use crate::app::{Sends, ViewContext};
+use crate::app::{Sends, ViewContext, ViewName};
 use crate::event::Side;
 use crate::session::RunState;
 
@@ -63,9 +63,9 @@ fn query(ui: &mut Ui, context: &ViewContext<'_>, panes: &mut Panes) {
     let scene = RichText::new(setup.queries.name()).strong();
     ui.add(Label::new(scene).truncate()).on_hover_text("The scene of the query");
     ui.weak("›");
-    button(ui, context, "◀", "Previous query");
+    button(ui, context, "◀", const { Action::named("Previous query") });
     ui.label(RichText::new(setup.query_name()).strong()).on_hover_text("The query");
-    button(ui, context, "▶", "Next query");
+    button(ui, context, "▶", const { Action::named("Next query") });
     // The names of the references are worth more than the word before them.
     if ui.available_width() > 170.0 {
         ui.weak("against");
@@ -82,7 +82,7 @@ fn query(ui: &mut Ui, context: &ViewContext<'_>, panes: &mut Panes) {
         [first, others @ ..] => format!("{first} and {} more", others.len()),
     };
     let chip = Button::new(format!("{text} ▾")).truncate();
-    let show = |ui: &mut Ui| panes.show(ui, "references", context);
+    let show = |ui: &mut Ui| panes.show(ui, ViewName::References, context);
     let response = popup(ui, chip, [380.0, 420.0], show);
     let all = names.join(", ");
     let spoken = format!("References: {all}");
@@ -95,15 +95,15 @@ fn running(ui: &mut Ui, context: &ViewContext<'_>, panes: &mut Panes) {
     let is_paused = matches!(context.state.run_state(), RunState::Paused { .. });
     let text = if is_running { "Pause" } else { "▶ Run" };
     let run = ui.add_sized([64.0, 26.0], Button::new(text));
-    run.on_hover_text(action::tooltip(ui.ctx(), "Run or pause"))
+    run.on_hover_text(const { Action::named("Run or pause") }.tooltip(ui.ctx()))
         .sends(context, |app| app.state.run_or_pause());
     ui.add_enabled_ui(is_paused || is_running, |ui| {
-        button(ui, context, "Stage", "Step over the stage");
-        button(ui, context, "Step", "Step to the next event");
+        button(ui, context, "Stage", const { Action::named("Step over the stage") });
+        button(ui, context, "Step", const { Action::named("Step to the next event") });
     });
     let count = context.setup.task.breakpoints.len();
     let text = if count == 0 { "Break".to_owned() } else { format!("Break ({count})") };
-    let show = |ui: &mut Ui| panes.show(ui, "breakpoints", context);
+    let show = |ui: &mut Ui| panes.show(ui, ViewName::Breakpoints, context);
     let response = popup(ui, Button::new(text), [320.0, 260.0], show);
     response.on_hover_text("Where the run stops");
 }
@@ -121,18 +121,21 @@ fn popup(ui: &mut Ui, button: Button<'_>, size: [f32; 2], show: impl FnOnce(&mut
 
 /// What is shown, and the layouts; from the right.
 fn shown(ui: &mut Ui, context: &ViewContext<'_>) {
-    button(ui, context, "?", "All keys");
-    button(ui, context, "Search", "Search for an action");
+    button(ui, context, "?", const { Action::named("All keys") });
+    button(ui, context, "Search", const { Action::named("Search for an action") });
     ui.separator();
-    for (layout, title, text) in Arrangement::ALL.into_iter().rev() {
+    for (layout, title) in Arrangement::ALL.into_iter().rev() {
+        let action = match layout {
+            Arrangement::Inspect => const { Action::named("Inspect one query") },
+            Arrangement::Lecture => const { Action::named("Lecture") },
+            Arrangement::Batch => const { Action::named("Batch of results") },
+        };
         let response = ui.add(Button::selectable(context.options.layout == layout, title));
-        response
-            .on_hover_text(action::tooltip(ui.ctx(), text))
-            .sends(context, move |app| app.arrange(layout));
+        response.on_hover_text(action.tooltip(ui.ctx())).sends(context, action.run);
     }
     ui.separator();
     compare(ui, context);
-    button(ui, context, "Truth", "Ground truth");
+    button(ui, context, "Truth", const { Action::named("Ground truth") });
 }
 
 fn compare(ui: &mut Ui, context: &ViewContext<'_>) {

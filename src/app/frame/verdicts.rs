@@ -7,7 +7,7 @@ use egui::{
 
 use super::proof::elided;
 use super::storyboard::part_name;
-use crate::app::action;
+use crate::app::action::Action;
 use crate::app::lecture;
 use crate::app::theme;
 use crate::app::{Sends, ViewContext};
@@ -214,7 +214,7 @@ fn remedy(ui: &mut Ui, context: &ViewContext<'_>, result: &QueryResult) {
         }
         (None, None) if is_offered => (
             "Try what would help".to_owned(),
-            action::tooltip(ui.ctx(), "Try what would have helped"),
+            const { Action::named("Try what would have helped") }.tooltip(ui.ctx()),
         ),
         (None, None) => return,
     };

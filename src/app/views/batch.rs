@@ -7,7 +7,7 @@ use egui::{Button, RichText, ScrollArea, Sense, TextEdit, Ui};
 use egui_extras::{Column, TableBuilder, TableRow};
 
 use super::View;
-use crate::app::action::{button, toggle};
+use crate::app::action::{Action, button, toggle};
 use crate::app::memo::Memo;
 use crate::app::{ResultRow, Sends, ViewContext, theme};
 use crate::localize::QueryResult;
@@ -129,8 +129,8 @@ fn changes(ui: &mut Ui, context: &ViewContext<'_>) {
                     Verdicts since A in Charts";
         keep.on_hover_text(help).sends(context, |app| app.state.keep_results());
         if context.state.results.has_before() {
-            toggle(ui, context, "Only what changed", "Differences only");
-            button(ui, context, "Forget A", "Forget the results A");
+            toggle(ui, context, "Only what changed", const { Action::named("Differences only") });
+            button(ui, context, "Forget A", const { Action::named("Forget the results A") });
         }
     });
 }

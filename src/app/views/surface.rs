@@ -13,7 +13,7 @@ use egui::{ScrollArea, Ui};
 use super::View;
 use super::legend::Readout;
 use crate::app::ViewContext;
-use crate::app::action::toggle;
+use crate::app::action::{Action, toggle};
 use crate::geometry::Pose;
 use crate::grid::DenseSurface;
 
@@ -82,7 +82,12 @@ impl SurfaceView {
         let readout = ui.horizontal(|ui| {
             if !is_narrow {
                 self.map.switch(ui);
-                toggle(ui, context, "Dense", "Dense map of all positions and headings");
+                toggle(
+                    ui,
+                    context,
+                    "Dense",
+                    const { Action::named("Dense map of all positions and headings") },
+                );
             }
             Readout::reserve(ui)
         });

@@ -11,7 +11,7 @@ use self::mode::Mode;
 use super::View;
 use super::canvas::{self, PanZoom};
 use super::legend::name_picture;
-use crate::app::action::toggle;
+use crate::app::action::{Action, toggle};
 use crate::app::textures::color_image;
 use crate::app::{ShownView, ViewContext};
 use crate::event::Side;
@@ -79,7 +79,12 @@ impl SynthesisView {
                     self.mode = mode;
                 }
             }
-            let blink = toggle(ui, context, "Blink", "Blink between query and synthetic view");
+            let blink = toggle(
+                ui,
+                context,
+                "Blink",
+                const { Action::named("Blink between query and synthetic view") },
+            );
             blink.accessible_name("Blink pictures");
         });
     }

@@ -159,7 +159,7 @@ impl Field {
     pub const fn named(name: &str) -> &'static Self {
         let mut at = 0;
         while at < Self::ALL.len() {
-            if is_equal(Self::ALL[at].name.as_bytes(), name.as_bytes()) {
+            if is_equal(Self::ALL[at].name, name) {
                 return &Self::ALL[at];
             }
             at += 1;
@@ -291,7 +291,9 @@ const fn number(
     Field { unit, decimals: Some(decimals), read, ..words(name, about, |_| String::new()) }
 }
 
-const fn is_equal(one: &[u8], other: &[u8]) -> bool {
+/// Whether two texts are equal, for constants.
+pub(crate) const fn is_equal(one: &str, other: &str) -> bool {
+    let (one, other) = (one.as_bytes(), other.as_bytes());
     let mut at = 0;
     while at < one.len() && at < other.len() && one[at] == other[at] {
         at += 1;

@@ -6,7 +6,7 @@ use egui::{Button, Color32, Grid, RichText, ScrollArea, Ui};
 
 use super::Chosen;
 use crate::app::command::Command;
-use crate::app::{ViewContext, theme};
+use crate::app::{ViewContext, ViewName, theme};
 use crate::diagnosis::Code;
 use crate::localize::QueryResult;
 use crate::measure::{Migration, verdict_name};
@@ -236,7 +236,7 @@ fn number(ui: &mut Ui, context: &ViewContext<'_>, cell: Cell) {
     let help = format!("{}. Click to show them", cell.words);
     if answer.on_hover_text(help).clicked() {
         context.send(cell.command);
-        context.send(|app| app.state.show_view("batch"));
+        context.send(|app| app.state.show_view(ViewName::Batch));
     }
 }
 
