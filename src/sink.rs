@@ -6,6 +6,6 @@ pub mod rerun;
 #[cfg(feature = "rerun")]
 mod run_records;
 
-pub use events::{EventExport, SceneNames, write_event};
+pub use events::{EventExport, EventLines, SceneNames};
 #[cfg(feature = "rerun")]
 pub use run_records::{Follower, KEPT_FAILURES, RunRecords, merge_failures};

@@ -44,8 +44,6 @@ pub struct CliObserver {
     problems: Vec<Problem>,
     /// The current problem.
     problem: usize,
-    /// The current method.
-    method: Option<Method>,
 }
 
 impl CliObserver {
@@ -63,7 +61,6 @@ impl CliObserver {
             explaining_since: Instant::now(),
             problems: Vec::new(),
             problem: 0,
-            method: None,
         }
     }
 
@@ -125,10 +122,8 @@ impl Sink for CliObserver {
         if let (Some(export), Some(problem)) = (&mut self.export, problem) {
             export.accept(record, problem);
         }
-        if let (Some(events), Some(problem), Some(method)) =
-            (&mut self.events, problem, self.method)
-        {
-            events.accept(record, problem, method);
+        if let Some(events) = &mut self.events {
+            events.lines.accept(record)?;
         }
         if let Some(stop) = &mut self.stop {
             stop.accept(record)?;
@@ -145,6 +140,9 @@ impl LocalizeObserver for CliObserver {
     fn begin_query(&mut self, index: usize, problems: &[Problem], truth: Option<&Pose>) {
         self.problems = problems.to_vec();
         self.stages.clear();
+        if let Some(events) = &mut self.events {
+            events.lines.begin_query(index, problems, truth);
+        }
         self.record(|recorder| recorder.begin_query(index, problems, truth));
     }
 
@@ -165,7 +163,9 @@ impl LocalizeObserver for CliObserver {
     fn begin_method(&mut self, problem: usize, method: Method) {
         self.stages.clear();
         self.problem = problem;
-        self.method = Some(method);
+        if let Some(events) = &mut self.events {
+            events.lines.begin_method(problem, method);
+        }
         self.record(|recorder| recorder.begin_method(problem, method));
     }
 
@@ -189,7 +189,9 @@ impl LocalizeObserver for CliObserver {
 
     fn begin_fusion(&mut self, method: Method) {
         self.problem = 0;
-        self.method = Some(method);
+        if let Some(events) = &mut self.events {
+            events.lines.begin_fusion(method);
+        }
         self.record(|recorder| recorder.begin_fusion(method));
     }
 

@@ -6,10 +6,13 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
+use crate::event::KindSet;
+use crate::geometry::Pose;
+use crate::localize::LocalizeObserver;
 use crate::method::Method;
 use crate::problem::Problem;
 use crate::run::FolderError;
-use crate::trace::Record;
+use crate::trace::{Cancelled, Record, Sink};
 
 /// The names of the frames' scenes.
 #[derive(Clone, Debug, Default, Serialize)]
@@ -35,27 +38,65 @@ struct Line<'a> {
     record: &'a Record,
 }
 
-/// Writes an event of a method on a problem as one line.
-///
-/// # Errors
-/// The errors of the writer.
-pub fn write_event(
-    mut to: impl Write,
-    scenes: &SceneNames,
-    problem: &Problem,
-    method: Method,
-    record: &Record,
-) -> io::Result<()> {
-    let line = Line {
-        scenes,
-        query: problem.query().name(),
-        reference: problem.reference().name(),
-        radius_m: problem.uncertainty_radius_m(),
-        method,
-        record,
-    };
-    serde_json::to_writer(&mut to, &line)?;
-    to.write_all(b"\n")
+/// Collects every event of a run as a line of JSON.
+#[derive(Default)]
+pub struct EventLines {
+    scenes: SceneNames,
+    problems: Vec<Problem>,
+    /// The current problem and method.
+    current: Option<(usize, Method)>,
+    lines: Vec<u8>,
+}
+
+impl EventLines {
+    /// For a run between these scenes.
+    pub fn new(scenes: SceneNames) -> Self {
+        Self { scenes, ..Self::default() }
+    }
+
+    /// All lines.
+    pub fn into_text(self) -> String {
+        String::from_utf8_lossy(&self.lines).into_owned()
+    }
+}
+
+impl Sink for EventLines {
+    fn wanted(&self) -> KindSet {
+        KindSet::ALL
+    }
+
+    fn accept(&mut self, record: &Record) -> Result<(), Cancelled> {
+        if let Some((problem, method)) = self.current
+            && let Some(problem) = self.problems.get(problem)
+        {
+            let line = Line {
+                scenes: &self.scenes,
+                query: problem.query().name(),
+                reference: problem.reference().name(),
+                radius_m: problem.uncertainty_radius_m(),
+                method,
+                record,
+            };
+            // A vector takes all bytes.
+            serde_json::to_writer(&mut self.lines, &line).ok();
+            self.lines.push(b'\n');
+        }
+        Ok(())
+    }
+}
+
+impl LocalizeObserver for EventLines {
+    fn begin_query(&mut self, _index: usize, problems: &[Problem], _truth: Option<&Pose>) {
+        self.problems = problems.to_vec();
+    }
+
+    fn begin_method(&mut self, problem: usize, method: Method) {
+        self.current = Some((problem, method));
+    }
+
+    fn begin_fusion(&mut self, method: Method) {
+        self.begin_method(0, method);
+    }
 }
 
 /// A file of events that gets whole queries only: a query that is interrupted and repeated on resuming is
@@ -63,9 +104,8 @@ pub fn write_event(
 pub struct EventExport {
     path: PathBuf,
     file: File,
-    scenes: SceneNames,
     /// The events of the current query.
-    lines: Vec<u8>,
+    pub lines: EventLines,
     broken: Option<io::Error>,
 }
 
@@ -89,8 +129,7 @@ impl EventExport {
         Ok(Self {
             path: path.to_owned(),
             file: file.map_err(FolderError::io(path))?,
-            scenes: SceneNames::default(),
-            lines: Vec::new(),
+            lines: EventLines::default(),
             broken: None,
         })
     }
@@ -110,20 +149,12 @@ impl EventExport {
 
     /// Sets the scenes of the following events.
     pub fn name_scenes(&mut self, scenes: SceneNames) {
-        self.scenes = scenes;
+        self.lines.scenes = scenes;
     }
 
-    /// Adds an event. After the first error, which is kept, events are ignored.
-    pub fn accept(&mut self, record: &Record, problem: &Problem, method: Method) {
-        if self.broken.is_none() {
-            let written = write_event(&mut self.lines, &self.scenes, problem, method, record);
-            self.broken = written.err();
-        }
-    }
-
-    /// Writes the events of the current query, which is done.
+    /// Writes the events of the current query, which is done. After the first error, which is kept, none are written.
     pub fn end_query(&mut self) {
-        let lines = std::mem::take(&mut self.lines);
+        let lines = std::mem::take(&mut self.lines.lines);
         if self.broken.is_none() {
             self.broken = self.file.write_all(&lines).err();
         }

@@ -53,9 +53,6 @@ pub struct RunRecords<'a> {
     missed: usize,
     events: Option<EventExport>,
     follower: &'a mut dyn Follower,
-    problems: Vec<Problem>,
-    /// The current problem and method.
-    current: Option<(usize, Method)>,
 }
 
 impl<'a> RunRecords<'a> {
@@ -81,8 +78,6 @@ impl<'a> RunRecords<'a> {
             missed: failures.len().saturating_sub(kept),
             events,
             follower,
-            problems: Vec::new(),
-            current: None,
         })
     }
 
@@ -169,10 +164,8 @@ impl Sink for RunRecords<'_> {
     }
 
     fn accept(&mut self, record: &Record) -> Result<(), Cancelled> {
-        if let (Some(events), Some((problem, method))) = (&mut self.events, self.current)
-            && let Some(problem) = self.problems.get(problem)
-        {
-            events.accept(record, problem, method);
+        if let Some(events) = &mut self.events {
+            events.lines.accept(record)?;
         }
         self.follower.check()
     }
@@ -183,16 +176,20 @@ impl Sink for RunRecords<'_> {
 }
 
 impl LocalizeObserver for RunRecords<'_> {
-    fn begin_query(&mut self, _index: usize, problems: &[Problem], _truth: Option<&Pose>) {
-        self.problems = problems.to_vec();
+    fn begin_query(&mut self, index: usize, problems: &[Problem], truth: Option<&Pose>) {
+        if let Some(events) = &mut self.events {
+            events.lines.begin_query(index, problems, truth);
+        }
     }
 
     fn begin_method(&mut self, problem: usize, method: Method) {
-        self.current = Some((problem, method));
+        if let Some(events) = &mut self.events {
+            events.lines.begin_method(problem, method);
+        }
     }
 
     fn begin_fusion(&mut self, method: Method) {
-        self.current = Some((0, method));
+        self.begin_method(0, method);
     }
 
     fn attention(&self) -> Option<Arc<AtomicBool>> {

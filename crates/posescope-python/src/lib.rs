@@ -16,7 +16,6 @@ mod job;
 mod live;
 mod localize;
 mod scene;
-mod witness;
 
 use pyo3::prelude::*;
 

@@ -12,6 +12,7 @@ use posescope::localize::{LocalizeError, NoObserver, QueryResult, Request};
 use posescope::report::Witness;
 use posescope::run::{Protocol, known};
 use posescope::scene::SceneError;
+use posescope::sink::EventLines;
 use posescope::sink::rerun::{Recorder, Targets};
 use posescope_core::features::{FoundMatches, PairMatches};
 use posescope_core::{Method, Params, Pose};
@@ -21,7 +22,6 @@ use pyo3::prelude::*;
 use crate::detached::{Stoppable, detached};
 use crate::frames::{Query, Reference};
 use crate::job::{Frames, Job};
-use crate::witness::EventLines;
 use crate::{arrays, errors};
 
 /// Query points, reference points and perhaps scores.
