@@ -3,24 +3,27 @@
 //! A query's results are appended together once all are computed, so a killed run loses at most the current
 //! query. Resuming cuts off incomplete lines and ends with the same bytes.
 
-use std::collections::{BTreeMap, HashMap, HashSet};
+mod merging;
+mod reading;
+mod recording_names;
+
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, BufRead as _, BufReader, Seek as _, SeekFrom, Write as _};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
-use serde::de::DeserializeOwned;
 
-use super::run_file::{RunFile, RunFileError};
-use super::scene_pair::ScenePair;
+use super::run_file::RunFile;
 use crate::diagnosis::Code;
 use crate::localize::{QueryResult, StageTimes};
 use crate::method::Method;
-use crate::params::Params;
-use crate::scene::Scene;
 use posescope_core::files::write_whole;
 use posescope_core::text::json_message;
+
+pub use merging::merge;
+pub use reading::{read_results, read_run, result_lines, results_of_pair};
+pub use recording_names::RecordingNames;
 
 const RUN: &str = "run.toml";
 const RESULTS: &str = "results.jsonl";
@@ -28,50 +31,6 @@ const TIMINGS: &str = "timings.jsonl";
 
 /// The folder of the failures' recordings, inside the run folder.
 pub const FAILURES: &str = "failures";
-
-/// The names of the recordings of a run's failures: `QUERY-METHOD`, preceded by the scenes if the run has several pairs.
-/// Each query has a name of its own, also beside another that differs from it only by characters that file names do not
-/// have.
-pub struct RecordingNames(HashMap<[String; 3], String>);
-
-impl RecordingNames {
-    /// Those of all queries of a run.
-    pub fn of(run: &RunFile) -> Self {
-        let is_plain = |c: char| c.is_alphanumeric() || "-_.".contains(c);
-        let several_pairs = run.pairs.len() > 1;
-        let queries = run.plan().map(|item| {
-            let ScenePair { scene, query_scene, .. } = item.pair;
-            let scenes = several_pairs.then(|| format!("{scene}-{query_scene}-"));
-            let name = scenes.unwrap_or_default() + item.query;
-            ([scene, query_scene, item.query].map(str::to_owned), name)
-        });
-        let (exact, changed): (Vec<_>, Vec<_>) =
-            queries.partition(|(_, name)| name.chars().all(is_plain));
-        let mut used: HashSet<String> = exact.iter().map(|(_, name)| name.clone()).collect();
-        let changed = changed.into_iter().map(|(key, name)| {
-            let plain: String = name.chars().map(|c| if is_plain(c) { c } else { '-' }).collect();
-            let numbered = (2..).map(|number| format!("{plain}-{number}"));
-            let mut free = [plain.clone()].into_iter().chain(numbered);
-            let name = free.find(|name| used.insert(name.clone()));
-            (key, name.unwrap_or(plain))
-        });
-        let changed: Vec<_> = changed.collect();
-        Self(exact.into_iter().chain(changed).collect())
-    }
-
-    /// The file of a failure in the folder [`FAILURES`]; `None` for a query that is not of the run.
-    pub fn file(&self, scenes: [&str; 2], query: &str, method: Method) -> Option<String> {
-        let [scene, query_scene] = scenes;
-        let name = self.0.get(&[scene, query_scene, query].map(str::to_owned))?;
-        Some(format!("{name}-{method}.rrd"))
-    }
-
-    /// The file of a failed result.
-    pub fn of_result(&self, result: &QueryResult) -> Option<String> {
-        let query_scene = result.query_scene.as_ref().unwrap_or(&result.scene);
-        self.file([&result.scene, query_scene], &result.query, result.method)
-    }
-}
 
 /// Why a run folder cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -455,167 +414,15 @@ fn remove_temporary_files(folder: &Path) -> io::Result<()> {
     Ok(())
 }
 
-/// Reads the description of the run in a folder.
-///
-/// # Errors
-/// [`FolderError::NoRun`], or an error in the file.
-pub fn read_run(folder: &Path) -> Result<RunFile, FolderError> {
-    let path = folder.join(RUN);
-    let text = match fs::read_to_string(&path) {
-        Err(error) if error.kind() == io::ErrorKind::NotFound => {
-            return Err(FolderError::NoRun(folder.to_owned()));
-        }
-        read => read.map_err(FolderError::io(&path))?,
-    };
-    let mut run = RunFile::read(&text)
-        .map_err(|RunFileError { line, message }| FolderError::Damaged { path, line, message })?;
-    run.params = completed(run.params);
-    Ok(run.found_from(folder))
-}
-
-/// The parameters of a run, with defaults for those that its version did not know or write.
-fn completed(params: toml::Table) -> toml::Table {
-    let mut all = Params::default();
-    match all.merge_toml(&params.to_string()) {
-        Ok(()) => all.to_toml().parse().unwrap_or(params),
-        // The user of the parameters reports the error.
-        Err(_) => params,
-    }
-}
-
-/// Reads the lines of `results.jsonl` one by one, as the fields of `T`.
-///
-/// # Errors
-/// A line that is not a result.
-pub fn read_results<T: DeserializeOwned>(
-    folder: &Path,
-) -> Result<impl Iterator<Item = Result<T, FolderError>>, FolderError> {
-    let path = folder.join(RESULTS);
-    Ok(result_lines(folder)?.enumerate().map(move |(index, line)| {
-        serde_json::from_str(&line?).map_err(|error| FolderError::Damaged {
-            path: path.clone(),
-            line: index + 1,
-            message: json_message(&error),
-        })
-    }))
-}
-
-/// The results that are about a pair of the run's scenes, by the frames of the queries, and how many are about others.
-///
-/// # Errors
-/// Results that cannot be read.
-pub fn results_of_pair(
-    folder: &Path,
-    pair: &ScenePair,
-    queries: &dyn Scene,
-) -> Result<(BTreeMap<usize, Vec<QueryResult>>, usize), FolderError> {
-    let frames = queries.frames().iter().enumerate();
-    let frames: HashMap<&str, usize> = frames.map(|(at, name)| (name.as_str(), at)).collect();
-    let mut results = BTreeMap::<usize, Vec<QueryResult>>::new();
-    let mut elsewhere = 0;
-    for result in read_results::<QueryResult>(folder)? {
-        let result = result?;
-        let of_queries = result.query_scene.as_ref().unwrap_or(&result.scene);
-        let is_of_pair = result.scene == pair.scene && *of_queries == pair.query_scene;
-        match frames.get(result.query.as_str()).filter(|_| is_of_pair) {
-            Some(&frame) => results.entry(frame).or_default().push(result),
-            None => elsewhere += 1,
-        }
-    }
-    Ok((results, elsewhere))
-}
-
-/// The raw lines of `results.jsonl`, in the order of [`read_results`].
-///
-/// # Errors
-/// A file that cannot be read.
-pub fn result_lines(
-    folder: &Path,
-) -> Result<impl Iterator<Item = Result<String, FolderError>>, FolderError> {
-    let path = folder.join(RESULTS);
-    let lines = lines_of(folder, RESULTS)?;
-    Ok(lines.map(move |line| line.map_err(FolderError::io(&path))))
-}
-
-fn lines_of(
-    folder: &Path,
-    name: &str,
-) -> Result<impl Iterator<Item = io::Result<String>>, FolderError> {
-    let path = folder.join(name);
-    let file = File::open(&path).map_err(FolderError::io(path))?;
-    Ok(BufReader::new(file).lines())
-}
-
-/// Merges the shards of a run into one folder, with the same content as an unsplit run.
-///
-/// # Errors
-/// [`FolderError`]: parts of different runs, or a missing, repeated or incomplete part.
-pub fn merge(shards: &[PathBuf], target: &Path) -> Result<RunFile, FolderError> {
-    let mut runs = Vec::new();
-    for path in shards {
-        runs.push((path, read_run(path)?));
-    }
-    let Some((first_path, first)) = runs.first() else {
-        return Err(FolderError::NoRun(target.to_owned()));
-    };
-    let whole = first.whole();
-    for (path, run) in &runs {
-        same_run(path, &run.whole(), &whole)?;
-    }
-    let per_item = whole.results_per_item();
-    let mut sources = Vec::new();
-    for (path, run) in &runs {
-        let lines = (lines_of(path, RESULTS)?, lines_of(path, TIMINGS)?);
-        let lines_in = |name: &str| Ok::<usize, FolderError>(lines_of(path, name)?.count());
-        let complete = lines_in(RESULTS)?.min(lines_in(TIMINGS)?) / per_item;
-        let items = run.items().count();
-        if complete != items {
-            return Err(FolderError::Incomplete { path: (*path).clone(), done: complete, items });
-        }
-        sources.push((run.shard, lines));
-    }
-    let mut folder = RunFolder::create(target, &whole)?;
-    for item in whole.plan() {
-        let mut owners =
-            sources.iter_mut().filter(|(shard, _)| shard.is_none_or(|shard| shard.has(item.index)));
-        let problem = |message: &str| FolderError::Damaged {
-            path: first_path.join(RUN),
-            line: 1,
-            message: format!("query {} is in {message} of the parts to merge", item.query),
-        };
-        let Some((_, (results, timings))) = owners.next() else {
-            return Err(problem("none"));
-        };
-        if owners.next().is_some() {
-            return Err(problem("more than one"));
-        }
-        for _ in 0..per_item {
-            copy_line(timings, &mut folder.timings, target)?;
-        }
-        for _ in 0..per_item {
-            copy_line(results, &mut folder.results, target)?;
-        }
-        folder.done += 1;
-    }
-    Ok(whole)
-}
-
-fn copy_line(
-    lines: &mut impl Iterator<Item = io::Result<String>>,
-    file: &mut File,
-    target: &Path,
-) -> Result<(), FolderError> {
-    let Some(line) = lines.next() else { return Ok(()) };
-    let written = line.and_then(|line| writeln!(file, "{line}"));
-    written.map_err(FolderError::io(target))
-}
-
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeMap;
+
     use tempfile::TempDir;
 
     use super::*;
-    use crate::run::{Protocol, QueryCamera, RUN_SCHEMA};
+    use crate::params::Params;
+    use crate::run::{Protocol, QueryCamera, RUN_SCHEMA, ScenePair};
 
     /// A run over these queries.
     fn run(queries: &[&str]) -> RunFile {
