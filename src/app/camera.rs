@@ -1,4 +1,4 @@
-//! The camera in hand: another pose to try.
+//! The trial camera: another pose to try.
 
 use nalgebra::Translation3;
 

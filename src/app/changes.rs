@@ -383,7 +383,7 @@ impl AppState {
         }
     }
 
-    /// Moves the camera in hand, in its own frame.
+    /// Moves the trial camera, in its own frame.
     pub(super) fn move_camera(&mut self, nudge: Nudge) {
         match self.camera.or_else(|| self.named_pose(NamedPose::Start)) {
             Some(pose) => self.camera = Some(nudge.apply(&pose)),

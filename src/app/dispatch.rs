@@ -77,7 +77,7 @@ impl App {
         }
     }
 
-    /// Answers it by where the camera in hand is.
+    /// Answers it with the place of the trial camera.
     pub(super) fn guess(&mut self) {
         if let Some(camera) = self.state.camera {
             self.answer(Given::Place(camera));

@@ -273,7 +273,7 @@ fn place(context: &ViewContext<'_>, camera: &Pose) -> Option<String> {
     ))
 }
 
-/// How good a guess was, as far as that is told.
+/// How good a guess was, once the method's pose is shown.
 fn outcome(context: &ViewContext<'_>, method: Method, guess: &Pose) -> Vec<String> {
     let run = context.state.run();
     let apart = |pose: &Pose| (guess.translation.vector - pose.translation.vector).norm();

@@ -93,7 +93,7 @@ pub(super) enum Anchor {
     Stage(StagePosition),
     /// The place by the number of its record.
     Record(usize),
-    /// The place by what is told there.
+    /// The place by the moment of a lesson.
     Moment(Moment),
 }
 

@@ -22,7 +22,7 @@ pub struct ShownView {
 pub enum ShownReason {
     /// The pointer is over this pose.
     Pointer,
-    /// The camera in hand is there.
+    /// The trial camera is there.
     Camera,
     /// The estimator rendered it.
     Event(Moment),
@@ -33,7 +33,7 @@ impl ShownReason {
     pub fn name(self) -> &'static str {
         match self {
             Self::Pointer => "under the pointer",
-            Self::Camera => "camera in hand",
+            Self::Camera => "trial camera",
             Self::Event(Moment::Start) => "at the reference",
             Self::Event(Moment::NewBest) => "new best",
             Self::Event(Moment::End) => "result",

@@ -1,4 +1,4 @@
-//! The application's state: the run, the cursor in it, the camera in hand, what is switched on.
+//! The application's state: the run, the cursor in it, the trial camera, what is switched on.
 
 mod shown;
 
@@ -63,7 +63,7 @@ pub struct AppState {
     pub hovered: Option<Pose>,
     /// The pose under the pointer, set by the view that is pointed at while a frame is drawn.
     pub pointed_at: Cell<Option<Pose>>,
-    /// The camera in hand (`world_from_camera`).
+    /// The trial camera (`world_from_camera`).
     pub camera: Option<Pose>,
     /// Where the camera was before the last jump.
     pub(super) camera_before: Option<Pose>,
@@ -194,7 +194,7 @@ impl AppState {
         }
     }
 
-    /// Takes in what the threads have to say.
+    /// Takes in the answers of the threads.
     pub(super) fn poll(&mut self) {
         self.forget_notes();
         let was_alive = self.session.is_alive();

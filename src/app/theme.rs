@@ -51,7 +51,7 @@ pub const REFERENCE: Color32 = rgb(palette::REFERENCE);
 pub const ESTIMATE: Color32 = rgb(palette::ESTIMATE);
 /// Colour of the ground truth.
 pub const TRUTH: Color32 = rgb(palette::TRUTH);
-/// Colour of the camera in hand.
+/// Colour of the trial camera.
 pub const CAMERA: Color32 = rgb(palette::UNDECIDED);
 
 /// Everything whose colour stands for what it is.
@@ -68,7 +68,7 @@ pub fn state(index: usize) -> Color32 {
     rgb(palette::STATES[index.min(FeatureState::NAMES.len() - 1)])
 }
 
-/// The colour of what a result is worth, as text.
+/// The text colour of a grade.
 pub fn grade(visuals: &Visuals, grade: Grade) -> Color32 {
     match grade {
         Grade::Right => text(visuals, TRUTH),

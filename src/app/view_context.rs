@@ -26,7 +26,7 @@ pub struct ViewContext<'a> {
     pub setup: &'a Setup,
     /// What is switched on and selected.
     pub options: &'a ViewOptions,
-    /// All that is not of one run: queries, results, the camera in hand, what is worked out beside a run.
+    /// All that is not of one run: queries, results, the trial camera, what is worked out beside a run.
     pub state: &'a AppState,
     commands: &'a Queue,
 }
@@ -93,7 +93,7 @@ impl<'a> ViewContext<'a> {
         self.run.truth().filter(|_| self.options.shows_truth)
     }
 
-    /// The latest event of a type at or before the cursor, told by the estimator there.
+    /// The latest event of a type at or before the cursor, reported by the estimator there.
     pub fn latest<E: DebugEvent + 'static>(&self) -> Option<&'a E> {
         self.run.latest(self.cursor)
     }
@@ -113,7 +113,7 @@ impl<'a> ViewContext<'a> {
         (!is_future || !self.options.hides_future).then_some((span, last))
     }
 
-    /// The latest event of a type that a method has told: up to the cursor if the cursor is in its
+    /// The latest event of a type that a method has reported: up to the cursor if the cursor is in its
     /// part, else in all of its part.
     pub fn latest_of<E: DebugEvent + 'static>(&self, method: Method) -> Option<&'a E> {
         let (span, cursor) = self.part_of(method)?;
@@ -141,7 +141,7 @@ impl<'a> ViewContext<'a> {
             .is_some_and(|parts| parts.first == method || parts.second == method)
     }
 
-    /// The synthetic view to show for a direct method: under the pointer, of the camera in hand, or
+    /// The synthetic view to show for a direct method: under the pointer, of the trial camera, or
     /// the latest that the estimator rendered.
     pub fn shown(&self, method: Method) -> Option<ShownView> {
         if let Some((_, reason)) = self.state.looking_at()

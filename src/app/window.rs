@@ -21,7 +21,7 @@ pub enum WindowError {
          mesa-vulkan-drivers (Debian, Ubuntu) or vulkan-swrast (Arch), or mesa-vulkan-drivers (Fedora)"
     )]
     NoAdapter(String),
-    /// Anything else that eframe has to say.
+    /// Any other error of eframe.
     #[error("no window: {0}")]
     Failed(String),
 }

@@ -2,7 +2,6 @@
 
 mod eval;
 mod given;
-mod lesson;
 mod look;
 mod scene;
 #[cfg(feature = "app")]
@@ -19,7 +18,6 @@ use posescope::run::{ConfigError, with_config};
 
 pub use eval::{EvalArgs, EvalCommand, MergeArgs};
 pub use given::Given;
-pub use lesson::LessonArgs;
 pub use look::{CompareArgs, Form, ResultsArgs};
 pub use scene::{DoctorArgs, IndexArgs, SynthArgs};
 #[cfg(feature = "app")]
@@ -159,6 +157,17 @@ impl Everywhere {
         words.extend(self.threads.map(|threads| format!("--threads={threads}").into()));
         words
     }
+}
+
+/// The arguments of `posescope lesson`.
+#[derive(Debug, Args)]
+pub struct LessonArgs {
+    /// The name or the file of a lesson; without it, all lessons are listed
+    #[arg(value_name = "NAME|FILE.md")]
+    pub name: Option<String>,
+    /// Save the lesson as a Rerun recording instead of opening the window
+    #[arg(long, value_name = "FILE.rrd", requires = "name")]
+    pub save: Option<PathBuf>,
 }
 
 /// Changes to the parameters' defaults.

@@ -231,7 +231,7 @@ fn a_pose_of_ones_own_has_the_costs_of_both_methods() {
     });
     wait(&mut window, |app| app.app_state().scoring.probe().is_some());
     window.step();
-    window.get_by_label_contains("MI, camera in hand: cost ");
+    window.get_by_label_contains("MI, trial camera: cost ");
     let probe = app(&window).scoring.probe().expect("an answer").clone();
     for (_, comparison) in &probe.comparisons {
         let cost = comparison.score.cost.expect("a cost");

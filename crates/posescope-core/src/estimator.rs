@@ -252,7 +252,7 @@ impl Entry {
         let is_of = |group: &&str| {
             key.strip_prefix(*group).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
         };
-        let mut parts = self.told_by().into_iter().filter(|part| *part != self.method);
+        let mut parts = self.recorded_methods().into_iter().filter(|part| *part != self.method);
         of_search.iter().chain(&self.groups).any(is_of)
             || parts.any(|part| entry(part).reads(params, key))
     }
@@ -274,7 +274,7 @@ impl Entry {
     }
 
     /// The methods whose events show what it does: those that it runs inside, else itself.
-    pub fn told_by(&self) -> Vec<Method> {
+    pub fn recorded_methods(&self) -> Vec<Method> {
         match self.hybrid {
             Some(HybridParts { first, second }) => vec![first, second],
             None if self.runs.is_empty() => vec![self.method],

@@ -1,4 +1,4 @@
-//! The verdict bar: what each method's result is worth, and the selected one in one sentence.
+//! The verdict bar: the grade of each method's result, and the selected one in one sentence.
 
 use egui::{
     Align, AtomExt as _, Button, Layout, Rect, Role, Sense, Stroke, Ui, UiBuilder, WidgetInfo,

@@ -23,7 +23,7 @@ impl View for HistogramView {
             let method = context.direct_method();
             let Some(shown) = context.shown(method) else {
                 ui.weak(
-                    "No synthetic view yet. Run PM (2) or MI (3), or take a camera in hand",
+                    "No synthetic view yet. Run PM (2) or MI (3), or place a trial camera",
                 );
                 return;
             };

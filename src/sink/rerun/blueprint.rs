@@ -66,7 +66,7 @@ impl Focus {
             first.reference_from_query(pose).translation.vector.into()
         };
         Self {
-            wrong: wrong.filter_map(responsible).flat_map(told_by).collect(),
+            wrong: wrong.filter_map(responsible).flat_map(recorded_with).collect(),
             proven: proven.to_vec(),
             places: estimates.chain(truth.copied()).map(|pose| in_reference(&pose)).collect(),
         }
@@ -74,8 +74,8 @@ impl Focus {
 }
 
 /// The methods whose events show what a method does.
-pub(super) fn told_by(method: Method) -> Vec<Method> {
-    estimator::find(method).map_or(vec![method], Entry::told_by)
+pub(super) fn recorded_with(method: Method) -> Vec<Method> {
+    estimator::find(method).map_or(vec![method], Entry::recorded_methods)
 }
 
 /// Whether a result is wrong or missing, or has a failure verdict.
@@ -109,7 +109,7 @@ pub(super) fn log_styles(stream: &mut Stream, methods: &[Method], params: &Param
 
 /// Whether features are matched.
 fn shows_features(methods: &[Method], params: &Params) -> bool {
-    let mut recorded = methods.iter().flat_map(|&method| told_by(method));
+    let mut recorded = methods.iter().flat_map(|&method| recorded_with(method));
     recorded.any(|method| family(method, params).is_some_and(|of| Family::MATCHING.contains(&of)))
 }
 
@@ -119,7 +119,7 @@ fn family(method: Method, params: &Params) -> Option<Family> {
 
 /// The methods that search a cost, each of which has a row.
 fn searches(methods: &[Method]) -> Vec<Method> {
-    let recorded: Vec<Method> = methods.iter().flat_map(|&method| told_by(method)).collect();
+    let recorded: Vec<Method> = methods.iter().flat_map(|&method| recorded_with(method)).collect();
     estimator::direct_methods(&recorded)
 }
 
@@ -289,7 +289,7 @@ fn map(
     let results: Vec<Method> = if methods.contains(&method) {
         vec![method]
     } else {
-        methods.iter().copied().filter(|&asked| told_by(asked).contains(&method)).collect()
+        methods.iter().copied().filter(|&asked| recorded_with(asked).contains(&method)).collect()
     };
     let label = |asked: &Method| format!("+ /{}/label", entities::estimate(*asked));
     contents.extend(results.iter().map(label));

@@ -188,8 +188,8 @@ impl Recording {
         if !is_wrong(result) || query.proven.contains(&result.method) {
             return;
         }
-        let told_by = blueprint::told_by(estimator).into_iter();
-        let records = told_by.filter_map(|teller| query.records.get(&(query.reference, teller)));
+        let methods = blueprint::recorded_with(estimator).into_iter();
+        let records = methods.filter_map(|method| query.records.get(&(query.reference, method)));
         let case = ProofCase {
             problem,
             records: &records.flatten().cloned().collect::<Vec<_>>(),

@@ -1,4 +1,4 @@
-//! The cameras of the scene: reference, truth, estimates, and the camera in hand.
+//! The cameras of the scene: reference, truth, estimates, and the trial camera.
 
 use egui::{CornerRadius, Pos2, Rect, Role, Sense, Stroke, Ui, WidgetInfo, vec2};
 use nalgebra::{Point2, Point3};
@@ -25,7 +25,7 @@ pub(super) enum CameraKind {
     Estimate(Method),
     /// The best pose so far of a method that is not finished.
     BestSoFar(Method),
-    /// The camera in hand.
+    /// The trial camera.
     Hand,
     /// The pose under the pointer, in another view.
     Pointer,

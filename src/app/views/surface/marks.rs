@@ -75,7 +75,7 @@ impl MapMark {
         }
         if let Some(pose) = context.state.camera {
             let kind = MarkKind::Thing(Thing::Dot(palette::UNDECIDED));
-            add(kind, pose, "camera in hand", near(&pose));
+            add(kind, pose, "trial camera", near(&pose));
         }
         let method = search.span.part.method();
         if let Some(pose) = method.and_then(|method| context.estimate(method)) {

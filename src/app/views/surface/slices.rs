@@ -89,7 +89,7 @@ fn marks(ui: &Ui, context: &ViewContext<'_>, search: &Search<'_>) -> Vec<LineMar
     let marks = [
         ("╎ truth", theme::TRUTH, dashed, truth),
         ("│ hypothesis", strong, LineStyle::Solid, hypothesis),
-        ("┊ camera in hand", theme::CAMERA, dotted, camera),
+        ("┊ trial camera", theme::CAMERA, dotted, camera),
     ];
     let marks = marks.into_iter();
     marks.filter_map(|(name, color, style, offset)| Some((name, color, style, offset?))).collect()

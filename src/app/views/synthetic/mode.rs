@@ -25,7 +25,7 @@ pub(super) enum Mode {
     View,
     Blend,
     Residual,
-    /// What each pixel has to say in the cost.
+    /// The share of each pixel in the cost.
     Weights,
 }
 
