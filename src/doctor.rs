@@ -8,6 +8,7 @@
 //! Where a reading has numbers of its own, half of the frames choose them and the others test them.
 
 mod agreement;
+mod calibration;
 mod inventory;
 mod matches;
 mod picture;
@@ -21,6 +22,7 @@ use crate::geometry::Pose;
 use crate::image::RgbImage;
 use crate::scene::Scene;
 
+pub use calibration::{Calibration, Estimate, NotJudged, calibration};
 pub use inventory::{Inventory, Remark};
 pub use reading::{Mistake, Subject};
 pub use sample::Agreement;

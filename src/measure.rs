@@ -47,5 +47,6 @@ pub use results::{RunResults, read_rows};
 pub use sweep::{SweptRun, write_sweep};
 #[cfg(feature = "cli")]
 pub use tables::{TableName, rows, tables};
+#[cfg(feature = "app")]
 pub(crate) use triage::is_equal;
 pub use triage::{Condition, ConditionError, Field, Order, Value, select};

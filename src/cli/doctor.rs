@@ -1,5 +1,7 @@
 //! `posescope doctor`: whether a scene is usable, and which of the usual mistakes it contains.
 
+mod calibration;
+
 use posescope::doctor::{Agreement, Examination, Fit, Remark, examine};
 use posescope::measure::paper_scene;
 use posescope::run::refuse_to_replace;
@@ -44,6 +46,9 @@ fn examine_scene(
         if let Some(path) = path {
             refuse_to_replace(option, path, &[extension], [argument])?;
         }
+    }
+    if args.calibration {
+        return calibration::judge(args, scene.as_ref(), terminal);
     }
     let found = examine(scene.as_ref());
     if let (Some(path), Some(picture)) = (&args.picture, &found.picture) {

@@ -4,6 +4,7 @@ mod condition;
 mod field;
 
 pub use condition::{Condition, ConditionError};
+#[cfg(feature = "app")]
 pub(crate) use field::is_equal;
 pub use field::{Field, Value};
 

@@ -5,6 +5,7 @@ mod believed;
 mod calibration;
 mod cases;
 mod exported;
+mod extrinsics;
 mod faults;
 mod frames;
 mod fusions;
@@ -38,6 +39,7 @@ enum Study {
     Answered(answered::Options),
     Believed(believed::Options),
     Calibration(calibration::Options),
+    Extrinsics(extrinsics::Options),
     Scenes(scene_statistics::Options),
     MapSize(map_size::Options),
     Places(places_found::Options),
@@ -55,6 +57,7 @@ fn main() -> ExitCode {
         Study::Answered(options) => answered::run(&options),
         Study::Believed(options) => believed::run(&options),
         Study::Calibration(options) => calibration::run(&options),
+        Study::Extrinsics(options) => extrinsics::run(&options),
         Study::Scenes(options) => scene_statistics::run(&options),
         Study::MapSize(options) => map_size::run(&options),
         Study::Places(options) => places_found::run(&options),

@@ -1,6 +1,7 @@
 //! Integration tests: one binary, because each would link the whole of Rerun again.
 
 mod binary;
+mod calibration;
 mod card;
 mod ci;
 mod cloud_files;
