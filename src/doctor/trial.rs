@@ -66,10 +66,15 @@ impl Sample<'_> {
     /// The agreement of the scene as stated, whether it fits, and the mistake that explains it if it does not.
     pub(super) fn diagnose(self) -> (Agreement, Fit, Option<Finding>) {
         let stated = self.agreement();
-        // It does not count on the poses, so it may be chance unless the scene fits in the end.
-        let by_motions = self.cloud_by_motions().and_then(|(finding, change)| {
+        // It does not count on the poses, so it may be chance: where the scene fits as stated, and unless it fits in the
+        // end.
+        let by_motions = if self.fit() == Fit::Fits { None } else { self.cloud_by_motions() };
+        let by_motions = by_motions.and_then(|(finding, change)| {
             let (fit, rest) = self.clone().read_as(&change).chained();
-            (fit == Fit::Fits).then(|| (fit, Finding { then: rest.map(Box::new), ..finding }))
+            // A second reading of the same kind takes the first one back.
+            let is_kept = rest.as_ref().is_none_or(|rest| rest.mistake != finding.mistake);
+            (fit == Fit::Fits && is_kept)
+                .then(|| (fit, Finding { then: rest.map(Box::new), ..finding }))
         });
         let (fit, found) = match by_motions {
             Some((fit, finding)) => (fit, Some(finding)),

@@ -197,6 +197,15 @@ fn nothing_is_wrong_with_the_street_in_rain() {
     healthy(&Planted::new(street.as_ref(), Fault::Nothing, 300, 40));
 }
 
+/// Frames so far apart share few features, and a wrong camera may seem to explain more of them.
+#[test]
+fn nothing_is_wrong_with_frames_of_the_street_that_are_far_apart() {
+    let street = Street::new("overcast", Size::Half).expect("is built in");
+    for step in [8, 12] {
+        healthy(&Planted::every(&street, Fault::Nothing, 0..101 * 8, step));
+    }
+}
+
 #[test]
 fn nothing_is_wrong_with_a_real_drive() {
     healthy_sample("kitti_raw/2011_09_26/2011_09_26_drive_0013_sync");
