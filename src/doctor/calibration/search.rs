@@ -130,7 +130,8 @@ pub(super) fn best(frames: &mut [Frame], free: &[usize]) -> Values {
     const LOOKS: usize = 3;
     let all: Vec<&Frame> = frames.iter().collect();
     let starts = turns(&all, STARTS).into_iter().map(|start| climbed(&all, free, start, LEVELS));
-    let found = starts.chain([climbed(&all, free, Values::zeros(), 2)]);
+    let near = start_focal_lengths(free).map(|start| climbed(&all, free, start, 2));
+    let found = starts.chain(near);
     let mut found: Vec<Values> = found.map(|start| refined(&all, free, start)).collect();
     let unit = units(&all);
     found.sort_by(|one, other| total(&all, 0, other).total_cmp(&total(&all, 0, one)));
@@ -144,7 +145,7 @@ pub(super) fn best(frames: &mut [Frame], free: &[usize]) -> Values {
             let all: Vec<&Frame> = frames.iter().collect();
             values = refined(&all, free, climbed(&all, free, values, 1));
         }
-        let score = mean(&frames.iter().collect::<Vec<_>>(), &values);
+        let score = total(&frames.iter().collect::<Vec<_>>(), 0, &values);
         if best.is_none_or(|(most, _)| score > most) {
             best = Some((score, values));
         }
@@ -152,6 +153,17 @@ pub(super) fn best(frames: &mut [Frame], free: &[usize]) -> Values {
     let values = best.map_or_else(Values::zeros, |(_, values)| values);
     frames.par_iter_mut().for_each(|frame| frame.look(&values));
     values
+}
+
+/// The calibration as stated, with several focal lengths if that is free.
+fn start_focal_lengths(free: &[usize]) -> impl Iterator<Item = Values> {
+    const TIMES: [f64; 5] = [0.0, -0.03, 0.03, -0.06, 0.06];
+    let count = if free.contains(&FOCAL_LENGTH) { TIMES.len() } else { 1 };
+    TIMES.into_iter().take(count).map(|times| {
+        let mut start = Values::zeros();
+        start[FOCAL_LENGTH] = times;
+        start
+    })
 }
 
 /// The delay that fits best, if nothing else is off.
