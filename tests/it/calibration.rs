@@ -9,8 +9,9 @@ use posescope::geometry::Pose;
 use posescope::image::Photo;
 use posescope::scene::street::{Size, Street};
 use posescope::scene::{Scene, SceneError};
+use tempfile::TempDir;
 
-use crate::binary::has;
+use crate::binary::{has, run_in, text, write};
 use crate::damage::open;
 use crate::data;
 use crate::small_sequence::SmallSequence;
@@ -149,6 +150,7 @@ fn a_delay_is_found_and_told_from_nothing() {
         let delay = found.delay.expect("the car drives");
         assert!((delay.value - delay_s).abs() < 0.012, "{delay_s}: {delay:?}");
         assert_eq!(delay.is_off(), delay_s != 0.0);
+        assert_eq!(found.may_be_delay, delay_s != 0.0);
     }
 }
 
@@ -160,6 +162,35 @@ fn the_same_scene_has_the_same_calibration_on_any_number_of_threads() {
         pool.install(|| format!("{:?}", Misplaced::new(&street, EVERY, 4).judged().turn))
     };
     assert_eq!(on(1), on(3));
+}
+
+/// The binary's answer on a data set as it was written, and after the scanner was moved in its `calib.txt`.
+#[test]
+fn the_exit_code_and_the_picture_are_those_of_the_answer() {
+    let folder = TempDir::new().expect("a folder");
+    run_in(folder.path(), "synth . --size half --every 40 --condition overcast -q").ok();
+    let line = "doctor sequences/overcast --calibration --picture edges.png";
+    let said = run_in(folder.path(), line).ok();
+    has(&said.out, "Answer: consistent with the stated calibration");
+    assert!(!said.out.contains("Multiply"));
+    let (width, height) =
+        image::image_dimensions(folder.path().join("edges.png")).expect("a picture");
+    assert_eq!([width, height], [620, 2 * 188]);
+    let file = folder.path().join("sequences/overcast/calib.txt");
+    let stated = text(&file);
+    let moved = stated.lines().map(|line| {
+        let mut words: Vec<String> = line.split(' ').map(str::to_owned).collect();
+        if words[0] == "Tr:" {
+            let shift: f64 = words[4].parse().expect("a number");
+            words[4] = format!("{:.6}", shift + 0.2);
+        }
+        words.join(" ") + "\n"
+    });
+    let moved: String = moved.collect();
+    assert_ne!(moved, stated);
+    write(&file, moved);
+    let said = run_in(folder.path(), line).fails(3, "shift along x (right) by -0.");
+    has(&said.out, "Multiply the stated camera_from_cloud from the left");
 }
 
 #[test]

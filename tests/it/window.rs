@@ -456,7 +456,7 @@ fn the_window_goes_on_while_a_session_is_opened() {
     window.state_mut().app_state_mut().select_query(2);
     window.step();
     assert!(app(&window).is_opening() && app(&window).setup.query == 2);
-    std::fs::write(&pipe, std::fs::read(&path).expect("saved")).expect("somebody reads");
+    std::fs::write(&pipe, std::fs::read(&path).expect("saved")).expect("the pipe has a reader");
     finish(&mut window);
     assert_eq!(app(&window).setup.query, 1);
     assert!(is_said(&window, "The session is restored"));
