@@ -18,7 +18,7 @@ use std::sync::mpsc::{self, Receiver};
 
 pub use breakpoint::{Breakpoint, BreakpointError, Breakpoints, StopAtBreakpoint};
 pub use index_file::IndexFile;
-pub use job::{Job, JobError};
+pub use job::{Job, JobError, none_near};
 pub use pausing::RunMode;
 pub use run::{Explaining, Loaded, Part, Run, RunState, Span, StageBar};
 pub use task::{Task, TaskScenes, command_line};

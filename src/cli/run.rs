@@ -10,7 +10,7 @@ use posescope::localize::{
 use posescope::method::Method;
 use posescope::run::{JSON_LINES, refuse_to_replace};
 use posescope::scene::{Retriever, Scene, frame_range, why_no_cloud};
-use posescope::session::{Breakpoints, StopAtBreakpoint, Task};
+use posescope::session::{Breakpoints, StopAtBreakpoint, Task, none_near};
 use posescope::sink::rerun::{Identity, Recorder, Targets};
 use posescope::sink::{EventExport, SceneNames};
 
@@ -291,13 +291,9 @@ impl Plan<'_> {
                 let scene = self.localizer.references().name();
                 return Err(CliError::Unusable(format!("{scene}: no frame has a cloud: {why}")));
             }
-            let name = &self.localizer.queries().frames()[query];
-            let words = format!(
-                "{}: no frame with a pose and a cloud within {} m of query {name}; \
-                 raise --radius or --prior, or name a frame with --reference",
-                self.localizer.references().name(),
-                self.task.reach_m()
-            );
+            let (references, queries) = (self.localizer.references(), self.localizer.queries());
+            let why = none_near(references, queries, query, self.task.reach_m());
+            let words = format!("{}: {why}", references.name());
             return Err(CliError::Unusable(self.task.params.scale.unit().words(&words)));
         }
         Ok(chosen)

@@ -8,7 +8,7 @@ use posescope::localize::QueryResult;
 use posescope::measure::StoredSummary;
 use posescope::run::{ConfigError, ScenePair, read_run, results_of_pair};
 use posescope::scene::{Scene, why_no_cloud};
-use posescope::session::{IndexFile, Job, RunMode, Task, TaskScenes};
+use posescope::session::{IndexFile, Job, RunMode, Task, TaskScenes, none_near};
 
 use super::args::{RunArgs, ViewArgs};
 use super::defaults;
@@ -125,13 +125,9 @@ fn begin_at(args: &ViewArgs, named: Option<usize>, setup: &mut Setup) -> Result<
     if let Some(why) = why_no_cloud(setup.references.as_ref()) {
         return Err(CliError::Unusable(format!("{}: no frame has a cloud: {why}", args.scene)));
     }
-    let words = format!(
-        "{}: no frame with a pose and a cloud within {} m of query {}; raise --radius or --prior, or \
-         name a frame with --reference",
-        args.scene,
-        setup.task.reach_m(),
-        setup.query_name()
-    );
+    let (references, queries) = (setup.references.as_ref(), setup.queries.as_ref());
+    let why = none_near(references, queries, setup.query, setup.task.reach_m());
+    let words = format!("{}: {why}", args.scene);
     Err(CliError::Unusable(setup.task.params.scale.unit().words(&words)))
 }
 

@@ -110,6 +110,9 @@ fn headline(results: &[&QueryResult], bars: &[Bar]) -> String {
     };
     let (name, good, total) = (&best.name, worth(best), best.total());
     let queries = if total == 1 { "query" } else { "queries" };
+    if !is_measured && good == 0 {
+        return format!("No method gives a pose for any of {total} {queries}.");
+    }
     if !is_measured {
         return format!(
             "{name} gives a pose for {good} of {total} {queries}. The truth is not known."

@@ -178,7 +178,7 @@ impl<C: Clouds> FileScene<C> {
     fn frames_with_cloud(&self) -> String {
         let all = self.names.iter().enumerate();
         let with: Vec<&str> = all
-            .filter(|(frame, _)| self.clouds.has(*frame))
+            .filter(|(frame, _)| self.has_cloud(*frame))
             .map(|(_, name)| name.as_str())
             .collect();
         match with.as_slice() {
@@ -218,8 +218,11 @@ impl<C: Clouds> Scene for FileScene<C> {
         self.frames[frame].time_s
     }
 
+    /// Of a map, a frame without a pose has no part.
     fn has_cloud(&self, frame: usize) -> bool {
-        self.clouds.has(frame)
+        let is_placed =
+            self.frames[frame].world_from_camera.is_some() || !self.clouds.is_in_world(frame);
+        is_placed && self.clouds.has(frame)
     }
 
     fn photo(&self, frame: usize) -> Result<Photo, SceneError> {

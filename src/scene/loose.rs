@@ -16,6 +16,7 @@ use super::file_scene::{Clouds, FileScene, Frame};
 use super::folder::stem;
 use super::lens::{developed_camera, pinhole};
 use super::{Lengths, Scene, SceneError, photo_file};
+use crate::camera::Intrinsics;
 use crate::cloud::Cloud;
 
 /// The loose photos of a command line.
@@ -25,6 +26,17 @@ pub struct LoosePhotos {
     pub paths: Vec<PathBuf>,
     /// Their camera; by default that of each photo's EXIF data.
     pub camera: Option<CameraArgument>,
+}
+
+/// What to type if a photo was taken with the camera of a scene's photos of its size. A camera with distortion has more
+/// numbers than its scene knows.
+fn camera_of_size(scene: &dyn Scene, size: (u32, u32)) -> Option<String> {
+    let frames = 0..scene.frames().len();
+    let mut cameras = frames.filter(|&frame| scene.pixel_map(frame).is_none());
+    let camera = cameras
+        .find_map(|at| Some(scene.intrinsics(at)).filter(|one| (one.width, one.height) == size))?;
+    let Intrinsics { fx, fy, cx, cy, .. } = camera;
+    Some(format!("; that of the scene's photos of this size is --camera {fx},{fy},{cx},{cy}"))
 }
 
 impl LoosePhotos {
@@ -42,18 +54,18 @@ impl LoosePhotos {
         paths.find(|path| Self::name(path) == name).map(PathBuf::as_path)
     }
 
-    /// Opens the photos as a scene without poses and clouds.
+    /// Opens the photos as a scene without poses and clouds. An error may offer the camera of the references.
     ///
     /// # Errors
     /// A file that is not an image, a camera for another image size, a missing camera, or two files with the same name.
-    pub fn open(&self) -> Result<Arc<dyn Scene>, SceneError> {
+    pub fn open(&self, references: Option<&dyn Scene>) -> Result<Arc<dyn Scene>, SceneError> {
         let mut names = BTreeSet::new();
         if let Some(twice) = self.paths.iter().find(|path| !names.insert(Self::name(path))) {
             let name = Self::name(twice);
             let expected = format!("photos with different names expected, two are called {name}");
             return Err(SceneError::expected(twice, expected));
         }
-        let frames = self.paths.iter().map(|path| self.frame(path));
+        let frames = self.paths.iter().map(|path| self.frame(path, references));
         let frames = frames.collect::<Result<Vec<_>, _>>()?;
         let name = Self::NAME.to_owned();
         let scene = FileScene::new(name, frames, NoClouds);
@@ -61,18 +73,18 @@ impl LoosePhotos {
         Ok(Arc::new(scene))
     }
 
-    fn frame(&self, path: &Path) -> Result<Frame, SceneError> {
+    fn frame(&self, path: &Path, references: Option<&dyn Scene>) -> Result<Frame, SceneError> {
         let error = |expected: String| SceneError::expected(path, expected);
         let stored = photo_file::dimensions(path)?;
         let exif = Exif::read(path);
         let turned = exif.orientation();
         let Some(camera) = &self.camera else {
             let (focal_px, how) = exif.focal_px(stored).ok_or_else(|| {
-                error(
-                    "a focal length in EXIF expected, none found; give the camera as --camera \
-                     fx,fy,cx,cy, as a camera line of COLMAP or as its cameras.txt"
-                        .to_owned(),
-                )
+                error(format!(
+                    "a focal length in EXIF expected, none found; give the camera as --camera fx,fy,cx,cy, as a camera \
+                     line of COLMAP or as its cameras.txt{}",
+                    references.and_then(|scene| camera_of_size(scene, stored)).unwrap_or_default()
+                ))
             })?;
             log::warn!(
                 "{}: focal length {focal_px:.0} px from EXIF ({how}), no distortion; --camera overrides it",

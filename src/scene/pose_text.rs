@@ -89,6 +89,14 @@ impl<'a> PoseFile<'a> {
             1 => fitting.remove(0),
             _ => best_named(file, fitting, names)?,
         };
+        let direction =
+            if format.is_camera_from_world { "camera from world" } else { "world from camera" };
+        log::info!(
+            "{}: read as poses of {} ({}), {direction}",
+            file.name(),
+            format.name,
+            format.form
+        );
         Self::of_rows(file, rows, None, format.is_camera_from_world)
     }
 

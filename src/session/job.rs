@@ -11,7 +11,7 @@ use super::run::RunState;
 use super::task::Task;
 use crate::localize::{
     ChoiceError, LocalizeError, LocalizeObserver, Localizer, QueryResult, Ranking, References,
-    Request, Selection, words_of,
+    Request, Selection, frames_within, is_one_drive, words_of,
 };
 use crate::scene::{FrameStore, NoIndex, Scene, SceneError};
 
@@ -55,16 +55,31 @@ pub enum JobError {
     )]
     NoneNamed(String),
     /// No frame is near enough to be a reference.
-    #[error(
-        "no frame with a pose and a cloud within {radius_m} m of query {query}; raise the radius \
-         or the prior, or name the references"
-    )]
-    NoneNear {
-        /// The query frame's name.
-        query: String,
-        /// The search distance around the query \[m\].
-        radius_m: f64,
-    },
+    #[error("{0}")]
+    NoneNear(String),
+}
+
+/// Why no frame is near enough to a query to be a reference, and how far off the nearest one is.
+pub fn none_near(
+    references: &dyn Scene,
+    queries: &dyn Scene,
+    query: usize,
+    radius_m: f64,
+) -> String {
+    let name = &queries.frames()[query];
+    let nearest = queries.position(query).and_then(|place| {
+        let is_query = |frame| is_one_drive(references, queries) && frame == query;
+        let within = frames_within(references, &place, f64::INFINITY, &is_query);
+        let nearest = *within.first()?;
+        Some((&references.frames()[nearest], (references.position(nearest)? - place).norm()))
+    });
+    let nearest =
+        nearest.map(|(frame, away_m)| format!(", and the nearest, {frame}, is {away_m:.1} m away"));
+    format!(
+        "no frame with a pose and a cloud within {radius_m} m of query {name}{}; raise --radius or --prior, or name a \
+         frame with --reference",
+        nearest.unwrap_or_default()
+    )
 }
 
 impl JobError {
@@ -164,7 +179,13 @@ impl Job {
         let chooser = protocol.chooser(localizer, task.reach_m(), index);
         let chosen = chooser.choose(self.query, &|_| false, observer)?;
         if chosen.frames.is_empty() {
-            return Err(JobError::NoneNear { query: query(), radius_m: task.reach_m() });
+            let (references, queries) = (self.references.as_ref(), self.queries.as_ref());
+            return Err(JobError::NoneNear(none_near(
+                references,
+                queries,
+                self.query,
+                task.reach_m(),
+            )));
         }
         Ok(chosen)
     }

@@ -78,7 +78,7 @@ impl Task {
         };
         let references = open(&self.scene)?;
         let queries = match (&self.photos, self.query_scene()) {
-            (Some(photos), _) => photos.open()?,
+            (Some(photos), _) => photos.open(Some(references.as_ref()))?,
             (None, Some(argument)) => open(argument)?,
             (None, None) => Arc::clone(&references),
         };

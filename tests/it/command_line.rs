@@ -102,8 +102,8 @@ fn where_no_reference_is_near_the_distance_is_named_that_was_searched() {
     refused(
         sequence.path(),
         "
-        3 | run sequences/42 --query 5 --method mi --radius 15 --prior 0.5 | within 0.5 m of query 000005; raise --radius or --prior, or name a frame
-        3 | view sequences/42 --query 5 --method mi --radius 15 --prior 0.5 | within 0.5 m of query 000005; raise --radius or --prior, or name a frame
+        3 | run sequences/42 --query 5 --method mi --radius 15 --prior 0.5 | within 0.5 m of query 000005, and the nearest, 000004, is
+        3 | view sequences/42 --query 5 --method mi --radius 15 --prior 0.5 | m away; raise --radius or --prior, or name a frame
         ",
     );
     sequence.run("eval sequences/42 --method mi --prior 0.5 -q --out run").ok();

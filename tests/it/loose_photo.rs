@@ -102,7 +102,7 @@ fn what_is_no_photo_or_no_camera_of_it_is_told() {
             paths: paths.into_iter().cloned().collect(),
             camera: camera.map(|camera| camera.parse().expect("a camera")),
         };
-        let error = photos.open().err().expect("it is refused").to_string();
+        let error = photos.open(None).err().expect("it is refused").to_string();
         damage::expect_words(&error, words);
     }
 }
@@ -147,7 +147,7 @@ fn rational(number: u32, through: u32) -> Value {
 
 fn opened(path: &Path) -> std::sync::Arc<dyn Scene> {
     let photos = LoosePhotos { paths: vec![path.to_owned()], camera: None };
-    photos.open().unwrap_or_else(|error| panic!("{error}"))
+    photos.open(None).unwrap_or_else(|error| panic!("{error}"))
 }
 
 #[test]

@@ -326,7 +326,7 @@ fn no_damage_to_a_photo_or_its_camera_makes_their_reader_panic() {
     for camera in [None, Some(scene::CameraArgument::File(cameras.clone()))] {
         let read = || {
             let photos = LoosePhotos { paths: vec![photo.clone()], camera: camera.clone() };
-            let scene = photos.open()?;
+            let scene = photos.open(None)?;
             scene.photo(0).map(drop)
         };
         assert!(read().is_ok(), "{:?}", read());
@@ -342,7 +342,7 @@ fn no_damage_to_a_photo_or_its_camera_makes_their_reader_panic() {
         let camera = Some(scene::CameraArgument::File(cameras.clone()));
         fs::write(&cameras, "1 PINHOLE 160 64 100 100 80 32\n").expect("writable");
         let photos = LoosePhotos { paths: vec![path.clone()], camera };
-        let read = || photos.open()?.photo(0).map(drop);
+        let read = || photos.open(None)?.photo(0).map(drop);
         assert!(read().is_ok(), "{:?}", read());
         mutate(ending, &[path], || read().map_err(|error| vec![error]));
     }
