@@ -43,6 +43,7 @@ use failure::CliError;
 use stderr::tell;
 
 pub use compute::{Compute, ComputeError, with as with_compute};
+pub use doctor::calibration::in_words as calibration_in_words;
 pub use doctor::report as examination_in_words;
 
 /// Parses the arguments, of which the first is the program's name, runs the command and prints an error in one

@@ -22,9 +22,9 @@ use crate::geometry::Pose;
 use crate::image::RgbImage;
 use crate::scene::Scene;
 
-pub use calibration::{Calibration, Estimate, NotJudged, calibration};
+pub use calibration::{CALIBRATION_STEPS, Calibration, Estimate, NotJudged, calibration};
 pub use inventory::{Inventory, Remark};
-pub use reading::{Mistake, Subject};
+pub use reading::{Correction, Mistake, Place, Subject};
 pub use sample::Agreement;
 pub use trial::{Finding, Fit};
 

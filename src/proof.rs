@@ -245,7 +245,7 @@ impl<'a> ProofCase<'a> {
 }
 
 impl Panel {
-    fn new(title: impl Into<String>, picture: RgbImage) -> Self {
+    pub(crate) fn new(title: impl Into<String>, picture: RgbImage) -> Self {
         Self {
             title: title.into(),
             picture: Arc::new(picture),

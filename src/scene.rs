@@ -26,6 +26,7 @@ mod model_view;
 mod pair_matches;
 mod photo_file;
 mod pose_text;
+mod recalibrated;
 mod retriever;
 mod robotcar;
 mod seven_scenes;
@@ -50,6 +51,7 @@ pub use estimates::read_estimates;
 pub use gps::located;
 pub use loose::{CameraArgument, LoosePhotos};
 pub use pair_matches::{MatchFolder, PixelMaps, write_matches};
+pub use recalibrated::{Recalibrated, recalibrated};
 pub use retriever::{IndexOptions, NoIndex, Retriever};
 
 /// Every format, in the order in which they are tried.
@@ -65,6 +67,14 @@ pub const ALL: &[SceneFormat] = &[
     described::ENTRY,
 ];
 
+/// The format of a scene: the named one, or the first that recognises it.
+pub fn format_of(argument: &str, format: Option<&str>) -> Option<&'static SceneFormat> {
+    match format {
+        Some(name) => ALL.iter().find(|entry| entry.name == name),
+        None => ALL.iter().find(|entry| (entry.recognizes)(argument)),
+    }
+}
+
 /// Opens a scene. Its format is detected from its content; `format` overrides that.
 ///
 /// # Errors
@@ -74,10 +84,9 @@ pub fn open(argument: &str, format: Option<&str>) -> Result<Box<dyn Scene>, Scen
         let names: Vec<&str> = ALL.iter().map(|entry| entry.name).collect();
         names.join(", ")
     };
-    let entry = match format {
-        Some(name) => (ALL.iter().find(|entry| entry.name == name))
-            .ok_or_else(|| SceneError::UnknownFormat { format: name.to_owned(), known: known() }),
-        None => (ALL.iter().find(|entry| (entry.recognizes)(argument))).ok_or_else(|| {
+    let entry = format_of(argument, format).ok_or_else(|| match format {
+        Some(name) => SceneError::UnknownFormat { format: name.to_owned(), known: known() },
+        None => {
             let argument = argument.to_owned();
             if Path::new(&argument).exists() {
                 let (known, hint) = (known(), hint(Path::new(&argument)));
@@ -85,8 +94,8 @@ pub fn open(argument: &str, format: Option<&str>) -> Result<Box<dyn Scene>, Scen
             } else {
                 SceneError::NotFound { argument }
             }
-        }),
-    };
+        }
+    });
     let scene = (entry?.open)(argument)?;
     sound(argument, scene.as_ref())?;
     Ok(scene)

@@ -1,11 +1,11 @@
 //! `posescope doctor`: whether a scene is usable, and which of the usual mistakes it contains.
 
-mod calibration;
+pub mod calibration;
 
-use posescope::doctor::{Agreement, Examination, Fit, Remark, examine};
+use posescope::doctor::{Agreement, Correction, Examination, Fit, Place, Remark, examine};
 use posescope::measure::paper_scene;
-use posescope::run::refuse_to_replace;
-use posescope::scene::{self, Scene};
+use posescope::run::{OutputError, refuse_to_replace};
+use posescope::scene::{self, Scene, SceneFormat};
 use posescope::sink::rerun::{Targets, record_checkup};
 use posescope::table::wrapped;
 
@@ -16,10 +16,10 @@ use super::terminal::Terminal;
 
 /// Examines every scene. The error is that of the first unusable scene.
 pub fn doctor(args: &DoctorArgs, terminal: &Terminal) -> Result<(), CliError> {
-    let files = args.picture.iter().chain(&args.save);
+    let files = args.picture.iter().chain(&args.save).chain(&args.out);
     if args.scenes.len() > 1 && files.count() > 0 {
         return Err(CliError::Usage(
-            "--picture and --save take one scene; name one only".to_owned(),
+            "--picture, --save and --out take one scene; name one only".to_owned(),
         ));
     }
     let mut broken = None;
@@ -47,6 +47,10 @@ fn examine_scene(
             refuse_to_replace(option, path, &[extension], [argument])?;
         }
     }
+    if let Some(path) = args.out.as_ref().filter(|path| path.exists()) {
+        let why = "is never replaced";
+        return Err(OutputError::Replaces { option: "--out", path: path.clone(), why }.into());
+    }
     if args.calibration {
         return calibration::judge(args, scene.as_ref(), terminal);
     }
@@ -61,7 +65,8 @@ fn examine_scene(
         record_checkup(&Targets::file(path), scene.name(), &frames)?;
     }
     if !terminal.is_quiet {
-        let text = report(scene.as_ref(), &found, terminal.width());
+        let format = scene::format_of(argument, args.format.as_deref());
+        let text = report(scene.as_ref(), format, &found, terminal.width());
         output::print(&text.trim_end())?;
     }
     Ok(found.is_broken().then(|| verdict(scene.as_ref(), &found)))
@@ -82,7 +87,12 @@ fn verdict(scene: &dyn Scene, found: &Examination) -> String {
 }
 
 /// The findings in words, a line each, in lines of at most this many characters.
-pub fn report(scene: &dyn Scene, found: &Examination, width: Option<usize>) -> String {
+pub fn report(
+    scene: &dyn Scene,
+    format: Option<&SceneFormat>,
+    found: &Examination,
+    width: Option<usize>,
+) -> String {
     let mut text = String::new();
     let there = &found.inventory;
     let mut line = |what: &str, words: &str| {
@@ -133,6 +143,11 @@ pub fn report(scene: &dyn Scene, found: &Examination, width: Option<usize>) -> S
     while let Some(finding) = next {
         line("mistake", finding.mistake.about());
         line("remedy", &finding.remedy);
+        if let Some(correction) = &finding.correction
+            && let Some(words) = written(correction, format)
+        {
+            line("write", &words);
+        }
         for (mistake, remedy) in &finding.or {
             line("or", &format!("{}: {remedy}", mistake.about()));
         }
@@ -166,6 +181,22 @@ pub fn report(scene: &dyn Scene, found: &Examination, width: Option<usize>) -> S
         }
     }
     text
+}
+
+/// What to write where, if a scene of this format takes it.
+fn written(correction: &Correction, format: Option<&SceneFormat>) -> Option<String> {
+    let Correction { lines, place } = correction;
+    let quoted: Vec<String> = lines.iter().map(|line| format!("`{line}`")).collect();
+    let quoted = quoted.join(", ");
+    match (format?.name, place) {
+        ("toml", Place::DepthPerMetre) => {
+            Some(format!("`depth_per_metre = {}` {}", lines.join(" "), Place::Description.about()))
+        }
+        ("toml", _) | ("tum" | "7scenes", Place::DepthPerMetre) => {
+            Some(format!("{quoted} {}", place.about()))
+        }
+        _ => None,
+    }
 }
 
 const UNEXPLAINED: &str =

@@ -3,6 +3,7 @@
 //! Lasers*, RSS 2013).
 
 mod depth_edges;
+#[cfg(feature = "rerun")]
 mod picture;
 mod search;
 mod view;
@@ -14,8 +15,9 @@ use self::search::{
     DELAY, FOCAL_LENGTH, Frame, POSE, Values, WITH_FOCAL_LENGTH, best, delay, spread, units,
 };
 use self::view::View;
+use super::reading::Change;
+use super::sample::{AS_STATED, Agreement, Sample};
 use crate::geometry::Pose;
-use crate::image::RgbImage;
 use crate::scene::Scene;
 
 /// The most frames that are compared.
@@ -69,12 +71,16 @@ pub struct Calibration {
     /// How much later the photos were taken than the clouds \[s\], if turn, shift and focal length are as stated; `None`
     /// where the camera stands or the times are not known.
     pub delay: Option<Estimate>,
+    /// Whether the features that photos share and the grey values of points fit worse with what the edges say than as
+    /// stated. The intervals then hold what is stated, too.
+    pub is_disputed: bool,
     /// Whether a delay alone explains the photos nearly as well as the turn and the shift.
     pub may_be_delay: bool,
     /// Whether more frames would narrow the intervals.
     pub is_narrowed_by_frames: bool,
     /// Depth edges on a photo, as stated above and as found below.
-    pub picture: RgbImage,
+    #[cfg(feature = "rerun")]
+    pub picture: crate::image::RgbImage,
 }
 
 /// Why a calibration cannot be judged.
@@ -108,6 +114,15 @@ impl Calibration {
         )
     }
 
+    /// With intervals that hold what is stated.
+    fn disputed(mut self) -> Self {
+        let all = self.turn.iter_mut().chain(&mut self.shift).chain([&mut self.focal_length]);
+        for one in all.chain(&mut self.delay) {
+            one.std_dev = one.std_dev.max(one.value.abs() / HOLD_90);
+        }
+        Self { is_disputed: true, ..self }
+    }
+
     /// Whether anything is not as stated.
     pub fn is_off(&self) -> bool {
         let delay = self.delay.iter();
@@ -116,11 +131,21 @@ impl Calibration {
     }
 }
 
-/// Estimates how far the calibration of a scene is off, from frames spread over it.
+/// The steps of [`calibration`] that it tells.
+pub const CALIBRATION_STEPS: [&str; 4] = [
+    "reading frames",
+    "searching a delay",
+    "searching with the focal length",
+    "searching turn and shift",
+];
+
+/// Estimates how far the calibration of a scene is off, from frames spread over it. `begins` is told the number of each of
+/// [`CALIBRATION_STEPS`].
 ///
 /// # Errors
 /// [`NotJudged`] if too little can be compared.
-pub fn calibration(scene: &dyn Scene) -> Result<Calibration, NotJudged> {
+pub fn calibration(scene: &dyn Scene, begins: &dyn Fn(usize)) -> Result<Calibration, NotJudged> {
+    begins(0);
     let mut frames = read(scene);
     if frames.len() < MIN_FRAMES {
         return Err(NotJudged::FewFrames { found: frames.len() });
@@ -129,7 +154,9 @@ pub fn calibration(scene: &dyn Scene) -> Result<Calibration, NotJudged> {
     if edges < MIN_EDGES {
         return Err(NotJudged::FewEdges { found: edges });
     }
+    begins(1);
     let delay = delayed(&mut frames);
+    begins(2);
     let with_focal_length = best(&mut frames, &WITH_FOCAL_LENGTH);
     let by_frames = spread(&refs(&frames), &WITH_FOCAL_LENGTH, &with_focal_length);
     let unit = units(&refs(&frames));
@@ -138,6 +165,7 @@ pub fn calibration(scene: &dyn Scene) -> Result<Calibration, NotJudged> {
         std_dev: by_frames[at].hypot(FLOOR_PX * unit[at]),
     };
     let focal_length = estimate(&with_focal_length, &by_frames, FOCAL_LENGTH);
+    begins(3);
     // A free focal length makes the shift along z less certain.
     let (values, by_frames) = if focal_length.is_off() {
         (with_focal_length, by_frames)
@@ -151,17 +179,47 @@ pub fn calibration(scene: &dyn Scene) -> Result<Calibration, NotJudged> {
         delay.is_off() && gain > AS_GOOD * search::gain(&refs(&frames), &values)
     });
     let narrowed = POSE.iter().filter(|&&at| by_frames[at] > FLOOR_PX * unit[at]).count();
-    Ok(Calibration {
+    let found = Calibration {
         frames: frames.len(),
         edges,
         turn: [of(0), of(1), of(2)],
         shift: [of(3), of(4), of(5)],
         focal_length: Estimate { value: focal_length.value.exp_m1(), ..focal_length },
         delay: delay.map(|(delay, _)| delay),
+        is_disputed: false,
         may_be_delay,
         is_narrowed_by_frames: 2 * narrowed > POSE.len(),
+        #[cfg(feature = "rerun")]
         picture: picture::before_and_after(scene, &frames, &values),
-    })
+    };
+    Ok(if found.is_off() && is_disputed(scene, &values) { found.disputed() } else { found })
+}
+
+/// Whether shared features and grey values together fit worse with these values than as stated.
+fn is_disputed(scene: &dyn Scene, values: &Values) -> bool {
+    /// What they vary by.
+    const LOST: f64 = 0.01;
+    let sample = Sample::read(scene);
+    let change = Change::Calibration {
+        camera_from_stated: pose_of(values),
+        times: values[FOCAL_LENGTH].exp(),
+    };
+    let worth = |change: &Change| {
+        let mean = Agreement::mean(&sample.scores(&sample.anchors, change));
+        Some(mean.carried?.tanh() + mean.motions?)
+    };
+    match (worth(&AS_STATED), worth(&change)) {
+        (Some(stated), Some(found)) => found < stated - LOST,
+        _ => false,
+    }
+}
+
+/// `camera_from_stated` of a turn and a shift.
+fn pose_of(values: &Values) -> Pose {
+    Pose::from_parts(
+        Translation3::from(values.fixed_rows::<3>(3).into_owned()),
+        UnitQuaternion::from_scaled_axis(values.fixed_rows::<3>(0)),
+    )
 }
 
 /// A delay that explains this share of what turn and shift do may be the cause.
@@ -195,6 +253,7 @@ fn read(scene: &dyn Scene) -> Vec<Frame> {
         let (photo, cloud) = (scene.photo(at).ok()?, scene.cloud(at).ok()?);
         let points: Vec<Point3<f64>> = cloud.points.iter().map(|point| point.cast()).collect();
         let mut frame = Frame {
+            #[cfg(feature = "rerun")]
             at,
             view: View::new(&photo.gray, scene.intrinsics(at)),
             points,

@@ -5,7 +5,7 @@ use nalgebra::{Point3, Quaternion, Translation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
 use crate::camera::Intrinsics;
-use crate::diagnosis::other_axes;
+use crate::diagnosis::{OPENGL_AXES, VEHICLE_AXES, other_axes};
 use crate::geometry::Pose;
 
 /// The part of a scene that is not as stated.
@@ -47,7 +47,7 @@ pub enum Mistake {
     OtherStereoCamera,
     /// Clouds are mirrored, or photos are.
     MirroredCloud,
-    /// Photos are upside down.
+    /// Photos are upside down or lie on their side.
     TurnedPhotos,
     /// Each pose is that of the frame before or after.
     PoseOfNeighbour,
@@ -79,7 +79,7 @@ impl Mistake {
                 "poses and clouds belong to the other camera of a stereo pair"
             }
             Self::MirroredCloud => "the clouds are mirrored, or the photos are",
-            Self::TurnedPhotos => "the photos are upside down",
+            Self::TurnedPhotos => "the photos are turned: upside down, or lying on their side",
             Self::PoseOfNeighbour => "the poses are one line off",
             Self::MovedCloud => "the clouds are turned or shifted against the photos",
             Self::ReversedPoses => "the poses are in reverse order",
@@ -115,13 +115,85 @@ impl Mistake {
 pub(super) const READ_WITH_5000: &str = "multiply the coordinates of clouds by 5; if these are depth images that are \
                                          read with 5000 for one metre, 1000 is one metre";
 
+/// What to write into the files of a scene, so that it is read otherwise.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Correction {
+    /// The lines.
+    pub lines: Vec<String>,
+    /// Where they belong.
+    pub place: Place,
+}
+
+/// A place in the files of a scene.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Place {
+    /// `scene.toml`, above its tables.
+    Description,
+    /// `scene.toml`, in its table of the camera.
+    Camera,
+    /// `scene.toml`, in its table of clouds.
+    Clouds,
+    /// The first line of the file with the poses.
+    PosesHeader,
+    /// The value of a metre in depth images: in `depth_per_metre.txt`, or in `scene.toml`.
+    DepthPerMetre,
+}
+
+impl Place {
+    /// The place in words.
+    pub fn about(self) -> &'static str {
+        match self {
+            Self::Description => "in scene.toml, above [camera]",
+            Self::Camera => "in scene.toml, in [camera]",
+            Self::Clouds => "in scene.toml, in [clouds]",
+            Self::PosesHeader => "as the first line of the file with the poses",
+            Self::DepthPerMetre => "in depth_per_metre.txt, a file in the scene's folder",
+        }
+    }
+}
+
 /// A way to read a scene, as if a mistake had been made.
 #[derive(Clone, Debug)]
 pub(super) struct Reading {
     pub(super) mistake: Mistake,
     /// How to correct it.
     pub(super) remedy: String,
+    /// The same as a line to write, where there is one.
+    pub(super) correction: Option<Correction>,
     pub(super) change: Change,
+}
+
+impl Reading {
+    pub(super) fn new(mistake: Mistake, remedy: &str, change: Change) -> Self {
+        Self { mistake, remedy: remedy.to_owned(), correction: None, change }
+    }
+
+    fn written(self, place: Place, lines: &str) -> Self {
+        Self {
+            correction: Some(Correction {
+                lines: lines.lines().map(str::to_owned).collect(),
+                place,
+            }),
+            ..self
+        }
+    }
+
+    /// With the value of a metre in depth images.
+    pub(super) fn with_depth_per_metre(self, value: &str) -> Self {
+        self.written(Place::DepthPerMetre, value)
+    }
+
+    /// With the line that a `scene.toml` takes for a unit.
+    pub(super) fn with_unit(self, of: &str, unit: &str) -> Self {
+        self.written(Place::Description, &format!("unit.{of} = {unit}"))
+    }
+
+    /// With the lines that a `scene.toml` takes for a camera.
+    pub(super) fn with_camera(self, stated: &Intrinsics) -> Self {
+        let (Intrinsics { fx, fy, cx, cy, .. }, _) = self.change.camera(stated);
+        let lines = format!("fx = {fx:.2}\nfy = {fy:.2}\ncx = {cx:.2}\ncy = {cy:.2}");
+        self.written(Place::Camera, &lines)
+    }
 }
 
 /// The change to the stated numbers.
@@ -149,10 +221,14 @@ pub(super) enum Change {
     Resized(f64),
     /// Photos upside down.
     UpsideDown,
+    /// Photos that a quarter turn clockwise puts upright, or one counter-clockwise.
+    OnTheirSide { clockwise: bool },
     /// An additional radial distortion k1.
     Lens(f64),
     /// Clouds so many times as large.
     Size(f64),
+    /// Clouds moved in the camera's frame, and a scaled focal length.
+    Calibration { camera_from_stated: Pose, times: f64 },
     /// Clouds turned \[°\] about the camera's y, x and z axes, then shifted \[m\] along x, y and z.
     Move([f64; 6]),
 }
@@ -160,7 +236,10 @@ pub(super) enum Change {
 impl Change {
     /// Whether it changes where clouds are in their photos, grossly and without a free number.
     pub(super) fn is_of_views(&self) -> bool {
-        matches!(self, Self::Points(_) | Self::Resized(_) | Self::UpsideDown)
+        matches!(
+            self,
+            Self::Points(_) | Self::Resized(_) | Self::UpsideDown | Self::OnTheirSide { .. }
+        )
     }
 
     /// Whether it has numbers that are chosen such that they fit.
@@ -184,6 +263,7 @@ impl Change {
             Self::Axes(turn) => Some(stated()? * turn),
             Self::InvertedAxes(turn) => Some(stated()?.inverse() * turn),
             Self::Aside(right_m) => Some(stated()? * Pose::translation(right_m, 0.0, 0.0)),
+            Self::OnTheirSide { clockwise } => Some(stated()? * quarter(clockwise).inverse()),
             _ => stated(),
         }
     }
@@ -194,6 +274,13 @@ impl Change {
             Self::Points(read) => each(&read),
             Self::Size(times) => each(&|point| point * times),
             Self::Aside(right_m) => each(&|point| point - Vector3::new(right_m, 0.0, 0.0)),
+            Self::OnTheirSide { clockwise } => {
+                let turn = quarter(clockwise);
+                each(&|point| turn * point)
+            }
+            Self::Calibration { camera_from_stated, .. } => {
+                each(&|point| camera_from_stated * point)
+            }
             Self::Move([yaw, pitch, roll, x, y, z]) => {
                 let turn = from_angles([yaw, pitch, roll].map(f64::to_radians));
                 let moved = Pose::from_parts(Translation3::new(x, y, z), turn);
@@ -223,6 +310,9 @@ impl Change {
                 };
                 (camera, 0.0)
             }
+            Self::Calibration { times, .. } => {
+                (Intrinsics { fx: stated.fx * times, fy: stated.fy * times, ..*stated }, 0.0)
+            }
             Self::Resized(times) => {
                 let centre = |c: f64| (c + 0.5) * times - 0.5;
                 let camera = Intrinsics {
@@ -245,10 +335,38 @@ impl Change {
                 };
                 (camera, 0.0)
             }
+            Self::OnTheirSide { clockwise } => {
+                let Intrinsics { fx, fy, cx, cy, width, height } = *stated;
+                // The upright photo is as wide as the one in the file is high.
+                let camera = if clockwise {
+                    Intrinsics {
+                        fx: fy,
+                        fy: fx,
+                        cx: cy,
+                        cy: f64::from(height) - 1.0 - cx,
+                        ..*stated
+                    }
+                } else {
+                    Intrinsics {
+                        fx: fy,
+                        fy: fx,
+                        cx: f64::from(width) - 1.0 - cy,
+                        cy: cx,
+                        ..*stated
+                    }
+                };
+                (camera, 0.0)
+            }
             Self::Lens(k1) => (*stated, k1),
             _ => (*stated, 0.0),
         }
     }
+}
+
+/// From the camera of an upright photo to that of the photo in a file, which a quarter turn puts upright.
+fn quarter(clockwise: bool) -> UnitQuaternion<f64> {
+    let angle = if clockwise { -std::f64::consts::FRAC_PI_2 } else { std::f64::consts::FRAC_PI_2 };
+    UnitQuaternion::from_axis_angle(&Vector3::z_axis(), angle)
 }
 
 /// A foot \[m\].
@@ -256,11 +374,13 @@ pub(super) const FOOT_M: f64 = 0.3048;
 
 /// The readings that need no search.
 pub(super) fn readings() -> Vec<Reading> {
-    let reading =
-        |mistake, remedy: &str, change| Reading { mistake, remedy: remedy.to_owned(), change };
     use Mistake as M;
+    let reading = Reading::new;
+    let header = |order: &str| format!("name x y z {order}");
+    let [first, last] = ["qw qx qy qz", "qx qy qz qw"].map(header);
     let mut all = vec![
-        reading(M::InversePose, "invert each pose", Change::Pose(|pose| pose.inverse())),
+        reading(M::InversePose, "invert each pose", Change::Pose(|pose| pose.inverse()))
+            .written(Place::Description, "pose = \"camera_from_world\""),
         reading(
             M::InversePose,
             "invert the rotation of each pose, and leave its position",
@@ -270,13 +390,19 @@ pub(super) fn readings() -> Vec<Reading> {
             M::CloudAxes,
             "rotate the axes of each cloud to right, down, forward",
             Change::Points(|p| Point3::new(-p.y, -p.z, p.x)),
-        ),
-        reading(M::Units, "divide the coordinates of clouds by 1000", Change::Size(1e-3)),
-        reading(M::Units, "divide the coordinates of clouds by 100", Change::Size(1e-2)),
-        reading(M::Units, "divide the positions of poses by 1000", Change::Size(1e3)),
-        reading(M::Units, "divide the positions of poses by 100", Change::Size(1e2)),
-        reading(M::Units, "multiply the positions of poses by 0.3048", Change::Size(1.0 / FOOT_M)),
-        reading(M::Units, READ_WITH_5000, Change::Size(5.0)),
+        )
+        .written(Place::Clouds, "camera_from_cloud = [0, -1, 0, 0,  0, 0, -1, 0,  1, 0, 0, 0]"),
+        reading(M::Units, "divide the coordinates of clouds by 1000", Change::Size(1e-3))
+            .with_unit("clouds", "\"mm\""),
+        reading(M::Units, "divide the coordinates of clouds by 100", Change::Size(1e-2))
+            .with_unit("clouds", "\"cm\""),
+        reading(M::Units, "divide the positions of poses by 1000", Change::Size(1e3))
+            .with_unit("poses", "\"mm\""),
+        reading(M::Units, "divide the positions of poses by 100", Change::Size(1e2))
+            .with_unit("poses", "\"cm\""),
+        reading(M::Units, "multiply the positions of poses by 0.3048", Change::Size(1.0 / FOOT_M))
+            .with_unit("poses", "\"ft\""),
+        reading(M::Units, READ_WITH_5000, Change::Size(5.0)).with_depth_per_metre("1000"),
         reading(
             M::WrongCamera,
             "halve the camera parameters, which are those of photos of twice the size",
@@ -291,12 +417,14 @@ pub(super) fn readings() -> Vec<Reading> {
             M::QuaternionOrder,
             "read quaternions as w x y z",
             Change::Pose(|pose| with_rotation(pose, |[x, y, z, w]| [y, z, w, x])),
-        ),
+        )
+        .written(Place::PosesHeader, &first),
         reading(
             M::QuaternionOrder,
             "read quaternions as x y z w",
             Change::Pose(|pose| with_rotation(pose, |[x, y, z, w]| [w, x, y, z])),
-        ),
+        )
+        .written(Place::PosesHeader, &last),
         reading(
             M::QuaternionOrder,
             "read quaternions as w x y z, world to camera",
@@ -323,7 +451,20 @@ pub(super) fn readings() -> Vec<Reading> {
             "give each frame the pose of the line before",
             Change::Poses(|frame, poses| poses.get(frame.checked_sub(1)?).copied().flatten()),
         ),
-        reading(M::TurnedPhotos, "turn the photos by 180°", Change::UpsideDown),
+        reading(M::TurnedPhotos, "turn the photos by 180°", Change::UpsideDown)
+            .written(Place::Description, "orientation = 180"),
+        reading(
+            M::TurnedPhotos,
+            "turn the photos by 90° clockwise",
+            Change::OnTheirSide { clockwise: true },
+        )
+        .written(Place::Description, "orientation = 90"),
+        reading(
+            M::TurnedPhotos,
+            "turn the photos by 90° counter-clockwise",
+            Change::OnTheirSide { clockwise: false },
+        )
+        .written(Place::Description, "orientation = 270"),
         reading(M::Degrees, "read the angles as degrees", Change::Poses(angles_in_degrees)),
         reading(M::Degrees, "read the angles as radians", Change::Pose(angles_in_radians)),
         reading(
@@ -346,21 +487,28 @@ pub(super) fn readings() -> Vec<Reading> {
     ];
     for (axes, turn) in other_axes() {
         let of = match axes.as_str() {
-            OPENGL => ", those of OpenGL",
-            VEHICLE => ", those of a vehicle (forward, left, up)",
+            OPENGL_AXES => ", those of OpenGL",
+            VEHICLE_AXES => ", those of a vehicle (forward, left, up)",
             _ => "",
         };
         let remedy = format!("read the poses with camera axes {axes}{of}");
-        all.push(reading(M::PoseAxes, &remedy, Change::Axes(turn)));
+        let line = match axes.as_str() {
+            OPENGL_AXES => "axes = \"opengl\"".to_owned(),
+            VEHICLE_AXES => "axes = \"vehicle\"".to_owned(),
+            axes => format!("axes = \"{axes}\""),
+        };
+        all.push(
+            reading(M::PoseAxes, &remedy, Change::Axes(turn)).written(Place::Description, &line),
+        );
         let remedy = format!("invert each pose, then read it with camera axes {axes}{of}");
-        all.push(reading(M::PoseAxes, &remedy, Change::InvertedAxes(turn)));
+        let line = format!("pose = \"camera_from_world\"\n{line}");
+        all.push(
+            reading(M::PoseAxes, &remedy, Change::InvertedAxes(turn))
+                .written(Place::Description, &line),
+        );
     }
     all
 }
-
-/// The camera axes of OpenGL, and those of a vehicle, in the axes of a camera here.
-const OPENGL: &str = "(x, -y, -z)";
-const VEHICLE: &str = "(z, -x, -y)";
 
 /// The same position, with the quaternion's components reordered.
 fn with_rotation(pose: &Pose, order: fn([f64; 4]) -> [f64; 4]) -> Pose {

@@ -61,7 +61,7 @@ struct Seeing {
 /// The compared frames, with all poses.
 #[derive(Clone)]
 pub(super) struct Sample<'a> {
-    scene: &'a dyn Scene,
+    pub(super) scene: &'a dyn Scene,
     /// Whether the poses decide what of the clouds is seen.
     has_map: bool,
     pub(super) poses: Vec<Option<Pose>>,

@@ -18,13 +18,10 @@ impl Sample<'_> {
         if let Some(right_m) = self.best_of(choosing, &aside, &|right_m| Change::Aside(right_m))
             && right_m.abs() > MIN_ASIDE_M
         {
-            found.push(Reading {
-                mistake: Mistake::OtherStereoCamera,
-                remedy: format!(
-                    "shift poses and clouds by {right_m:.2} m along the camera's x axis"
-                ),
-                change: Change::Aside(right_m),
-            });
+            let remedy =
+                format!("shift poses and clouds by {right_m:.2} m along the camera's x axis");
+            let change = Change::Aside(right_m);
+            found.push(Reading::new(Mistake::OtherStereoCamera, &remedy, change));
         }
         found.extend(self.best_camera(choosing));
         found.extend(self.best_move(choosing));
@@ -32,11 +29,8 @@ impl Sample<'_> {
         if let Some(k1) = self.best_of(choosing, &bends, &Change::Lens)
             && self.bends_by_px(k1) > MIN_PX
         {
-            found.push(Reading {
-                mistake: Mistake::UndistortedTwice,
-                remedy: format!("add {k1:.2} to the distortion k1, which fits the photos better"),
-                change: Change::Lens(k1),
-            });
+            let remedy = format!("add {k1:.2} to the distortion k1, which fits the photos better");
+            found.push(Reading::new(Mistake::UndistortedTwice, &remedy, Change::Lens(k1)));
         }
         found
     }
@@ -71,9 +65,8 @@ impl Sample<'_> {
         }
         let moved_px =
             f64::hypot(right, down).max((times - 1.0_f64).abs() * f64::from(first.width) / 2.0);
-        (moved_px > MIN_PX).then(|| Reading {
-            mistake: Mistake::WrongCamera,
-            remedy: format!(
+        (moved_px > MIN_PX).then(|| {
+            let remedy = format!(
                 "use a focal length of {:.0} px instead of {:.0} and a centre at ({:.0}, {:.0}) instead of \
                  ({:.0}, {:.0}), which fit the photos better",
                 first.fx * times,
@@ -82,9 +75,40 @@ impl Sample<'_> {
                 first.cy + down,
                 first.cx,
                 first.cy
-            ),
-            change: Change::Camera { times, right, down },
+            );
+            let change = Change::Camera { times, right, down };
+            self.with_camera(Reading::new(Mistake::WrongCamera, &remedy, change))
         })
+    }
+
+    /// The camera of photos of another size, by its centre: it is near the middle of the photos that it belongs to. `None`
+    /// where it is near the middle of these, or where both axes do not agree.
+    pub(super) fn camera_of_other_size(&self) -> Option<Reading> {
+        /// Centres are off the middle by less, as a share.
+        const OFF: f64 = 0.1;
+        let camera = self.sights.values().next()?.camera;
+        let times = |side: u32, centre: f64| f64::from(side) / (2.0 * centre + 1.0);
+        let [across, down] = [times(camera.width, camera.cx), times(camera.height, camera.cy)];
+        let times = (across * down).sqrt();
+        let is_of_other_size = (across / down).ln().abs() < OFF && times.ln().abs() > 1.5 * OFF;
+        is_of_other_size.then(|| {
+            let remedy = format!(
+                "multiply the camera parameters by about {times:.2}: their centre is the middle of photos of {:.0}x{:.0}",
+                f64::from(camera.width) / times,
+                f64::from(camera.height) / times
+            );
+            self.with_camera(Reading::new(Mistake::WrongCamera, &remedy, Change::Resized(times)))
+        })
+    }
+
+    /// With the camera's numbers, if the photos are as their files are: those of a lens are not known here.
+    pub(super) fn with_camera(&self, reading: Reading) -> Reading {
+        match self.sights.iter().next() {
+            Some((&frame, sight)) if self.scene.pixel_map(frame).is_none() => {
+                reading.with_camera(&sight.camera)
+            }
+            _ => reading,
+        }
     }
 
     /// Turns or shifts the clouds along one axis, and along a second one if that helps too.
@@ -131,11 +155,8 @@ impl Sample<'_> {
             _ => format!("shift the clouds by {:.2} {}", moved[axis], NAMES[axis]),
         });
         let words: Vec<String> = words.collect();
-        (!words.is_empty()).then(|| Reading {
-            mistake: Mistake::MovedCloud,
-            remedy: words.join(" and "),
-            change: Change::Move(moved),
-        })
+        (!words.is_empty())
+            .then(|| Reading::new(Mistake::MovedCloud, &words.join(" and "), Change::Move(moved)))
     }
 
     /// Whether the stated lengths are such as a wrong unit would leave. At one place all photos agree, so a unit that

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::reading::{Change, FOOT_M, Mistake, READ_WITH_5000, Reading, readings};
+use super::reading::{Change, Correction, FOOT_M, Mistake, READ_WITH_5000, Reading, readings};
 use super::sample::{AS_STATED, Agreement, Sample};
 
 /// The least mean gain of another reading over the frames.
@@ -34,6 +34,8 @@ pub struct Finding {
     pub mistake: Mistake,
     /// How to correct it.
     pub remedy: String,
+    /// The same as a line to write, where there is one.
+    pub correction: Option<Correction>,
     /// The agreement of the scene as stated.
     pub stated: Agreement,
     /// The agreement in the other reading.
@@ -119,13 +121,24 @@ impl Sample<'_> {
         };
         let fits = least(stated.motions, FITTING_MOTIONS)
             || has_more && least(stated.carried, FITTING_CARRIED);
+        log::debug!("{pairs} pairs of photos, {shared} share a view, {motions} agree on a motion");
+        // Streets look alike, so that some photos of different places seem to share a view.
         if fits {
             Fit::Fits
-        } else if pairs > 0 && 4 * shared.max(motions) >= pairs {
+        } else if pairs > 0 && (2 * shared >= pairs || 4 * motions >= pairs) {
             Fit::Unexplained
         } else {
             Fit::NoSharedView
         }
+    }
+
+    /// The readings without numbers that are chosen.
+    fn usual(&self) -> impl Iterator<Item = Reading> {
+        let usual = readings().into_iter().map(|one| match one.change {
+            Change::Resized(_) => self.with_camera(one),
+            _ => one,
+        });
+        usual.chain(self.camera_of_other_size())
     }
 
     /// A reading of clouds or cameras under which features agree on motions, where they agree on none as stated. It does
@@ -137,7 +150,7 @@ impl Sample<'_> {
         if 3 * as_stated >= shared {
             return None;
         }
-        let counted = readings().into_iter().filter(|one| one.change.is_of_views()).map(|one| {
+        let counted = self.usual().filter(|one| one.change.is_of_views()).map(|one| {
             let found = self.motions_in(&one.change);
             (found.values().flatten().flatten().count(), one)
         });
@@ -148,6 +161,7 @@ impl Sample<'_> {
         let finding = Finding {
             mistake: reading.mistake,
             remedy: reading.remedy,
+            correction: reading.correction,
             stated: self.agreement(),
             otherwise: Agreement::mean(&self.scores(&self.anchors, &reading.change)),
             or: Vec::new(),
@@ -159,7 +173,7 @@ impl Sample<'_> {
     /// The reading that fits better than the scene as stated, if any.
     fn best(&self) -> Option<(Finding, Change)> {
         let stated = self.scores(&self.anchors, &AS_STATED);
-        let usual = readings().into_iter().filter(|reading| self.may_be(&reading.change));
+        let usual = self.usual().filter(|reading| self.may_be(&reading.change));
         let mut tried: Vec<Judged> = usual
             .chain(self.other_scale())
             .filter_map(|reading| {
@@ -201,6 +215,7 @@ impl Sample<'_> {
         let finding = Finding {
             mistake: reading.mistake,
             remedy: reading.remedy,
+            correction: reading.correction,
             stated: Agreement::mean(&stated),
             otherwise,
             or: as_good.map(|one| (one.reading.mistake, one.reading.remedy)).collect(),
@@ -254,7 +269,14 @@ impl Sample<'_> {
             Some(0.2) => READ_WITH_5000.to_owned(),
             _ => format!("divide the coordinates of clouds, or multiply the positions of poses, by {times:.3}"),
         };
-        Some(Reading { mistake: Mistake::Units, remedy, change: Change::Size(1.0 / times) })
+        let reading = Reading::new(Mistake::Units, &remedy, Change::Size(1.0 / times));
+        Some(match unit {
+            Some(1e3) if self.has_far_clouds() => reading.with_unit("clouds", "\"mm\""),
+            Some(1e2) if self.has_far_clouds() => reading.with_unit("clouds", "\"cm\""),
+            Some(0.2) => reading.with_depth_per_metre("1000"),
+            Some(5.0) => reading.with_depth_per_metre("5000"),
+            _ => reading.with_unit("poses", &format!("{times:.4}")),
+        })
     }
 }
 

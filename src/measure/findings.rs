@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
 use super::groups::grouped;
-use crate::diagnosis::{Code, Diagnosis};
+use crate::diagnosis::{Code, Diagnosis, Grade};
 use crate::doctor::{self, Subject};
 use crate::localize::QueryResult;
 
@@ -89,17 +89,37 @@ pub fn findings(results: &[&QueryResult], examined: &[Finding]) -> Vec<Finding> 
     let quoted = examined.iter().filter(|one| failing.contains(&one.of)).cloned();
     let mut found: Vec<Finding> = without_references(results).into_iter().chain(quoted).collect();
     for one in agreed {
-        // Nothing contradicts the doctor, which has seen the whole scene.
         match found.iter_mut().find(|known| known.doctor && known.of == one.of) {
             None => found.push(one),
-            Some(known) if known.about == one.about => {
+            Some(known) if is_same(known, &one) => {
                 let text = format!("{} `posescope doctor` agrees.", one.text);
                 *known = Finding { doctor: true, text, ..one };
             }
-            Some(_) => {}
+            // Neither explains both, so neither is hidden.
+            Some(_) => {
+                let text =
+                    format!("{} `posescope doctor` names another mistake: compare both.", one.text);
+                found.push(Finding { text, ..one });
+            }
         }
     }
     found
+}
+
+/// Whether `posescope doctor` names the mistake that queries agree on.
+fn is_same(by_doctor: &Finding, by_queries: &Finding) -> bool {
+    let text = |finding: &Finding, key: &str| {
+        finding.evidence.get(key).and_then(Value::as_str).map(str::to_owned)
+    };
+    let remedy = text(by_doctor, "remedy").unwrap_or_default();
+    let is_read_so = match text(by_queries, "reading").as_deref() {
+        Some("camera_from_world (inverted)") => remedy.starts_with("invert"),
+        Some("quaternions with w first") => remedy.contains("w x y z"),
+        Some("quaternions with w last") => remedy.contains("x y z w"),
+        Some(axes) if axes.contains("axes") => remedy.contains(axes),
+        _ => true,
+    };
+    by_doctor.about == by_queries.about && is_read_so
 }
 
 /// What `posescope doctor` says of a scene.
@@ -121,12 +141,17 @@ pub fn of_examination(scene: &str, found: &doctor::Finding) -> Finding {
     }
 }
 
-/// The scenes of references whose queries fail so often that a mistake of the scene may be the cause.
+/// The scenes of references whose queries fail so often that a mistake of the scene may be the cause. Where a method is
+/// right, the scene is not to blame.
 pub fn failing_scenes(results: &[&QueryResult]) -> BTreeSet<String> {
     let of_scenes = grouped(results.iter().map(|result| (&result.scene, *result))).into_iter();
     let failing = of_scenes.filter(|(_, results)| {
-        let failed = results.iter().filter(|result| result.grade.is_failure());
-        let failed: BTreeSet<&str> = failed.map(|result| result.query.as_str()).collect();
+        let of = |is: &dyn Fn(Grade) -> bool| -> BTreeSet<&str> {
+            let those = results.iter().filter(|result| is(result.grade));
+            those.map(|result| result.query.as_str()).collect()
+        };
+        let right = of(&|grade| grade == Grade::Right);
+        let failed: BTreeSet<&str> = &of(&Grade::is_failure) - &right;
         let share = failed.len() as f64 / queries_of(results).len() as f64;
         failed.len() >= MIN_QUERIES && share >= COMMON_FAILURE
     });
@@ -151,7 +176,8 @@ fn without_references(results: &[&QueryResult]) -> Vec<Finding> {
             queries: queries.len(),
             doctor: false,
             text: format!(
-                "None of {} queries of {} has a reference in {scene}. The poses may be in another unit or place.",
+                "None of {} queries of {} has a frame of {scene} with a pose and a cloud within the radius. Raise --radius, or \
+                 check the unit and the frame of the poses.",
                 queries.len(),
                 query_scene.as_ref().unwrap_or(scene)
             ),
@@ -407,11 +433,12 @@ mod tests {
     }
 
     #[test]
-    fn what_the_doctor_says_is_quoted_and_never_contradicted() {
+    fn what_the_doctor_says_is_quoted_and_what_queries_say_beside_it() {
         let says = |mistake: Mistake| {
             let found = doctor::Finding {
                 mistake,
                 remedy: "correct it".into(),
+                correction: None,
                 stated: Default::default(),
                 otherwise: Default::default(),
                 or: Vec::new(),
@@ -427,9 +454,35 @@ mod tests {
         assert!(agreed[0].text.ends_with("`posescope doctor` agrees."), "{}", agreed[0].text);
 
         let otherwise = with(Mistake::InversePose);
-        assert_eq!((otherwise.len(), otherwise[0].queries), (1, 0));
+        assert_eq!(otherwise.iter().map(|one| one.queries).collect::<Vec<_>>(), [0, 3]);
         assert_eq!(otherwise[0].about, Subject::Poses);
         assert!(otherwise[0].text.contains("correct it"), "{}", otherwise[0].text);
+        assert!(otherwise[1].text.contains("names another mistake"), "{}", otherwise[1].text);
+
+        // The same part of the scene, in another reading.
+        let read = |reading: &str, remedy: &str| {
+            let of = |evidence| Finding { evidence, ..says(Mistake::PoseAxes) };
+            is_same(&of(json!({ "remedy": remedy })), &of(json!({ "reading": reading })))
+        };
+        let axes = "read the poses with camera axes (x, -y, -z), those of OpenGL";
+        assert!(read("camera axes (x, -y, -z)", axes));
+        assert!(!read("camera axes (z, -x, -y)", axes));
+        assert!(!read("camera axes (x, -y, -z)", "reverse the order of the poses"));
+        assert!(read("camera_from_world (inverted)", "invert each pose"));
+        assert!(!read("quaternions with w first", "invert each pose"));
+    }
+
+    #[test]
+    fn a_scene_in_which_a_method_is_right_is_not_to_blame() {
+        let with = |other: f64| {
+            let queries = ["a", "b", "c", "d"];
+            let rows = queries
+                .iter()
+                .flat_map(|query| [row(query, "pm", Some(99.0)), row(query, "fb", Some(other))]);
+            let rows: Vec<QueryResult> = rows.collect();
+            failing_scenes(&rows.iter().collect::<Vec<_>>()).len()
+        };
+        assert_eq!([with(0.1), with(50.0)], [0, 1]);
     }
 
     #[test]

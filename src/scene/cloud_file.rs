@@ -48,6 +48,20 @@ impl MapCloud {
         let from_origin = |point: &Point3<f32>| point.cast::<f64>() + self.origin;
         self.points.iter().map(from_origin)
     }
+
+    /// The cloud of a file whose coordinates are in a unit of this length \[m\].
+    pub fn in_metres(mut self, unit_m: f64) -> Self {
+        if unit_m == 1.0 {
+            return self;
+        }
+        self.origin *= unit_m;
+        for point in &mut self.points {
+            *point = (point.cast::<f64>() * unit_m).cast();
+        }
+        self.extent = self.extent.map(|(least, most)| (least * unit_m, most * unit_m));
+        self.notes = self.notes.into_iter().filter_map(|note| note.in_metres(unit_m)).collect();
+        self
+    }
 }
 
 /// Reads a cloud in any of the formats.

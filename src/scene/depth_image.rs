@@ -6,6 +6,7 @@ use image::DynamicImage;
 use nalgebra::Point2;
 
 use super::file_scene::{Clouds, Frame};
+use super::lines::TextFile;
 use super::{SceneError, photo_file};
 use crate::camera::Intrinsics;
 use crate::cloud::Cloud;
@@ -39,31 +40,59 @@ impl Clouds for DepthImages {
     }
 
     fn read(&self, index: usize, frame: &Frame) -> Result<Cloud, SceneError> {
-        let path = self.place(index, frame);
-        let depth = read_depth(path)?;
         let registered = (frame.intrinsics, Pose::identity());
-        let (intrinsics, camera_from_depth) = self.beside.unwrap_or(registered);
-        let size = (intrinsics.width, intrinsics.height);
-        photo_file::expect_size(path, depth.dimensions(), size)?;
-        let step = step(size);
-        let offset = step / 2;
-        let columns = (offset..intrinsics.width).step_by(step as usize);
-        let rows = (offset..intrinsics.height).step_by(step as usize);
-        let points = rows
-            .flat_map(|y| columns.clone().map(move |x| (x, y)))
-            .filter_map(|(x, y)| {
-                let value = depth.get_pixel(x, y).0[0];
-                if matches!(value, 0 | u16::MAX) {
-                    return None;
-                }
-                let pixel = Point2::new(f64::from(x), f64::from(y));
-                let point = intrinsics.unproject(&pixel, f64::from(value) * self.unit_m);
-                Some((camera_from_depth * point).cast())
-            })
-            .collect();
-        Ok(Cloud { points })
+        let (camera, camera_from_depth) = self.beside.unwrap_or(registered);
+        cloud_of(self.place(index, frame), &camera, &camera_from_depth, self.unit_m)
     }
 }
+
+/// The points of a depth image \[m\], from its camera, where that is, and the depth of a value of 1 \[m\].
+pub(super) fn cloud_of(
+    path: &Path,
+    depth_camera: &Intrinsics,
+    camera_from_depth: &Pose,
+    unit_m: f64,
+) -> Result<Cloud, SceneError> {
+    let depth = read_depth(path)?;
+    let size = (depth_camera.width, depth_camera.height);
+    photo_file::expect_size(path, depth.dimensions(), size)?;
+    let step = step(size);
+    let offset = step / 2;
+    let columns = (offset..depth_camera.width).step_by(step as usize);
+    let rows = (offset..depth_camera.height).step_by(step as usize);
+    let points = rows
+        .flat_map(|y| columns.clone().map(move |x| (x, y)))
+        .filter_map(|(x, y)| {
+            let value = depth.get_pixel(x, y).0[0];
+            if matches!(value, 0 | u16::MAX) {
+                return None;
+            }
+            let pixel = Point2::new(f64::from(x), f64::from(y));
+            let point = depth_camera.unproject(&pixel, f64::from(value) * unit_m);
+            Some((camera_from_depth * point).cast())
+        })
+        .collect();
+    Ok(Cloud { points })
+}
+
+/// The depth of a value of 1 \[m\], where the folder of a data set with a convention of its own has a file
+/// `depth_per_metre.txt` with another one.
+pub(super) fn unit_m(folder: &Path, usual_m: f64) -> Result<f64, SceneError> {
+    let path = folder.join(DEPTH_PER_METRE);
+    if !path.is_file() {
+        return Ok(usual_m);
+    }
+    let file = TextFile::read(&path)?;
+    match file.rows::<1, 1>()? {
+        [[value]] if value.is_finite() && value > 0.0 => Ok(1.0 / value),
+        [[value]] => {
+            Err(file.error(format!("the value of a metre in depth images expected, {value} found")))
+        }
+    }
+}
+
+/// The file with the value of a metre in the depth images of a folder.
+pub(super) const DEPTH_PER_METRE: &str = "depth_per_metre.txt";
 
 /// The step in pixels, along both axes, between points.
 pub(super) fn step((width, height): (u32, u32)) -> u32 {

@@ -14,6 +14,7 @@
 //!
 //! All files are in the folder of `scene.toml` or below it.
 
+mod correction;
 mod pattern;
 mod poses;
 
@@ -21,10 +22,12 @@ use std::mem::discriminant;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
-use nalgebra::{Matrix3x4, Point3};
+use image::metadata::Orientation;
+use nalgebra::{Matrix3x4, Point3, Translation3};
 use serde::Deserialize;
 use toml::Spanned;
 
+use self::correction::{Turn, Units, axes};
 use self::poses::FramePoses;
 use super::cloud_file::{self, MapCloud, Note};
 use super::file_scene::{Clouds, Develop, FileScene, Frame};
@@ -32,25 +35,30 @@ use super::folder::{folder_name, stem, warn_without_poses, within};
 use super::frame_names::names_of;
 use super::lens::{Distortion, developed_camera, pinhole};
 use super::map_blocks::MapBlocks;
-use super::{CloudFacts, Scene, SceneError, SceneFormat, lines, photo_file, view_crop};
+use super::recalibrated::Recalibrated;
+use super::{
+    CloudFacts, Scene, SceneError, SceneFormat, depth_image, lines, photo_file, view_crop,
+};
 use crate::camera::Intrinsics;
 use crate::cloud::Cloud;
-use crate::geometry::{Pose, pose_from_matrix};
+use crate::geometry::{Pose, matrix_from_pose, pose_from_matrix};
 
 const FILE: &str = "scene.toml";
 
 pub(super) const ENTRY: SceneFormat = SceneFormat {
     name: "toml",
-    about: "anything else: a scene.toml, or the folder with it, that names images, poses, camera and \
-            cloud (PLY, PCD, LAS, LAZ, E57, PTS, PTX, text)",
+    about: "anything else: a scene.toml (or another .toml file), or the folder with it, that names images, poses, \
+            camera and cloud (PLY, PCD, LAS, LAZ, E57, PTS, PTX, text, depth images)",
     recognizes: |argument| description_of(Path::new(argument)).is_file(),
     open: |argument| open(&description_of(Path::new(argument))),
 };
 
+/// A file of another name is a second description of the same folder.
 fn description_of(argument: &Path) -> PathBuf {
-    match argument.file_name() {
-        Some(name) if name == FILE => argument.to_owned(),
-        _ => argument.join(FILE),
+    if argument.extension().is_some_and(|extension| extension == "toml") && argument.is_file() {
+        argument.to_owned()
+    } else {
+        argument.join(FILE)
     }
 }
 
@@ -64,6 +72,16 @@ struct Description {
     /// The file with the poses. Without it, all frames are queries.
     poses: Option<Spanned<String>>,
     pose: Option<Spanned<PoseMeaning>>,
+    /// The axes of the poses' cameras.
+    axes: Option<Spanned<String>>,
+    /// From the frame of a body whose poses they are: a 3 × 4 matrix, row by row.
+    camera_from_body: Option<Spanned<[f64; 12]>>,
+    /// The unit of poses and clouds.
+    unit: Option<Spanned<Units>>,
+    /// How the images in files must be turned.
+    orientation: Option<Spanned<Turn>>,
+    /// The value of a metre in depth images.
+    depth_per_metre: Option<Spanned<f64>>,
     camera: Spanned<CameraDescription>,
     /// One cloud for all frames.
     cloud: Option<Spanned<String>>,
@@ -144,6 +162,17 @@ struct Source {
 }
 
 impl Source {
+    fn read(path: &Path) -> Result<Self, SceneError> {
+        Ok(Self { path: path.to_owned(), text: lines::read_text(path)? })
+    }
+
+    fn description(&self) -> Result<Description, SceneError> {
+        toml::from_str(&self.text).map_err(|error| {
+            let at = error.span().map_or(0, |span| span.start);
+            self.error_at(at, error.message())
+        })
+    }
+
     fn folder(&self) -> &Path {
         match self.path.parent() {
             Some(folder) if !folder.as_os_str().is_empty() => folder,
@@ -162,6 +191,16 @@ impl Source {
 
     fn error<T>(&self, value: &Spanned<T>, expected: &str) -> SceneError {
         self.error_at(value.span().start, expected)
+    }
+
+    /// What a value means, if it is there.
+    fn read_value<T, R>(
+        &self,
+        value: Option<&Spanned<T>>,
+        read: impl Fn(&T) -> Result<R, String>,
+    ) -> Result<Option<R>, SceneError> {
+        let read = value.map(|value| read(value.get_ref()).map_err(|why| self.error(value, &why)));
+        read.transpose()
     }
 
     fn file(&self, name: &Spanned<String>) -> Result<PathBuf, SceneError> {
@@ -191,13 +230,11 @@ impl Source {
 }
 
 fn open(path: &Path) -> Result<Box<dyn Scene>, SceneError> {
-    let source = Source { path: path.to_owned(), text: lines::read_text(path)? };
-    let description: Description = toml::from_str(&source.text).map_err(|error| {
-        let at = error.span().map_or(0, |span| span.start);
-        source.error_at(at, error.message())
-    })?;
+    let source = Source::read(path)?;
+    let description = source.description()?;
     let photos = source.files(&description.images)?;
-    let (intrinsics, develop) = camera(&source, &description.camera, &photos)?;
+    let turned = source.read_value(description.orientation.as_ref(), Turn::orientation)?;
+    let (intrinsics, develop) = camera(&source, &description.camera, &photos, turned)?;
     let file_names = photos.iter().map(|photo| photo.file_name().unwrap_or_default());
     let file_names: Vec<String> =
         file_names.map(|name| name.to_string_lossy().into_owned()).collect();
@@ -217,11 +254,36 @@ fn open(path: &Path) -> Result<Box<dyn Scene>, SceneError> {
         return Err(source.error(pose, expected));
     }
     let invert = meaning == Some(&PoseMeaning::CameraFromWorld) && !is_inverted;
-    let clouds = clouds(&source, &description, &photos)?;
+    let turn = source.read_value(description.axes.as_ref(), |text| axes(text))?;
+    let [unit_m, clouds_unit_m] =
+        source.read_value(description.unit.as_ref(), Units::metres)?.unwrap_or([1.0, 1.0]);
+    let camera_from_body =
+        source.read_value(description.camera_from_body.as_ref(), pose_of_rows)?;
+    if let (Some(axes), Some(_)) = (&description.axes, camera_from_body) {
+        let expected = "either `axes` or `camera_from_body` expected, both found";
+        return Err(source.error(axes, expected));
+    }
+    let turn = turn.map(|turn| Pose::from_parts(Translation3::identity(), turn));
+    let posed_from_camera = turn.or(camera_from_body.map(|pose| pose.inverse()));
+    let world_from_camera = |read: Pose| {
+        let mut pose = if invert { read.inverse() } else { read };
+        pose.translation.vector *= unit_m;
+        posed_from_camera.map_or(pose, |posed_from_camera| pose * posed_from_camera)
+    };
+    let clouds =
+        DescribedClouds { unit_m: clouds_unit_m, ..clouds(&source, &description, &photos)? };
+    if let (Some(depth), true) =
+        (&description.depth_per_metre, develop.is_some() || turned.is_some())
+    {
+        let expected = "photos without distortion and `orientation` expected, since depth images belong to them pixel \
+                        by pixel";
+        return Err(source.error(depth, expected));
+    }
     let name = match &description.name {
         Some(name) if !name.get_ref().trim().is_empty() => name.get_ref().clone(),
         Some(name) => return Err(source.error(name, "a name expected, an empty one found")),
-        None => format!("toml/{}", folder_name(source.folder())),
+        None if path.ends_with(FILE) => format!("toml/{}", folder_name(source.folder())),
+        None => format!("toml/{}/{}", folder_name(source.folder()), stem(path)),
     };
     let frames = photos
         .into_iter()
@@ -230,24 +292,30 @@ fn open(path: &Path) -> Result<Box<dyn Scene>, SceneError> {
         .map(|((photo, FramePoses { pose, time_s }), name)| Frame {
             name,
             develop: develop.clone(),
-            world_from_camera: pose.map(|pose| if invert { pose.inverse() } else { pose }),
+            world_from_camera: pose.map(world_from_camera),
             time_s,
+            turned,
             ..Frame::new(photo, intrinsics)
         })
         .collect();
     Ok(Box::new(FileScene::new(name, frames, clouds)))
 }
 
-/// The camera of the undistorted photos.
+/// The camera of the undistorted photos, whose files are turned as said.
 fn camera(
     source: &Source,
     described: &Spanned<CameraDescription>,
     photos: &[PathBuf],
+    turned: Option<Orientation>,
 ) -> Result<(Intrinsics, Option<Arc<dyn Develop>>), SceneError> {
     let camera = described.get_ref();
     let (stored, first) = photo_file::common_size(photos)?;
-    let turned = photo_file::turned_size(stored, photo_file::orientation(first));
-    let size = if turned != stored && fits_turned(camera, stored, first) { turned } else { stored };
+    let by_exif = photo_file::turned_size(stored, photo_file::orientation(first));
+    let size = match turned {
+        Some(turned) => photo_file::turned_size(stored, turned),
+        None if by_exif != stored && fits_turned(camera, stored, first) => by_exif,
+        None => stored,
+    };
     let numbers = [camera.fx, camera.fy, camera.cx, camera.cy];
     let error = |why: String| source.error(described, &why);
     let taken = pinhole(numbers, size).map_err(error)?;
@@ -296,6 +364,11 @@ fn clouds(
     photos: &[PathBuf],
 ) -> Result<DescribedClouds, SceneError> {
     let mut clouds = DescribedClouds { place: source.path.clone(), ..DescribedClouds::default() };
+    if let (Some(value), None) = (&description.depth_per_metre, &description.clouds) {
+        return Err(
+            source.error(value, "depth images in `files` of [clouds] expected, no [clouds] found")
+        );
+    }
     match (&description.cloud, &description.clouds) {
         (Some(name), None) => {
             clouds.place = source.file(name)?;
@@ -303,6 +376,7 @@ fn clouds(
         }
         (None, Some(described)) => {
             (clouds.files, clouds.camera_from_cloud) = per_frame(source, described, photos)?;
+            clouds.depth = depth(source, description, described, &clouds.files)?;
         }
         (None, None) => {}
         (Some(name), Some(_)) => {
@@ -339,11 +413,80 @@ fn per_frame(
         }
         (CloudFrame::Camera, None) => Some(Pose::identity()),
         (CloudFrame::Camera, Some(matrix)) => {
-            let pose = pose_from_matrix(&Matrix3x4::from_row_slice(matrix.get_ref()));
-            Some(pose.map_err(|error| source.error(matrix, &error.to_string()))?)
+            Some(pose_of_rows(matrix.get_ref()).map_err(|why| source.error(matrix, &why))?)
         }
     };
     Ok((clouds, camera_from_cloud))
+}
+
+/// The depth of a value of 1 in the clouds' files \[m\], if these are depth images.
+fn depth(
+    source: &Source,
+    description: &Description,
+    described: &CloudsDescription,
+    files: &[Option<PathBuf>],
+) -> Result<Option<f64>, SceneError> {
+    let are_images = files.iter().flatten().next().is_some_and(|file| photo_file::is_image(file));
+    match &description.depth_per_metre {
+        Some(value) if !are_images => {
+            Err(source.error(value, "depth images in `files` of [clouds] expected, other files found"))
+        }
+        Some(value) if !(value.get_ref().is_finite() && *value.get_ref() > 0.0) => {
+            Err(source.error(value, "the value of a metre in depth images expected, such as 1000"))
+        }
+        None if are_images => Err(source.error(
+            &described.files,
+            "these are images: if they are depth images, a line such as `depth_per_metre = 1000` expected above [camera]",
+        )),
+        Some(_) if described.frame == CloudFrame::World || described.camera_from_cloud.is_some() => {
+            Err(source.error(
+                &described.files,
+                "depth images belong to their photos pixel by pixel: no `frame` or `camera_from_cloud` expected",
+            ))
+        }
+        value => Ok(value.as_ref().map(|value| 1.0 / value.get_ref())),
+    }
+}
+
+fn pose_of_rows(rows: &[f64; 12]) -> Result<Pose, String> {
+    pose_from_matrix(&Matrix3x4::from_row_slice(rows)).map_err(|error| error.to_string())
+}
+
+/// The description with another `camera_from_cloud`, or `camera_from_body` where the clouds are in the world's frame.
+pub(super) fn recalibrated(argument: &str, change: &Pose) -> Result<Recalibrated, SceneError> {
+    let source = Source::read(&description_of(Path::new(argument)))?;
+    let description = source.description()?;
+    let of_clouds = description.clouds.as_ref().filter(|one| one.frame == CloudFrame::Camera);
+    let (name, stated) = match of_clouds {
+        Some(_) if description.depth_per_metre.is_some() => {
+            let expected =
+                "clouds of a scanner expected: depth images belong to their photos pixel by pixel";
+            return Err(SceneError::expected(&source.path, expected));
+        }
+        Some(clouds) => ("camera_from_cloud", clouds.camera_from_cloud.as_ref()),
+        None => ("camera_from_body", description.camera_from_body.as_ref()),
+    };
+    let mut better = match stated {
+        Some(stated) => pose_of_rows(stated.get_ref()).map_err(|why| source.error(stated, &why))?,
+        None => Pose::identity(),
+    };
+    if let (None, Some(axes_of_poses)) = (of_clouds, &description.axes) {
+        let expected = "`camera_from_body` in place of `axes` expected, to hold a turn and a shift";
+        return Err(source.error(axes_of_poses, expected));
+    }
+    better = change * better;
+    let numbers = matrix_from_pose(&better).transpose();
+    let numbers: Vec<String> = numbers.iter().map(|number| format!("{number:.9}")).collect();
+    let value = format!("[{}]", numbers.join(", "));
+    let mut text = source.text.clone();
+    match (stated, &description.clouds) {
+        (Some(stated), _) => text.replace_range(stated.span(), &value),
+        (None, Some(clouds)) if of_clouds.is_some() => {
+            text.insert_str(clouds.files.span().end, &format!("\n{name} = {value}"));
+        }
+        (None, _) => text.insert_str(0, &format!("{name} = {value}\n")),
+    }
+    Ok(Recalibrated { path: source.path, text })
 }
 
 #[derive(Default)]
@@ -356,6 +499,10 @@ struct DescribedClouds {
     files: Vec<Option<PathBuf>>,
     /// The transform of these files to the camera's frame; `None` if they are in the world's frame.
     camera_from_cloud: Option<Pose>,
+    /// The depth of a value of 1 \[m\], if the files are depth images.
+    depth: Option<f64>,
+    /// The unit of the clouds \[m\].
+    unit_m: f64,
     /// What was noticed in the files.
     notes: Mutex<Vec<Note>>,
 }
@@ -363,7 +510,7 @@ struct DescribedClouds {
 impl DescribedClouds {
     /// Reads a file, and warns of what is noticed in it. The same of other files is not said again.
     fn read_file(&self, path: &Path) -> Result<MapCloud, SceneError> {
-        let cloud = cloud_file::read(path)?;
+        let cloud = cloud_file::read(path)?.in_metres(self.unit_m);
         let mut known = self.notes.lock().unwrap_or_else(PoisonError::into_inner);
         for note in &cloud.notes {
             if !known.iter().any(|other| discriminant(other) == discriminant(note)) {
@@ -417,6 +564,9 @@ impl Clouds for DescribedClouds {
                 Some(camera_from_cloud) => camera_from_cloud,
                 None => world_from_camera()?.inverse(),
             };
+            if let Some(unit_m) = self.depth {
+                return depth_image::cloud_of(path, &frame.intrinsics, &Pose::identity(), unit_m);
+            }
             let cloud = self.read_file(path)?;
             let in_camera = |point: Point3<f64>| (camera_from_cloud * point).cast();
             return Ok(Cloud { points: cloud.positions().map(in_camera).collect() });

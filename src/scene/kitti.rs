@@ -7,9 +7,12 @@ use nalgebra::{Matrix3x4, Point3, Vector3};
 
 use super::file_scene::{FileScene, Frame};
 use super::folder::{folder_name, numbered, warn_without_poses};
-use super::kitti_format::{Camera, Scans, labelled, optional, split_projection};
-use super::lines::TextFile;
+use super::kitti_format::{
+    Camera, Scans, in_camera0, labelled, optional, split_projection, with_labelled,
+};
+use super::lines::{self, TextFile};
 use super::pose_text::{PoseLines, by_line};
+use super::recalibrated::Recalibrated;
 use super::{Scene, SceneError, SceneFormat, photo_file};
 use crate::geometry::{Pose, matrix_from_pose};
 
@@ -77,6 +80,21 @@ fn open(path: &Path) -> Result<Box<dyn Scene>, SceneError> {
         None => format!("kitti/{sequence}"),
     };
     Ok(Box::new(FileScene::new(name, frames.collect(), scans)))
+}
+
+/// `calib.txt` with another line `Tr`.
+pub(super) fn recalibrated(argument: &str, change: &Pose) -> Result<Recalibrated, SceneError> {
+    let camera = Camera::of_path(Path::new(argument), &CAMERAS);
+    let (path, label) = (camera.folder.join(CALIBRATION), camera.name()?.replace("image_", "P"));
+    let text = lines::read_text(&path)?;
+    let file = TextFile::from_text(&path.display().to_string(), &text);
+    // The size does not matter for where the camera is.
+    let size = (u32::MAX, u32::MAX);
+    let (_, camera_from_camera0) = split_projection(&labelled(&file, &label)?, size, &file)?;
+    let stated = Matrix3x4::from_row_slice(&labelled::<12>(&file, "Tr")?);
+    let better = moved(&stated, &in_camera0(change, &camera_from_camera0));
+    let text = with_labelled(&text, "Tr", better.transpose().as_slice());
+    Ok(Recalibrated { path, text })
 }
 
 /// The camera from the Velodyne. `Tr` is not orthonormalised, although its rotation may have few digits.

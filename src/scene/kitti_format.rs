@@ -156,3 +156,19 @@ fn read_scan(
     let points = records.iter().enumerate().map(point);
     Ok(Cloud { points: points.collect::<Result<_, _>>()? })
 }
+
+/// The text of a file in which the line `LABEL: …` has other numbers.
+pub(super) fn with_labelled(text: &str, label: &str, numbers: &[f64]) -> String {
+    let is_it = |line: &&str| line.split_once(':').is_some_and(|(found, _)| found.trim() == label);
+    let numbers: Vec<String> = numbers.iter().map(|number| format!("{number:.12}")).collect();
+    let lines = text.lines().map(|line| match Some(line).filter(is_it) {
+        Some(_) => format!("{label}: {}\n", numbers.join(" ")),
+        None => format!("{line}\n"),
+    });
+    lines.collect()
+}
+
+/// The change in the frame of the rectified camera 0 for one in the frame of a camera.
+pub(super) fn in_camera0(change: &Pose, camera_from_camera0: &Pose) -> Pose {
+    camera_from_camera0.inverse() * change * camera_from_camera0
+}

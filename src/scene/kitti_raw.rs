@@ -20,7 +20,9 @@ use self::sweep::Sweep;
 use super::file_scene::{FileScene, Frame};
 use super::folder::{folder_name, numbered, split_word, warn_without_poses};
 use super::kitti_format::{Camera, Scans};
+use super::recalibrated::Recalibrated;
 use super::{Scene, SceneError, SceneFormat, photo_file};
+use crate::geometry::Pose;
 
 pub(super) const ENTRY: SceneFormat = SceneFormat {
     name: "kitti-raw",
@@ -43,6 +45,13 @@ const UNCORRECTED: &str = "uncorrected";
 
 /// The cameras in the order of preference: grey left, colour left, grey right, colour right.
 const CAMERAS: [&str; 4] = ["image_00", "image_02", "image_01", "image_03"];
+
+/// `calib_velo_to_cam.txt` with another rotation and translation.
+pub(super) fn recalibrated(argument: &str, change: &Pose) -> Result<Recalibrated, SceneError> {
+    let (path, _) = split_word(argument, &[UNCORRECTED]);
+    let camera = Camera::of_path(path, &CAMERAS);
+    calibration::recalibrated(&day_of(camera.folder), camera.name()?, change)
+}
 
 /// The folder of the day, with the calibration.
 fn day_of(drive: &Path) -> PathBuf {

@@ -35,6 +35,11 @@ pub(super) fn common_size<'a>(photos: &'a [PathBuf]) -> Result<((u32, u32), &'a 
     }
 }
 
+/// Whether the content of a file is an image.
+pub(super) fn is_image(path: &Path) -> bool {
+    reader(path).is_ok()
+}
+
 /// Decodes an image.
 pub(super) fn decode(path: &Path) -> Result<DynamicImage, SceneError> {
     let image = reader(path)?.decode().map_err(SceneError::image(path))?;

@@ -4,14 +4,14 @@
 //! As distributed, the data contain no intrinsics, and depth images and poses are those of the depth camera. The
 //! reader then uses the documented intrinsics of the depth camera, and for the colour camera the calibration of a
 //! Kinect that is common in work on this data set. In a folder with `camera-intrinsics.txt`, a 3 × 3 matrix, depth
-//! images are registered with the photos.
+//! images are registered with the photos. 1000 is a metre in depth images, or the number in `depth_per_metre.txt`.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use nalgebra::{Matrix3, Matrix4, Translation3, UnitQuaternion};
 
-use super::depth_image::DepthImages;
+use super::depth_image::{DepthImages, unit_m};
 use super::file_scene::{FileScene, Frame};
 use super::folder::{entries, folder_name, split_word};
 use super::lens::pinhole;
@@ -93,7 +93,7 @@ fn open(folder: &Path, split: Option<&str>) -> Result<Box<dyn Scene>, SceneError
         images: depths,
         listed_in: folder.to_owned(),
         beside: cameras.depth,
-        unit_m: UNIT_M,
+        unit_m: unit_m(folder, UNIT_M)?,
     };
     Ok(Box::new(FileScene::new(name, frames, clouds)))
 }

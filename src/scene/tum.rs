@@ -3,11 +3,11 @@
 //!
 //! The camera is in `calibration.txt` (`fx fy cx cy`, an addition of ETH3D). Without it, the reader uses the
 //! benchmark's recommendation: the default calibration of the Kinect drivers, to which the depth images are
-//! registered.
+//! registered. 5000 is a metre in depth images, or the number in `depth_per_metre.txt`.
 
 use std::path::{Path, PathBuf};
 
-use super::depth_image::DepthImages;
+use super::depth_image::{DepthImages, unit_m};
 use super::file_scene::{FileScene, Frame};
 use super::folder::{folder_name, warn_without_poses, within};
 use super::lens::pinhole;
@@ -75,8 +75,12 @@ fn open(folder: &Path) -> Result<Box<dyn Scene>, SceneError> {
         ));
     }
     let name = format!("tum/{}", folder_name(folder));
-    let clouds =
-        DepthImages { images, listed_in: folder.join("depth.txt"), beside: None, unit_m: UNIT_M };
+    let clouds = DepthImages {
+        images,
+        listed_in: folder.join("depth.txt"),
+        beside: None,
+        unit_m: unit_m(folder, UNIT_M)?,
+    };
     Ok(Box::new(FileScene::new(name, frames, clouds)))
 }
 

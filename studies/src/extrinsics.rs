@@ -137,7 +137,7 @@ fn row(scene: &dyn Scene, options: &Options) -> Result<Vec<String>, Failure> {
         focal_length: 1.0,
         delay_s: 0.0,
     };
-    let own = calibration(&as_it_is)?.camera_from_stated();
+    let own = calibration(&as_it_is, &|_| ())?.camera_from_stated();
     let (mut turns, mut shifts, mut own_turns, mut own_shifts) = (vec![], vec![], vec![], vec![]);
     let (mut inside, mut judged) = (0, 0);
     let (mut consistent, mut focal_lengths, mut delays) = (0, vec![], vec![]);
@@ -150,7 +150,7 @@ fn row(scene: &dyn Scene, options: &Options) -> Result<Vec<String>, Failure> {
         let shift = way * random.random_range(0.02..0.3_f64);
         let change =
             Pose::from_parts(Translation3::from(shift), UnitQuaternion::from_scaled_axis(turn));
-        let found = calibration(&Misplaced { at: at.clone(), change, ..as_it_is })?;
+        let found = calibration(&Misplaced { at: at.clone(), change, ..as_it_is }, &|_| ())?;
         let rest = found.camera_from_stated() * change;
         let [turn_deg, shift_m] = size(&rest);
         turns.push(turn_deg);
@@ -164,15 +164,15 @@ fn row(scene: &dyn Scene, options: &Options) -> Result<Vec<String>, Failure> {
             inside += usize::from(off.abs() <= half);
             judged += 1;
         }
-        let sound: Calibration = calibration(&Misplaced { at: at.clone(), ..as_it_is })?;
+        let sound: Calibration = calibration(&Misplaced { at: at.clone(), ..as_it_is }, &|_| ())?;
         consistent += usize::from(!sound.is_off());
         let sign = if random.random_bool(0.5) { 1.0 } else { -1.0 };
         let by = sign * random.random_range(0.02..0.08);
         let wrong = Misplaced { at: at.clone(), focal_length: 1.0 + by, ..as_it_is };
-        let found = calibration(&wrong)?.focal_length.value;
+        let found = calibration(&wrong, &|_| ())?.focal_length.value;
         focal_lengths.push(100.0 * ((1.0 + found) * (1.0 + by) - 1.0).abs());
         let delay_s = sign * random.random_range(0.02..0.1);
-        if let Some(delay) = calibration(&Misplaced { at, delay_s, ..as_it_is })?.delay {
+        if let Some(delay) = calibration(&Misplaced { at, delay_s, ..as_it_is }, &|_| ())?.delay {
             delays.push(1000.0 * (delay.value - delay_s).abs());
         }
     }

@@ -4,6 +4,7 @@ mod answered;
 mod believed;
 mod calibration;
 mod cases;
+mod examined;
 mod exported;
 mod extrinsics;
 mod faults;
@@ -18,6 +19,9 @@ mod peers;
 mod places;
 mod places_found;
 mod planted;
+/// The scenes with mistakes that the tests examine, too.
+#[path = "../../tests/it/planted.rs"]
+mod planted_scene;
 mod real_pairs;
 mod same_results;
 mod scene_statistics;
@@ -40,6 +44,7 @@ enum Study {
     Believed(believed::Options),
     Calibration(calibration::Options),
     Extrinsics(extrinsics::Options),
+    Examined(examined::Options),
     Scenes(scene_statistics::Options),
     MapSize(map_size::Options),
     Places(places_found::Options),
@@ -58,6 +63,7 @@ fn main() -> ExitCode {
         Study::Believed(options) => believed::run(&options),
         Study::Calibration(options) => calibration::run(&options),
         Study::Extrinsics(options) => extrinsics::run(&options),
+        Study::Examined(options) => examined::run(&options),
         Study::Scenes(options) => scene_statistics::run(&options),
         Study::MapSize(options) => map_size::run(&options),
         Study::Places(options) => places_found::run(&options),

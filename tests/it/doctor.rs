@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use posescope::doctor::{Fit, Mistake, examine};
+use posescope::doctor::{Correction, Fit, Mistake, Place, examine};
 use posescope::scene::street::{Size, Street};
 use posescope::scene::{self, Scene};
 use tempfile::TempDir;
@@ -11,40 +11,13 @@ use tempfile::TempDir;
 use crate::binary::{has, run_in};
 use crate::damage::open;
 use crate::data;
-use crate::planted::{Fault, Planted};
+use crate::planted::{FAULTS, Fault, Planted};
 use crate::small_sequence::SmallSequence;
-
-/// What each fault is to be called; half a pixel is less than clouds and photos agree by.
-const EXPECTED: [(Fault, Option<Mistake>); 25] = [
-    (Fault::Nothing, None),
-    (Fault::InversePose, Some(Mistake::InversePose)),
-    (Fault::InverseRotation, Some(Mistake::InversePose)),
-    (Fault::PoseAxes, Some(Mistake::PoseAxes)),
-    (Fault::OpenGlAxes, Some(Mistake::PoseAxes)),
-    (Fault::CloudAxes, Some(Mistake::CloudAxes)),
-    (Fault::FiveTimesTheDepth, Some(Mistake::Units)),
-    (Fault::UpsideDown, Some(Mistake::TurnedPhotos)),
-    (Fault::WrongCamera, Some(Mistake::WrongCamera)),
-    (Fault::ResizedPhotos, Some(Mistake::WrongCamera)),
-    (Fault::FootPoses, Some(Mistake::Units)),
-    (Fault::MillimetrePoses, Some(Mistake::Units)),
-    (Fault::MillimetreClouds, Some(Mistake::Units)),
-    (Fault::CentimetreClouds, Some(Mistake::Units)),
-    (Fault::QuaternionOrder, Some(Mistake::QuaternionOrder)),
-    (Fault::HalfPixel, None),
-    (Fault::CloudOneFrameOff, Some(Mistake::CloudOfNeighbour)),
-    (Fault::DegreesForRadians, Some(Mistake::Degrees)),
-    (Fault::RadiansForDegrees, Some(Mistake::Degrees)),
-    (Fault::LeftForRight, Some(Mistake::OtherStereoCamera)),
-    (Fault::MirroredCloud, Some(Mistake::MirroredCloud)),
-    (Fault::TurnedCloud, Some(Mistake::MovedCloud)),
-    (Fault::LoweredCloud, Some(Mistake::MovedCloud)),
-    (Fault::ReversedPoses, Some(Mistake::ReversedPoses)),
-    (Fault::UndistortedTwice, Some(Mistake::UndistortedTwice)),
-];
+use crate::written::Written as _;
 
 /// What mends those that one word names as others are named.
-const REMEDIES: [(Fault, &str); 9] = [
+const REMEDIES: [(Fault, &str); 10] = [
+    (Fault::OnTheirSide, "turn the photos by 90° clockwise"),
     (Fault::InversePose, "invert each pose"),
     (Fault::InverseRotation, "invert the rotation of each pose, and leave its position"),
     (
@@ -85,10 +58,73 @@ fn all_planted_mistakes_are_named() {
     are_named(|fault| !FEW.contains(&fault));
 }
 
+/// The line that the doctor offers, written where it says, makes the scene fit.
+#[test]
+fn what_is_to_be_written_mends_the_poses_axes() {
+    are_mended(&[Fault::OpenGlAxes]);
+}
+
+#[test]
+#[ignore = "takes a minute; .ci/nightly runs it"]
+fn what_is_to_be_written_mends_the_scene() {
+    are_mended(&[
+        Fault::InversePose,
+        Fault::PoseAxes,
+        Fault::CloudAxes,
+        Fault::UpsideDown,
+        Fault::WrongCamera,
+        Fault::ResizedPhotos,
+        Fault::ThreeQuarterPhotos,
+        Fault::FootPoses,
+        Fault::MillimetrePoses,
+        Fault::MillimetreClouds,
+        Fault::CentimetreClouds,
+        Fault::QuaternionOrder,
+    ]);
+}
+
+fn are_mended(faults: &[Fault]) {
+    let street = Street::new("overcast", Size::Half).expect("is built in");
+    for &fault in faults {
+        let folder = TempDir::new().expect("a folder");
+        Planted::every(&street, fault, 0..40, 1).write_to(folder.path());
+        let found = examine(open(folder.path()).as_ref());
+        let finding = found.finding.unwrap_or_else(|| panic!("{fault:?} is not named"));
+        let Correction { lines, place } =
+            finding.correction.unwrap_or_else(|| panic!("{fault:?}: {}", finding.remedy));
+        let [scene, poses] = ["scene.toml", "poses.txt"].map(|name| folder.path().join(name));
+        let text = fs::read_to_string(&scene).expect("written");
+        let lines = lines.join("\n") + "\n";
+        let text = match place {
+            Place::Description => lines + &text,
+            Place::Clouds => text + &lines,
+            Place::Camera => {
+                let is_other = |line: &&str| {
+                    !["fx ", "fy ", "cx ", "cy "].iter().any(|of| line.starts_with(of))
+                };
+                let others = text.lines().filter(is_other).map(|line| line.to_owned() + "\n");
+                others.collect::<String>().replace("[camera]\n", &format!("[camera]\n{lines}"))
+            }
+            Place::PosesHeader => {
+                let known = fs::read_to_string(&poses).expect("written");
+                let (_, rest) = known.split_once('\n').expect("a header");
+                fs::write(&poses, lines + rest).expect("writable");
+                text
+            }
+            other => panic!("{fault:?}: {other:?}"),
+        };
+        fs::write(&scene, text).expect("writable");
+        let mended = examine(open(folder.path()).as_ref());
+        println!("{fault:?}: {:?} {:?}", mended.fit, mended.agreement);
+        let named = mended.finding.map(|one| (one.mistake, one.remedy));
+        assert_eq!((mended.fit, named), (Some(Fit::Fits), None), "{fault:?}");
+    }
+}
+
 fn are_named(is_planted: impl Fn(Fault) -> bool) {
     let street = Street::new("overcast", Size::Half).expect("is built in");
-    for (fault, expected) in EXPECTED.into_iter().filter(|(fault, _)| is_planted(*fault)) {
-        let planted = Planted::new(&street, fault, 0, 40);
+    for (fault, expected) in FAULTS.into_iter().filter(|(fault, _)| is_planted(*fault)) {
+        let planted = Planted::every(&street, fault, 0..40, 1);
         let found = examine(&planted);
         let named = found.finding.as_ref().map(|finding| finding.mistake);
         println!("{fault:?}: {named:?} {:?}", found.remarks);
@@ -115,11 +151,11 @@ fn mistakes_of_poses_are_named_with_one_map_for_all_frames() {
     ];
     for fault in faults {
         let folder = TempDir::new().expect("a folder");
-        Planted::new(&street, fault, 0, 40).write_with_map(folder.path());
+        Planted::every(&street, fault, 0..40, 1).write_with_map(folder.path());
         let found = examine(open(folder.path()).as_ref());
         let named = found.finding.as_ref().map(|finding| finding.mistake);
         println!("{fault:?}: {named:?} {:?}", found.agreement);
-        let expected = EXPECTED.iter().find(|(of, _)| *of == fault).and_then(|(_, named)| *named);
+        let expected = FAULTS.iter().find(|(of, _)| *of == fault).and_then(|(_, named)| *named);
         assert_eq!(named, expected, "{fault:?}");
     }
 }
@@ -129,7 +165,7 @@ fn mistakes_of_poses_are_named_with_one_map_for_all_frames() {
 #[ignore = "takes half a minute; .ci/nightly runs it"]
 fn poses_that_are_one_line_off_are_named() {
     let street = Street::new("overcast", Size::Full).expect("is built in");
-    let found = examine(&Planted::new(&street, Fault::PoseOneLineOff, 0, 40));
+    let found = examine(&Planted::every(&street, Fault::PoseOneLineOff, 0..40, 1));
     let named = found.finding.map(|one| (one.mistake, one.remedy));
     let remedy = "give each frame the pose of the next line".to_owned();
     assert_eq!(named, Some((Mistake::PoseOfNeighbour, remedy)));
@@ -138,8 +174,8 @@ fn poses_that_are_one_line_off_are_named() {
 #[test]
 fn two_mistakes_are_found_one_after_the_other() {
     let street = Street::new("overcast", Size::Half).expect("is built in");
-    let cloud = Planted::new(&street, Fault::CloudAxes, 0, 40);
-    let both = Planted::new(&cloud, Fault::OpenGlAxes, 0, 40);
+    let cloud = Planted::every(&street, Fault::CloudAxes, 0..40, 1);
+    let both = Planted::every(&cloud, Fault::OpenGlAxes, 0..40, 1);
     let found = examine(&both);
     let first = found.finding.expect("a mistake");
     let second = first.then.as_ref().expect("another");
@@ -162,10 +198,18 @@ fn frames_far_apart_are_not_accused() {
 }
 
 /// No reading makes depths fit that are noise.
+/// Facades look alike, so that some photos seem to share a view that they do not share.
+#[test]
+fn photos_of_different_places_are_no_misfit() {
+    let street = Street::new("overcast", Size::Full).expect("is built in");
+    let found = examine(&Planted::every(&street, Fault::Nothing, 0..720, 30));
+    assert_eq!((found.fit, found.is_broken()), (Some(Fit::NoSharedView), false));
+}
+
 #[test]
 fn depths_of_noise_are_a_misfit_that_nothing_explains() {
     let street = Street::new("overcast", Size::Half).expect("is built in");
-    let noise = Planted::new(&street, Fault::DepthsOfNoise, 0, 24);
+    let noise = Planted::every(&street, Fault::DepthsOfNoise, 0..24, 1);
     let found = examine(&noise);
     println!("{:?}", found.agreement);
     let named = found.finding.as_ref().map(|one| (one.mistake, &one.remedy, one.otherwise));
@@ -187,14 +231,14 @@ fn healthy(scene: &dyn Scene) {
 #[test]
 fn nothing_is_wrong_with_the_street_at_night() {
     let street = scene::open("street:night", None).expect("is built in");
-    healthy(&Planted::new(street.as_ref(), Fault::Nothing, 300, 40));
+    healthy(&Planted::every(street.as_ref(), Fault::Nothing, 300..340, 1));
 }
 
 #[test]
 #[ignore = "takes a minute; .ci/nightly runs it"]
 fn nothing_is_wrong_with_the_street_in_rain() {
     let street = scene::open("street:rain", None).expect("is built in");
-    healthy(&Planted::new(street.as_ref(), Fault::Nothing, 300, 40));
+    healthy(&Planted::every(street.as_ref(), Fault::Nothing, 300..340, 1));
 }
 
 /// Frames so far apart share few features, and a wrong camera may seem to explain more of them.

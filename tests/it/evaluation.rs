@@ -25,6 +25,7 @@ use crate::damage::open;
 use crate::planted::{Fault, Planted};
 use crate::small_sequence::SmallSequence;
 use crate::walls_scene::{TwoCameras, Walls};
+use crate::written::Written as _;
 
 const FRAMES: [usize; 8] = [0, 1, 2, 3, 4, 5, 6, 7];
 
@@ -152,7 +153,7 @@ fn threads_kills_and_shards_make_no_difference() {
 fn what_doctor_says_of_a_failing_scene_is_a_finding_of_the_run_and_of_its_merged_parts() {
     let root = TempDir::new().expect("a temporary folder");
     let street = Street::new("overcast", Size::Half).expect("is built in");
-    Planted::new(&street, Fault::InversePose, 0, 12).write_to(&root.path().join("inverse"));
+    Planted::every(&street, Fault::InversePose, 0..12, 1).write_to(&root.path().join("inverse"));
     let run = |line: &str| run_in(root.path(), line).ok();
     let eval = "eval inverse --limit 8 --method fb --keep-failures 0 --out";
     run(&format!("{eval} whole"));

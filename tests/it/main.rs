@@ -73,3 +73,4 @@ mod walls_scene;
 mod window;
 mod window_design;
 mod window_manners;
+mod written;

@@ -1,17 +1,14 @@
 //! A scene with one of the usual mistakes in it.
 
-use std::fs;
 use std::ops::Range;
-use std::path::Path;
 
 use nalgebra::{Matrix3, Point3, Quaternion, Rotation3, Translation3, UnitQuaternion, Vector3};
 use posescope::camera::Intrinsics;
 use posescope::cloud::Cloud;
+use posescope::doctor::Mistake;
 use posescope::geometry::Pose;
 use posescope::image::{GrayImage, Photo};
 use posescope::scene::{Scene, SceneError};
-
-use crate::binary::write;
 
 /// What is planted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -25,8 +22,10 @@ pub enum Fault {
     CloudAxes,
     FiveTimesTheDepth,
     UpsideDown,
+    OnTheirSide,
     WrongCamera,
     ResizedPhotos,
+    ThreeQuarterPhotos,
     FootPoses,
     MillimetrePoses,
     MillimetreClouds,
@@ -45,6 +44,37 @@ pub enum Fault {
     UndistortedTwice,
 }
 
+/// What each fault is to be called; half a pixel is less than clouds and photos agree by.
+pub const FAULTS: [(Fault, Option<Mistake>); 27] = [
+    (Fault::Nothing, None),
+    (Fault::InversePose, Some(Mistake::InversePose)),
+    (Fault::InverseRotation, Some(Mistake::InversePose)),
+    (Fault::PoseAxes, Some(Mistake::PoseAxes)),
+    (Fault::OpenGlAxes, Some(Mistake::PoseAxes)),
+    (Fault::CloudAxes, Some(Mistake::CloudAxes)),
+    (Fault::FiveTimesTheDepth, Some(Mistake::Units)),
+    (Fault::UpsideDown, Some(Mistake::TurnedPhotos)),
+    (Fault::OnTheirSide, Some(Mistake::TurnedPhotos)),
+    (Fault::WrongCamera, Some(Mistake::WrongCamera)),
+    (Fault::ResizedPhotos, Some(Mistake::WrongCamera)),
+    (Fault::ThreeQuarterPhotos, Some(Mistake::WrongCamera)),
+    (Fault::FootPoses, Some(Mistake::Units)),
+    (Fault::MillimetrePoses, Some(Mistake::Units)),
+    (Fault::MillimetreClouds, Some(Mistake::Units)),
+    (Fault::CentimetreClouds, Some(Mistake::Units)),
+    (Fault::QuaternionOrder, Some(Mistake::QuaternionOrder)),
+    (Fault::HalfPixel, None),
+    (Fault::CloudOneFrameOff, Some(Mistake::CloudOfNeighbour)),
+    (Fault::DegreesForRadians, Some(Mistake::Degrees)),
+    (Fault::RadiansForDegrees, Some(Mistake::Degrees)),
+    (Fault::LeftForRight, Some(Mistake::OtherStereoCamera)),
+    (Fault::MirroredCloud, Some(Mistake::MirroredCloud)),
+    (Fault::TurnedCloud, Some(Mistake::MovedCloud)),
+    (Fault::LoweredCloud, Some(Mistake::MovedCloud)),
+    (Fault::ReversedPoses, Some(Mistake::ReversedPoses)),
+    (Fault::UndistortedTwice, Some(Mistake::UndistortedTwice)),
+];
+
 /// Some frames of a scene, with a mistake in what it says of them.
 pub struct Planted<'a> {
     scene: &'a dyn Scene,
@@ -55,10 +85,6 @@ pub struct Planted<'a> {
 }
 
 impl<'a> Planted<'a> {
-    pub fn new(scene: &'a dyn Scene, fault: Fault, first: usize, count: usize) -> Self {
-        Self::every(scene, fault, first..first + count, 1)
-    }
-
     /// Every `step`th frame alone.
     pub fn every(scene: &'a dyn Scene, fault: Fault, frames: Range<usize>, step: usize) -> Self {
         let at: Vec<usize> = frames.step_by(step).collect();
@@ -66,54 +92,8 @@ impl<'a> Planted<'a> {
         Self { scene, fault, at, names }
     }
 
-    /// Writes it as a `scene.toml` with a text of points for each frame.
-    pub fn write_to(&self, folder: &Path) {
-        fs::create_dir_all(folder.join("scans")).expect("writable");
-        for (frame, name) in self.names.iter().enumerate() {
-            let points = self.cloud(frame).expect("readable").points;
-            let lines = points.iter().map(|p| format!("{} {} {}\n", p.x, p.y, p.z));
-            write(folder.join(format!("scans/{name}.txt")), lines.collect::<String>());
-        }
-        self.write_described(folder, "", "[clouds]\nfiles = \"scans/*.txt\"\n");
-    }
-
-    /// Writes it as a `scene.toml` with one map for all frames, which is where it is whatever the poses say.
-    pub fn write_with_map(&self, folder: &Path) {
-        /// Every how many points one is written.
-        const STEP: usize = 3;
-        let mut map = String::new();
-        for frame in 0..self.names.len() {
-            let world_from_camera = self.true_pose(frame).expect("has a pose");
-            for point in self.cloud(frame).expect("readable").points.iter().step_by(STEP) {
-                let p = world_from_camera * point.cast::<f64>();
-                map += &format!("{:.4} {:.4} {:.4}\n", p.x, p.y, p.z);
-            }
-        }
-        fs::create_dir_all(folder).expect("writable");
-        write(folder.join("map.txt"), map);
-        self.write_described(folder, "cloud = \"map.txt\"\n", "");
-    }
-
-    fn write_described(&self, folder: &Path, map: &str, clouds: &str) {
-        fs::create_dir_all(folder.join("photos")).expect("writable");
-        let mut poses = "name x y z qx qy qz qw\n".to_owned();
-        for (frame, name) in self.names.iter().enumerate() {
-            let photo = self.photo(frame).expect("readable").gray;
-            photo.save(folder.join(format!("photos/{name}.png"))).expect("writable");
-            let pose = self.pose(frame).expect("has a pose");
-            let (t, q) = (pose.translation.vector, pose.rotation.coords);
-            poses += &format!("{name} {} {} {} {} {} {} {}\n", t.x, t.y, t.z, q.x, q.y, q.z, q.w);
-        }
-        write(folder.join("poses.txt"), poses);
-        let Intrinsics { fx, fy, cx, cy, .. } = self.intrinsics(0);
-        let scene = format!(
-            "images = \"photos/*.png\"\nposes = \"poses.txt\"\n{map}[camera]\nfx = {fx}\nfy = {fy}\ncx = {cx}\n\
-             cy = {cy}\n{clouds}"
-        );
-        write(folder.join("scene.toml"), scene);
-    }
-
-    fn true_pose(&self, frame: usize) -> Option<Pose> {
+    /// The pose without the mistake.
+    pub fn true_pose(&self, frame: usize) -> Option<Pose> {
         self.scene.pose(self.at[frame])
     }
 }
@@ -186,6 +166,19 @@ impl Scene for Planted<'_> {
                 cy: camera.cy * 2.0 + 0.5,
                 ..camera
             },
+            Fault::ThreeQuarterPhotos => {
+                let of_larger = |c: f64| (c + 0.5) / 0.75 - 0.5;
+                Intrinsics {
+                    fx: camera.fx / 0.75,
+                    fy: camera.fy / 0.75,
+                    cx: of_larger(camera.cx),
+                    cy: of_larger(camera.cy),
+                    ..camera
+                }
+            }
+            Fault::OnTheirSide => {
+                Intrinsics { width: camera.height, height: camera.width, ..camera }
+            }
             Fault::HalfPixel => Intrinsics { cx: camera.cx + 0.5, cy: camera.cy + 0.5, ..camera },
             _ => camera,
         }
@@ -228,6 +221,7 @@ impl Scene for Planted<'_> {
         let photo = self.scene.photo(self.at[frame])?;
         Ok(match self.fault {
             Fault::UpsideDown => Photo::from_gray(image::imageops::rotate180(&photo.gray)),
+            Fault::OnTheirSide => Photo::from_gray(image::imageops::rotate270(&photo.gray)),
             Fault::UndistortedTwice => {
                 let camera = self.scene.intrinsics(self.at[frame]);
                 Photo::from_gray(bent(&photo.gray, &camera, -0.25))

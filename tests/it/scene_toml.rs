@@ -497,3 +497,180 @@ fn a_cloud_at_which_the_decoder_panics_is_named_in_one_line() {
     let said = said.fails_in_one_line(3, "layered.laz");
     assert!(!said.err.contains("internal error"), "{}", said.err);
 }
+
+/// The same photos and map, told in other conventions.
+#[test]
+fn axes_units_and_turned_photos_are_read_as_the_description_says() {
+    let folder = TempDir::new().expect("a folder");
+    write(folder.path());
+    let described = |lines: &str, camera: [f64; 2]| {
+        let [cx, cy] = camera;
+        let text = SIMPLE.replace("cx = 79.5\ncy = 31.5", &format!("cx = {cx}\ncy = {cy}"));
+        fs::write(folder.path().join("scene.toml"), lines.to_owned() + &text).expect("writable");
+        posescope::scene::open(arg(folder.path()), None)
+    };
+    let plain = described("", [79.5, 31.5]).expect("as stated");
+    let [cloud, photo] =
+        [plain.cloud(1), plain.cloud(2)].map(|cloud| cloud.expect("in view").points);
+    assert_ne!(cloud, photo);
+    let stated = plain.pose(1).expect("posed");
+    let turned = described("axes = \"x -y -z\"\n", [79.5, 31.5]).expect("the axes of OpenGL");
+    let expected = Pose::from_parts(
+        stated.translation,
+        nalgebra::UnitQuaternion::from_axis_angle(
+            &nalgebra::Vector3::x_axis(),
+            std::f64::consts::PI,
+        ),
+    );
+    assert!(
+        (turned.pose(1).expect("posed").to_homogeneous() - expected.to_homogeneous()).norm() < 1e-9
+    );
+    let named = described("axes = \"opengl\"\n", [79.5, 31.5]).expect("the same");
+    assert_eq!(named.pose(1), turned.pose(1));
+
+    // The same scene in centimetres: with both units stated, each camera sees the same points in metres.
+    let [poses, map] = ["poses.txt", "map.xyz"].map(|name| folder.path().join(name));
+    let metres = [&poses, &map].map(|path| fs::read_to_string(path).expect("written"));
+    let in_cm = |text: &str, columns: &[usize]| -> String {
+        let line = |line: &str| {
+            let words = line.split(' ').enumerate().map(|(at, word)| match word.parse::<f64>() {
+                Ok(number) if columns.contains(&at) => (100.0 * number).to_string(),
+                _ => word.to_owned(),
+            });
+            words.collect::<Vec<_>>().join(" ") + "\n"
+        };
+        text.lines().map(line).collect()
+    };
+    fs::write(&poses, in_cm(&metres[0], &[3, 7, 11])).expect("writable");
+    for (lines, is_map_in_cm) in [
+        ("unit = \"cm\"\n", true),
+        ("unit = 0.01\n", true),
+        ("unit.poses = \"cm\"\n", false),
+        ("unit.poses = 0.01\nunit.clouds = \"cm\"\n", true),
+    ] {
+        let text = if is_map_in_cm { in_cm(&metres[1], &[0, 1, 2]) } else { metres[1].clone() };
+        fs::write(&map, text).expect("writable");
+        let scene = described(lines, [79.5, 31.5]).expect("in metres");
+        let read = scene.cloud(1).expect("in view").points;
+        assert_eq!(read.len(), cloud.len(), "{lines}");
+        let off = read.iter().zip(&cloud).map(|(one, other)| (one - other).norm());
+        assert!(off.fold(0.0, f32::max) < 1e-3, "{lines}");
+        let moved = scene.pose(2).expect("posed").translation.vector
+            - scene.pose(1).expect("posed").translation.vector;
+        assert!((moved.norm() - 1.0).abs() < 1e-6, "{lines}");
+    }
+    fs::write(&poses, &metres[0]).expect("writable");
+    fs::write(&map, &metres[1]).expect("writable");
+
+    // Photos that lie on their side or stand on their head, and those of a mirror.
+    let upright = plain.photo(0).expect("readable").gray;
+    type Turn = fn(&image::GrayImage) -> image::GrayImage;
+    let turns: [(&str, Turn); 4] = [
+        ("90", image::imageops::rotate90),
+        ("180", image::imageops::rotate180),
+        ("270", image::imageops::rotate270),
+        ("\"mirrored\"", image::imageops::flip_horizontal),
+    ];
+    for (value, turn) in turns {
+        let turned = turn(&upright);
+        let centre = if turned.width() == 160 { [79.5, 31.5] } else { [31.5, 79.5] };
+        let scene = described(&format!("orientation = {value}\n"), centre).expect("turned");
+        assert_eq!(scene.photo(0).expect("readable").gray, turned, "{value}");
+        assert_eq!(scene.intrinsics(0).width, turned.width(), "{value}");
+    }
+
+    for (lines, words) in [
+        ("axes = \"x y -z\"\n", "scene.toml:1: \"opengl\", \"vehicle\""),
+        ("unit = \"inch\"\n", "`inch` found"),
+        ("unit = -1\n", "-1 found"),
+        ("unit = true\n", "a unit of length"),
+        ("orientation = 45\n", "`45` found"),
+        ("depth_per_metre = 1000\n", "scene.toml:1: "),
+    ] {
+        let why = described(lines, [79.5, 31.5]).err().unwrap_or_else(|| panic!("{lines} refused"));
+        has(&why.to_string(), words);
+    }
+}
+
+#[test]
+fn depth_images_are_clouds_where_the_value_of_a_metre_is_stated() {
+    let folder = TempDir::new().expect("a folder");
+    write(folder.path());
+    fs::create_dir_all(folder.path().join("depth")).expect("writable");
+    for frame in 0..3 {
+        let depth = image::ImageBuffer::from_pixel(160, 64, image::Luma([4000_u16]));
+        depth.save(folder.path().join(format!("depth/img{frame}.png"))).expect("writable");
+    }
+    let described = |lines: &str, more: &str| {
+        let text = SIMPLE.replace("cloud = \"map.xyz\"\n", lines);
+        let text = format!("{text}{more}\n[clouds]\nfiles = \"depth/*.png\"\n");
+        fs::write(folder.path().join("scene.toml"), text).expect("writable");
+        posescope::scene::open(arg(folder.path()), None)
+    };
+    for (lines, depth_m) in [("depth_per_metre = 1000\n", 4.0), ("depth_per_metre = 5000.0\n", 0.8)]
+    {
+        let cloud = described(lines, "").expect("readable").cloud(1).expect("a depth image");
+        assert!(cloud.points.iter().all(|point| (point.z - depth_m).abs() < 1e-6));
+        let right = cloud.points.iter().map(|point| point.x).fold(0.0, f32::max);
+        assert!((right - depth_m * 0.79).abs() < 0.02 * depth_m, "{right}");
+    }
+    for (lines, more, words) in [
+        ("", "", "`depth_per_metre = 1000`"),
+        ("depth_per_metre = 0\n", "", "scene.toml:3: the value of a metre"),
+        ("depth_per_metre = 1000\n", "k1 = 0.1\n", "pixel by pixel"),
+        ("depth_per_metre = 1000\norientation = 180\n", "", "pixel by pixel"),
+    ] {
+        let why = described(lines, more).err().unwrap_or_else(|| panic!("{lines}{more} refused"));
+        has(&why.to_string(), words);
+    }
+}
+
+/// A better place of the scanner, or of the cameras in a map, as a description.
+#[test]
+fn a_description_is_recalibrated_in_its_own_form() {
+    let turn = nalgebra::UnitQuaternion::from_euler_angles(0.01, -0.02, 0.005);
+    let change = Pose::from_parts(nalgebra::Translation3::new(0.1, -0.05, 0.2), turn);
+    let folder = TempDir::new().expect("a folder");
+    write(folder.path());
+    fs::create_dir_all(folder.path().join("scans")).expect("writable");
+    for frame in 0..3 {
+        let scan = folder.path().join(format!("scans/img{frame}.xyz"));
+        fs::write(scan, "1 2 10\n-3 0.5 20\n0 0 5\n").expect("writable");
+    }
+    let scans = SIMPLE.replace("cloud = \"map.xyz\"\n", "") + "[clouds]\nfiles = \"scans/*.xyz\"\n";
+    let stated = "camera_from_cloud = [0,-1,0,0, 0,0,-1,-0.5, 1,0,0,0]\n";
+    let body = "camera_from_body = [0,-1,0,0.1, 0,0,-1,0, 1,0,0,0]\n";
+    for (text, of_clouds) in [
+        (scans.clone(), true),
+        (scans + stated, true),
+        (SIMPLE.to_owned(), false),
+        (body.to_owned() + SIMPLE, false),
+    ] {
+        fs::write(folder.path().join("scene.toml"), &text).expect("writable");
+        let argument = arg(folder.path());
+        let before = open(folder.path());
+        let better =
+            posescope::scene::recalibrated(argument, None, &change).expect("in its own form");
+        assert_eq!(better.path, folder.path().join("scene.toml"));
+        fs::write(&better.path, better.text).expect("writable");
+        let after = open(folder.path());
+        if of_clouds {
+            let [one, other] =
+                [&before, &after].map(|scene| scene.cloud(1).expect("a scan").points);
+            for (one, other) in one.iter().zip(&other) {
+                assert!((change * one.cast::<f64>() - other.cast::<f64>()).norm() < 1e-5);
+            }
+        } else {
+            // The map stays, so the camera moves.
+            let [one, other] = [&before, &after].map(|scene| scene.pose(1).expect("posed"));
+            let off = (one * change.inverse()).to_homogeneous() - other.to_homogeneous();
+            assert!(off.norm() < 1e-6, "{off}");
+        }
+    }
+    fs::write(folder.path().join("scene.toml"), "axes = \"opengl\"\n".to_owned() + SIMPLE)
+        .expect("writable");
+    let why = posescope::scene::recalibrated(arg(folder.path()), None, &change).err();
+    has(&why.expect("two places for a turn").to_string(), "scene.toml:1: `camera_from_body`");
+    let why = posescope::scene::recalibrated("street", None, &change).err();
+    has(&why.expect("it has no file").to_string(), "KITTI");
+}

@@ -37,7 +37,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 pub use assessment::{Assessment, Grade};
-pub use axes::other_axes;
+pub use axes::{OPENGL_AXES, VEHICLE_AXES, other_axes};
 pub use case::{Case, FusionCase, Member, RankingCase};
 pub use confidence::{Confidence, PoseConfidence};
 pub use evidence::Evidence;

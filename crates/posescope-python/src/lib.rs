@@ -36,6 +36,7 @@ fn extension(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(command::main, module)?)?;
     module.add_function(wrap_pyfunction!(evaluate::evaluate, module)?)?;
     module.add_function(wrap_pyfunction!(command::doctor, module)?)?;
+    module.add_function(wrap_pyfunction!(command::calibration, module)?)?;
     module.add_function(wrap_pyfunction!(command::write_report, module)?)?;
     module.add_function(wrap_pyfunction!(detached::panic, module)?)?;
     module.add_function(wrap_pyfunction!(live::check_photo, module)?)?;

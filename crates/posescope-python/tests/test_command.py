@@ -113,11 +113,25 @@ def test_damaged_lines_are_named(tmp_path: Path) -> None:
 def test_the_doctor_says_what_the_command_prints(tmp_path: Path) -> None:
     found = posescope.doctor("street")
     assert not found.is_broken and found.mistake is None
+    assert (found.answer, found.write) == ("fits", None)
+    assert found.agreement is not None and found.agreement[0] is not None and found.agreement[0] > 0.5
     assert found.picture is not None and found.picture.ndim == 3
     ran = command("doctor", "street")
     assert ran.stdout.split() == found.text.split()
     with pytest.raises(posescope.InputError):
         posescope.doctor(tmp_path / "nowhere")
+
+
+def test_a_calibration_is_data(tmp_path: Path) -> None:
+    command("synth", str(tmp_path), "--size", "half", "--every", "40", "--condition", "overcast", "-q")
+    found = posescope.calibration(tmp_path / "sequences" / "overcast")
+    assert found.answer == "consistent" and found.delay_s is None
+    assert found.turn_deg is not None and found.shift_m is not None
+    for value, half in found.turn_deg + found.shift_m:
+        assert abs(value) < 3 * half < 1
+    assert found.camera_from_stated is not None and found.camera_from_stated.shape == (4, 4)
+    assert found.picture is not None and found.picture.shape[2] == 3
+    assert "consistent" in found.text
 
 
 def test_each_error_has_its_class_file_and_place(tmp_path: Path) -> None:

@@ -35,6 +35,7 @@ const FRAME_INTERVAL_S: f64 = 0.1;
 /// from the cache: a second look at a frame does not even build the town.
 pub struct Street {
     name: String,
+    world_seed: u64,
     condition: Condition,
     size: Size,
     /// What every key of this traversal begins with.
@@ -60,10 +61,23 @@ impl Street {
     /// # Errors
     /// When there is no such condition.
     pub fn new(condition: &str, size: Size) -> Result<Self, SceneError> {
-        Self::with_cache(condition, size, Arc::clone(&frame_cache::SHARED))
+        Self::of_town(WORLD_SEED, condition, size)
     }
 
-    fn with_cache(wanted: &str, size: Size, cache: Arc<FrameCache>) -> Result<Self, SceneError> {
+    /// The same through another town.
+    ///
+    /// # Errors
+    /// When there is no such condition.
+    pub fn of_town(world_seed: u64, condition: &str, size: Size) -> Result<Self, SceneError> {
+        Self::with_cache(world_seed, condition, size, Arc::clone(&frame_cache::SHARED))
+    }
+
+    fn with_cache(
+        world_seed: u64,
+        wanted: &str,
+        size: Size,
+        cache: Arc<FrameCache>,
+    ) -> Result<Self, SceneError> {
         let known = Condition::ALL.into_iter().find(|known| known.name() == wanted);
         let condition = known.ok_or_else(|| SceneError::UnknownCondition {
             argument: format!("{NAME}:{wanted}"),
@@ -71,9 +85,10 @@ impl Street {
         })?;
         Ok(Self {
             name: format!("{NAME}:{wanted}"),
+            world_seed,
             condition,
             size,
-            key: frame_cache::key(&format!("{WORLD_SEED}-{wanted}-{}", size.name())),
+            key: frame_cache::key(&format!("{world_seed}-{wanted}-{}", size.name())),
             cache,
             traversal: OnceLock::new(),
             poses: OnceLock::new(),
@@ -93,7 +108,7 @@ impl Street {
 
     /// What makes the frames, past the cache.
     pub fn traversal(&self) -> &Traversal {
-        self.traversal.get_or_init(|| Traversal::new(WORLD_SEED, self.condition, self.size))
+        self.traversal.get_or_init(|| Traversal::new(self.world_seed, self.condition, self.size))
     }
 
     fn poses(&self) -> &[Pose] {
@@ -196,7 +211,8 @@ mod tests {
     fn cached_in(folder: Option<&Path>) -> Street {
         let disk = folder.map(|folder| DiskCache::new(folder.to_owned(), 100 << 20));
         let cache = Arc::new(FrameCache::new(disk));
-        Street::with_cache("overcast", Size::Half, cache).unwrap_or_else(|e| panic!("{e}"))
+        Street::with_cache(WORLD_SEED, "overcast", Size::Half, cache)
+            .unwrap_or_else(|e| panic!("{e}"))
     }
 
     fn bytes(street: &Street, frame: usize) -> (Photo, Cloud) {

@@ -63,10 +63,16 @@ pub struct DoctorArgs {
     /// Say instead how far the calibration between camera and scanner is off
     ///
     /// Puts the depth edges of up to 25 clouds on the edges of their photos, and prints turn, shift, focal length and
-    /// delay with 90 % intervals. --picture shows the depth edges on a photo, as stated above and as found below. The
-    /// exit code is 3 if the calibration is off.
+    /// delay with 90 % intervals. --picture shows the depth edges on a photo, as stated above and as found below, and a
+    /// curve of the measure for each of the six values. The exit code is 3 if the calibration is off.
     #[arg(long, conflicts_with = "save")]
     pub calibration: bool,
+    /// With --calibration: write the better calibration file
+    ///
+    /// It is the scene's own file with another place of the scanner: calib.txt of KITTI, calib_velo_to_cam.txt of KITTI
+    /// raw, or scene.toml. The scene itself is not changed. Nothing is written if the calibration is consistent.
+    #[arg(long, value_name = "FILE", requires = "calibration")]
+    pub out: Option<PathBuf>,
 }
 
 #[derive(Debug, Args)]

@@ -1,8 +1,10 @@
 //! `posescope doctor --calibration`: how far camera and scanner are from where the scene says.
 
-use posescope::doctor::{Calibration, Estimate, calibration};
+use std::path::Path;
+
+use posescope::doctor::{CALIBRATION_STEPS, Calibration, Estimate, NotJudged, calibration};
 use posescope::geometry::matrix_from_pose;
-use posescope::scene::Scene;
+use posescope::scene::{Scene, recalibrated};
 use posescope::table::{Table, wrapped};
 
 use crate::cli::args::DoctorArgs;
@@ -16,28 +18,64 @@ pub fn judge(
     scene: &dyn Scene,
     terminal: &Terminal,
 ) -> Result<Option<String>, CliError> {
-    let name = scene.name();
-    let found = match calibration(scene) {
-        Ok(found) => found,
-        Err(why) => {
-            if !terminal.is_quiet {
-                let text = format!("{name}: the calibration cannot be judged: {why}");
-                output::print(
-                    &wrapped(&text, terminal.width().unwrap_or(usize::MAX), "  ").trim_end(),
-                )?;
-            }
-            return Ok(None);
-        }
-    };
+    let bar = terminal.bar(CALIBRATION_STEPS.len() as u64);
+    let found = calibration(scene, &|step| {
+        bar.set_position(step as u64);
+        bar.set_message(CALIBRATION_STEPS[step]);
+    });
+    bar.finish_and_clear();
+    if !terminal.is_quiet {
+        output::print(&in_words(scene, &found, terminal.width()).trim_end())?;
+    }
+    let Ok(found) = found else { return Ok(None) };
     if let Some(path) = &args.picture {
         let written = found.picture.save_with_format(path, image::ImageFormat::Png);
         written.map_err(CliError::image(path))?;
     }
-    let answer = answer(&found);
-    if !terminal.is_quiet {
-        output::print(&report(name, &found, &answer, terminal.width()).trim_end())?;
+    if let Some(path) = &args.out {
+        write_better(args, &found, path, terminal)?;
     }
-    Ok(found.is_off().then(|| format!("{name}: {answer}")))
+    Ok(found.is_off().then(|| format!("{}: {}", scene.name(), answer(&found))))
+}
+
+/// What a calibration came to, in lines of at most this many characters.
+pub fn in_words(
+    scene: &dyn Scene,
+    found: &Result<Calibration, NotJudged>,
+    width: Option<usize>,
+) -> String {
+    let name = scene.name();
+    match found {
+        Ok(found) => {
+            let first = (0..scene.frames().len()).find_map(|at| Some((at, scene.pose(at)?)));
+            let has_map = first.is_some_and(|(at, pose)| scene.cloud_at(at, &pose).is_some());
+            report(name, found, &answer(found), has_map, width)
+        }
+        Err(why) => {
+            let text = format!("{name}: the calibration cannot be judged: {why}");
+            wrapped(&text, width.unwrap_or(usize::MAX), "  ")
+        }
+    }
+}
+
+/// Writes the scene's calibration file as it should be.
+fn write_better(
+    args: &DoctorArgs,
+    found: &Calibration,
+    path: &Path,
+    terminal: &Terminal,
+) -> Result<(), CliError> {
+    if !found.is_off() {
+        terminal.say(|| {
+            "--out: nothing is written, since the stated calibration is consistent".to_owned()
+        });
+        return Ok(());
+    }
+    let change = found.camera_from_stated();
+    let better = recalibrated(&args.scenes[0], args.format.as_deref(), &change)?;
+    std::fs::write(path, better.text).map_err(CliError::io(path))?;
+    terminal.say(|| format!("{}: in place of {}", path.display(), better.path.display()));
+    Ok(())
 }
 
 const DELAY: &str = "delay of the photos, alone";
@@ -82,6 +120,11 @@ fn answer(found: &Calibration) -> String {
         })
         .collect();
     let delay = others.get(1).filter(|row| row.4.is_off()).map(words);
+    if found.is_disputed {
+        return "undecided: depth edges alone would lie better elsewhere, but with these values the photos' features and \
+                the grey values of points fit worse than as stated; several values may explain the edges alike"
+            .to_owned();
+    }
     match (off.is_empty(), delay) {
         (true, None) => {
             let most =
@@ -104,7 +147,13 @@ fn answer(found: &Calibration) -> String {
     }
 }
 
-fn report(name: &str, found: &Calibration, answer: &str, width: Option<usize>) -> String {
+fn report(
+    name: &str,
+    found: &Calibration,
+    answer: &str,
+    has_map: bool,
+    width: Option<usize>,
+) -> String {
     let mut table = Table::new(
         "",
         "",
@@ -129,8 +178,14 @@ fn report(name: &str, found: &Calibration, answer: &str, width: Option<usize>) -
     let correction = if found.is_off() {
         let rows = matrix_from_pose(&found.camera_from_stated()).transpose();
         let numbers: Vec<String> = rows.iter().map(|number| format!("{number:.6}")).collect();
+        let what = if has_map {
+            "To move the cameras against the map, multiply the stated camera_from_body of scene.toml (the identity, where \
+             there is none)"
+        } else {
+            "Multiply the stated camera_from_cloud"
+        };
         lines(&format!(
-            "Multiply the stated camera_from_cloud from the left by this [R|t], row by row: {}",
+            "{what} from the left by this [R|t], row by row: {}. --out FILE writes the scene's own file with it.",
             numbers.join(" ")
         ))
     } else {

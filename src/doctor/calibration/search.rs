@@ -1,6 +1,6 @@
 //! The turn, the shift and more that put depth edges on image edges.
 
-use nalgebra::{Point2, Point3, SMatrix, SVector, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Point3, SMatrix, SVector, Translation3, UnitQuaternion, Vector3};
 use rayon::prelude::*;
 
 use super::depth_edges::{DepthEdge, depth_edges};
@@ -21,6 +21,7 @@ pub(super) const DELAY: usize = 7;
 /// A view with its cloud and its depth edges, and how its camera moves.
 pub(super) struct Frame {
     /// Its place in the scene.
+    #[cfg(feature = "rerun")]
     pub(super) at: usize,
     pub(super) view: View,
     /// In the camera's frame as stated \[m\].
@@ -67,7 +68,11 @@ impl Frame {
     }
 
     /// Where the photo shows the depth edges, with their depths \[m\].
-    pub(super) fn seen(&self, values: &Values) -> impl Iterator<Item = (Point2<f64>, f64)> {
+    #[cfg(feature = "rerun")]
+    pub(super) fn seen(
+        &self,
+        values: &Values,
+    ) -> impl Iterator<Item = (nalgebra::Point2<f64>, f64)> {
         let (change, camera) = (self.change(values), self.camera(values));
         self.edges.iter().filter_map(move |edge| {
             let point = change * edge.point;

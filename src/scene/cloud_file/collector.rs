@@ -37,6 +37,17 @@ pub(in crate::scene) enum Note {
     Coarse { size: f64, step: f64 },
 }
 
+impl Note {
+    /// The note on a file in a unit of this length \[m\], if it holds in metres.
+    pub fn in_metres(self, unit_m: f64) -> Option<Self> {
+        match self {
+            Self::Coarse { size, step } => (step * unit_m >= FINE)
+                .then_some(Self::Coarse { size: size * unit_m, step: step * unit_m }),
+            other => Some(other),
+        }
+    }
+}
+
 impl fmt::Display for Note {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {

@@ -5,8 +5,9 @@ use std::path::Path;
 use nalgebra::Matrix3x4;
 
 use super::super::SceneError;
-use super::super::kitti_format::{labelled, split_projection};
-use super::super::lines::TextFile;
+use super::super::kitti_format::{in_camera0, labelled, split_projection, with_labelled};
+use super::super::lines::{self, TextFile};
+use super::super::recalibrated::Recalibrated;
 use crate::camera::Intrinsics;
 use crate::geometry::{Pose, pose_from_matrix};
 
@@ -47,6 +48,24 @@ impl Calibration {
     pub fn camera0_from_imu(&self) -> Pose {
         self.camera0_from_velodyne * self.velodyne_from_imu
     }
+}
+
+/// `calib_velo_to_cam.txt` of a day, with the clouds moved in the frame of a camera.
+pub(super) fn recalibrated(
+    day: &Path,
+    camera: &str,
+    change: &Pose,
+) -> Result<Recalibrated, SceneError> {
+    let stated = Calibration::read(day, camera)?;
+    let rectified_from_camera0 = pose(&TextFile::read(&day.join(CAMERAS))?, "R_rect_00", None)?;
+    let better = in_camera0(change, &stated.camera_from_camera0) * stated.camera0_from_velodyne;
+    let better = rectified_from_camera0.inverse() * better;
+    let path = day.join(VELODYNE);
+    let text = lines::read_text(&path)?;
+    let rotation = better.rotation.to_rotation_matrix().transpose();
+    let text = with_labelled(&text, "R", rotation.matrix().as_slice());
+    let text = with_labelled(&text, "T", better.translation.vector.as_slice());
+    Ok(Recalibrated { path, text })
 }
 
 /// The transform of a rotation and an optional translation.

@@ -2,6 +2,11 @@
 
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion};
 
+/// The camera axes of OpenGL, and those of a vehicle (forward, left, up), as [`other_axes`] writes them.
+pub const OPENGL_AXES: &str = "(x, -y, -z)";
+/// See [`OPENGL_AXES`].
+pub const VEHICLE_AXES: &str = "(z, -x, -y)";
+
 /// All other right-handed orders and signs of three axes. A name says what the axes of the other system are in those
 /// of a camera here, or those of the world here in its own: the camera axes of OpenGL are `(x, -y, -z)`.
 pub fn other_axes() -> Vec<(String, UnitQuaternion<f64>)> {

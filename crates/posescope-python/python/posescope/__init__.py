@@ -16,7 +16,7 @@ import sys
 from typing import List, Optional
 
 from . import _posescope
-from ._commands import Examination, doctor, evaluate
+from ._commands import Calibration, Examination, calibration, doctor, evaluate
 from ._errors import GateError, InputError, InternalError
 from ._localize import diagnose, localize
 from ._posescope import Camera, Query, Reference, Scene, __version__, methods
@@ -25,6 +25,7 @@ from ._result import Confidence, Failure, PoseError, Result, Verdict
 from ._run import Run
 
 __all__ = [
+    "Calibration",
     "Camera",
     "Confidence",
     "Examination",
@@ -41,6 +42,7 @@ __all__ = [
     "Scene",
     "Verdict",
     "__version__",
+    "calibration",
     "diagnose",
     "doctor",
     "evaluate",

@@ -97,12 +97,19 @@ class Examination:
 
     is_broken: bool
     """Whether the scene is unusable or contains a mistake."""
+    answer: str
+    """``fits``, ``does not fit`` or ``cannot be judged``."""
+    agreement: Optional[Tuple[Optional[float], Optional[float], Optional[float]]]
+    """The share of shared features that the poses explain, the correlation of grey values, and the log ratio of
+    image edges at depth edges; ``None`` where nothing can be compared."""
     remarks: List[Tuple[str, str]]
     """Implausible things: ``broken`` or ``odd``, and what it is."""
     mistake: Optional[str]
     """The mistake that explains why photos, poses and clouds do not fit."""
     remedy: Optional[str]
     """What mends it."""
+    write: Optional[Tuple[str, str]]
+    """The lines that mend a ``scene.toml`` or a file beside it, and where they belong."""
     text: str
     """What ``posescope doctor`` prints."""
     picture: Optional[NDArray[np.uint8]]
@@ -126,3 +133,54 @@ def doctor(scene: "Scene | str | os.PathLike[str]") -> Examination:
     found = _posescope.doctor(opened)
     mistake, remedy = found.pop("mistake") or (None, None)
     return Examination(mistake=mistake, remedy=remedy, **found)
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """How far camera and scanner are from where a scene says.
+
+    Values are pairs: what was found, and half of the interval that holds the true value with 90 %. They are ``None``
+    where the calibration cannot be judged.
+    """
+
+    answer: str
+    """``consistent``, ``off``, ``undecided`` or ``cannot be judged``."""
+    text: str
+    """What ``posescope doctor --calibration`` prints."""
+    turn_deg: Optional[Tuple[Tuple[float, float], ...]] = None
+    """How the clouds must be turned about x, y and z of the camera's frame."""
+    shift_m: Optional[Tuple[Tuple[float, float], ...]] = None
+    """How they must be shifted along x, y and z after that."""
+    focal_length_percent: Optional[Tuple[float, float]] = None
+    """By how much the focal length must be larger."""
+    delay_s: Optional[Tuple[float, float]] = None
+    """How much later the photos were taken than the clouds, if nothing else is off; ``None`` where the camera stands."""
+    frames: int = 0
+    """The frames that were compared."""
+    edges: int = 0
+    """Their depth edges."""
+    camera_from_stated: Optional[NDArray[np.float64]] = None
+    """4 x 4: multiplied from the left to the stated ``camera_from_cloud``, it gives the one that fits."""
+    picture: Optional[NDArray[np.uint8]] = None
+    """Depth edges on a photo as stated and as found, with a curve for each value: H x W x 3."""
+
+    def __str__(self) -> str:
+        return self.text
+
+
+def calibration(scene: "Scene | str | os.PathLike[str]") -> Calibration:
+    """Measures how far camera and scanner are from where a scene says, as ``posescope doctor --calibration`` does.
+
+    Args:
+        scene: The scene, or its path.
+
+    Raises:
+        InputError: The scene cannot be read.
+        InternalError: A bug of posescope.
+    """
+    opened = scene if isinstance(scene, Scene) else Scene.open(scene)
+    found = _posescope.calibration(opened)
+    for key in ("turn_deg", "shift_m"):
+        if key in found:
+            found[key] = tuple(found[key])
+    return Calibration(**found)
