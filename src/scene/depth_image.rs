@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use image::DynamicImage;
-use nalgebra::Point2;
+use nalgebra::{Point2, Point3};
 
 use super::file_scene::{Clouds, Frame};
 use super::lines::TextFile;
@@ -49,27 +49,35 @@ impl Clouds for DepthImages {
 /// The points of a depth image \[m\], from its camera, where that is, and the depth of a value of 1 \[m\].
 pub(super) fn cloud_of(
     path: &Path,
-    depth_camera: &Intrinsics,
+    camera: &Intrinsics,
     camera_from_depth: &Pose,
     unit_m: f64,
 ) -> Result<Cloud, SceneError> {
-    let depth = read_depth(path)?;
-    let size = (depth_camera.width, depth_camera.height);
-    photo_file::expect_size(path, depth.dimensions(), size)?;
-    let step = step(size);
+    photo_file::expect_size(path, photo_file::dimensions(path)?, (camera.width, camera.height))?;
+    points(path, unit_m, |pixel, depth| Some(camera_from_depth * camera.unproject(&pixel, depth)))
+}
+
+/// The points of an image: for a pixel and its depth \[m\], where they are in the camera's frame, if it sees them.
+pub(super) fn points(
+    path: &Path,
+    unit_m: f64,
+    place: impl Fn(Point2<f64>, f64) -> Option<Point3<f64>>,
+) -> Result<Cloud, SceneError> {
+    let image = read_depth(path)?;
+    let (width, height) = image.dimensions();
+    let step = step((width, height));
     let offset = step / 2;
-    let columns = (offset..depth_camera.width).step_by(step as usize);
-    let rows = (offset..depth_camera.height).step_by(step as usize);
+    let columns = (offset..width).step_by(step as usize);
+    let rows = (offset..height).step_by(step as usize);
     let points = rows
         .flat_map(|y| columns.clone().map(move |x| (x, y)))
         .filter_map(|(x, y)| {
-            let value = depth.get_pixel(x, y).0[0];
+            let value = image.get_pixel(x, y).0[0];
             if matches!(value, 0 | u16::MAX) {
                 return None;
             }
             let pixel = Point2::new(f64::from(x), f64::from(y));
-            let point = depth_camera.unproject(&pixel, f64::from(value) * unit_m);
-            Some((camera_from_depth * point).cast())
+            Some(place(pixel, f64::from(value) * unit_m)?.cast())
         })
         .collect();
     Ok(Cloud { points })

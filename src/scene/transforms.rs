@@ -7,11 +7,9 @@
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
-use nalgebra::{Matrix3x4, Point3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Matrix3x4, Point2, Point3, Translation3, UnitQuaternion, Vector3};
 use serde::Deserialize;
 
-use super::cloud_file;
-use super::depth_image::DepthImages;
 use super::file_scene::{Clouds, Develop, FileScene, Frame};
 use super::folder::{folder_name, within};
 use super::frame_names::names_of;
@@ -19,6 +17,7 @@ use super::lens::{Distortion, developed_camera, pinhole};
 use super::map_blocks::MapBlocks;
 use super::model_view::in_view_of_any_scale;
 use super::{Lengths, Scene, SceneError, SceneFormat, lines, photo_file};
+use super::{cloud_file, depth_image};
 use crate::camera::Intrinsics;
 use crate::cloud::Cloud;
 use crate::geometry::{Pose, pose_from_matrix};
@@ -86,6 +85,8 @@ struct CameraEntry {
     k2: Option<f64>,
     k3: Option<f64>,
     k4: Option<f64>,
+    k5: Option<f64>,
+    k6: Option<f64>,
     p1: Option<f64>,
     p2: Option<f64>,
 }
@@ -94,7 +95,7 @@ impl CameraEntry {
     /// What is stated for a frame, or else for all.
     fn or(self, all: &Self) -> Self {
         let Self { camera_model, is_fisheye, fl_x, fl_y, cx, cy, w, h, .. } = self;
-        let Self { camera_angle_x, camera_angle_y, k1, k2, k3, k4, p1, p2, .. } = self;
+        let Self { camera_angle_x, camera_angle_y, k1, k2, k3, k4, k5, k6, p1, p2, .. } = self;
         // A focal length of its own is not that of an angle for all.
         let has_focal = fl_x.is_some() || camera_angle_x.is_some();
         let of_all = |own: Option<f64>, all: Option<f64>| if has_focal { own } else { own.or(all) };
@@ -113,6 +114,8 @@ impl CameraEntry {
             k2: k2.or(all.k2),
             k3: k3.or(all.k3),
             k4: k4.or(all.k4),
+            k5: k5.or(all.k5),
+            k6: k6.or(all.k6),
             p1: p1.or(all.p1),
             p2: p2.or(all.p2),
         }
@@ -140,11 +143,13 @@ impl CameraEntry {
     fn distortion(&self) -> Result<Distortion, String> {
         let [k1, k2, k3, k4] = [self.k1, self.k2, self.k3, self.k4].map(|k| k.unwrap_or(0.0));
         let p = [self.p1, self.p2].map(|p| p.unwrap_or(0.0));
+        let unknown = [("k5", self.k5), ("k6", self.k6)];
+        let unknown = unknown.into_iter().find(|(_, k)| k.is_some_and(|k| k != 0.0));
         let model = self.camera_model.as_deref().unwrap_or("OPENCV");
         let is_fisheye = self.is_fisheye.unwrap_or(false) || model == "OPENCV_FISHEYE";
         if is_fisheye {
             return match p {
-                [0.0, 0.0] => Ok(Distortion::fisheye([k1, k2, k3, k4])),
+                [0.0, 0.0] if unknown.is_none() => Ok(Distortion::fisheye([k1, k2, k3, k4])),
                 _ => Err("a fisheye camera with the coefficients k1 k2 k3 k4 expected".to_owned()),
             };
         }
@@ -156,8 +161,10 @@ impl CameraEntry {
                 "camera_model OPENCV, PINHOLE or OPENCV_FISHEYE expected, `{model}` found"
             ));
         }
-        if k4 != 0.0 {
-            return Err(format!("a camera with k1 k2 k3 p1 p2 expected, k4 = {k4} found"));
+        // In OpenCV k4 is the first coefficient of a divisor, in nerfstudio that of the eighth power.
+        let fourth = self.k4.filter(|k4| *k4 != 0.0).map(|k4| ("k4", k4));
+        if let Some((name, k)) = fourth.or(unknown.and_then(|(name, k)| Some((name, k?)))) {
+            return Err(format!("a camera with k1 k2 k3 p1 p2 expected, {name} = {k} found"));
         }
         Ok(Distortion::brown([k1, k2, k3, 0.0, 0.0, 0.0], p))
     }
@@ -213,7 +220,7 @@ fn open(path: &Path) -> Result<Box<dyn Scene>, SceneError> {
             developed_camera(taken, distortion).map_err(|why| error(&name, why))?;
         let depth = entry.depth_file_path.map(|depth| within(folder, &depth)).transpose();
         let depth = depth.map_err(|why| error(&name, why))?;
-        depths.push(depth.filter(|depth| develop.is_none() && depth.is_file()));
+        depths.push(depth.filter(|depth| depth.is_file()));
         frames.push(Frame {
             world_from_camera: Some(
                 pose(&entry.transform_matrix).map_err(|why| error(&name, why))?,
@@ -295,9 +302,8 @@ impl Clouds for TransformsClouds {
 
     fn missing(&self) -> Option<&str> {
         let is_any = self.map.is_some() || self.depths.iter().any(Option::is_some);
-        (!is_any).then_some(
-            "neither ply_file_path nor sparse_pc.ply nor a depth_file_path of a photo without distortion is there",
-        )
+        (!is_any)
+            .then_some("neither ply_file_path nor sparse_pc.ply nor a depth_file_path is there")
     }
 
     fn is_in_world(&self, index: usize) -> bool {
@@ -312,16 +318,19 @@ impl Clouds for TransformsClouds {
 
     fn read(&self, index: usize, frame: &Frame) -> Result<Cloud, SceneError> {
         if let Some(depth) = &self.depths[index] {
-            // Depth images of phones are smaller than their photos.
+            // Depth images of phones are smaller than their photos; their borders are those of the photos.
             let size = photo_file::dimensions(depth)?;
-            let camera = resized(&frame.intrinsics, size);
-            let images = DepthImages {
-                images: vec![Some(depth.clone())],
-                listed_in: self.listed_in.clone(),
-                beside: Some((camera, Pose::identity())),
-                unit_m: self.unit_m,
-            };
-            return images.read(0, frame);
+            let camera = &frame.intrinsics;
+            let scale = |photo: u32, image: u32| f64::from(photo) / f64::from(image);
+            let (across, down) = (scale(camera.width, size.0), scale(camera.height, size.1));
+            // They show what the lens does, and the photos are undistorted.
+            let map = frame.develop.as_ref().and_then(|develop| develop.pixel_map());
+            return depth_image::points(depth, self.unit_m, |pixel, depth| {
+                let in_file =
+                    Point2::new(across * (pixel.x + 0.5) - 0.5, down * (pixel.y + 0.5) - 0.5);
+                let pixel = map.as_ref().map_or(Some(in_file), |map| map.to_photo(in_file))?;
+                Some(camera.unproject(&pixel, depth))
+            });
         }
         let (Some(map), Some(world_from_camera)) = (&self.map, &frame.world_from_camera) else {
             return Ok(Cloud::default());
@@ -336,19 +345,5 @@ impl Clouds for TransformsClouds {
         let points: Vec<Point3<f64>> =
             blocks.around_view(world_from_camera, &frame.intrinsics).collect();
         Ok(in_view_of_any_scale(points, &frame.intrinsics))
-    }
-}
-
-/// The camera of an image of another size. Its borders are those of the photo.
-fn resized(camera: &Intrinsics, (width, height): (u32, u32)) -> Intrinsics {
-    let x = f64::from(width) / f64::from(camera.width);
-    let y = f64::from(height) / f64::from(camera.height);
-    Intrinsics {
-        fx: x * camera.fx,
-        fy: y * camera.fy,
-        cx: x * (camera.cx + 0.5) - 0.5,
-        cy: y * (camera.cy + 0.5) - 0.5,
-        width,
-        height,
     }
 }

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 
 use image::{ImageBuffer, Luma};
-use nalgebra::{Point3, Vector3};
+use nalgebra::{Point2, Point3, Vector3};
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
@@ -106,6 +106,36 @@ fn a_depth_image_smaller_than_its_photo_is_the_cloud_in_metres() {
 }
 
 #[test]
+fn a_depth_image_shows_what_the_lens_does() {
+    for (model, k1) in [("OPENCV", -0.2), ("OPENCV_FISHEYE", 0.05)] {
+        let folder = TempDir::new().expect("a folder");
+        write(folder.path());
+        // The depth of each pixel is its column and row.
+        let depth = ImageBuffer::from_fn(WIDTH, HEIGHT, |x, y| Luma([(1000 + 100 * x + y) as u16]));
+        depth.save(folder.path().join("depth.png")).expect("writable");
+        let mut content = content();
+        content["camera_model"] = json!(model);
+        content["k1"] = json!(k1);
+        content["frames"][1]["depth_file_path"] = json!("depth.png");
+        save(folder.path(), &content);
+        let scene = open(folder.path());
+        let (camera, map) = (scene.intrinsics(0), scene.pixel_map(0).expect("a lens"));
+        let cloud = scene.cloud(0).expect("a depth image");
+        assert!(cloud.points.len() as u32 > WIDTH * HEIGHT / 2, "{}", cloud.points.len());
+        let mut farthest: f64 = 0.0;
+        for point in &cloud.points {
+            let pixel = camera.project(&point.cast()).expect("in front of the camera");
+            let in_file = map.to_file(pixel);
+            let depth = (1000.0 * point.z).round() as u32 - 1000;
+            let expected = Point2::new(f64::from(depth / 100), f64::from(depth % 100));
+            assert!((in_file - expected).norm() < 1e-2, "{in_file} {expected}");
+            farthest = farthest.max((pixel - expected).norm());
+        }
+        assert!(farthest > 1.0, "{farthest}");
+    }
+}
+
+#[test]
 fn angles_fisheyes_and_photos_that_are_not_there() {
     let folder = TempDir::new().expect("a folder");
     write(folder.path());
@@ -135,6 +165,8 @@ fn what_is_wrong_with_a_file_is_said_in_a_line() {
         ("w", json!(640), "w is 640 and the photo has 96 pixels"),
         ("camera_model", json!("EQUIRECTANGULAR"), "`EQUIRECTANGULAR` found"),
         ("k4", json!(0.5), "k4 = 0.5 found"),
+        ("k5", json!(0.5), "k1 k2 k3 p1 p2 expected, k5 = 0.5 found"),
+        ("camera_model", json!("FULL_OPENCV"), "`FULL_OPENCV` found"),
         ("frames", json!([]), "none of 0 found"),
         ("frames", json!([{ "file_path": "images/a" }]), "transform_matrix"),
         (
