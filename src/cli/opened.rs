@@ -180,4 +180,52 @@ mod tests {
         has(misfit(43.0, "1", 3.0), "--radius 15 fits");
         has(misfit(15.0, "1", 12.0), "--set grid.yaw_range=18 fits");
     }
+
+    #[test]
+    fn a_value_that_is_offered_fits() {
+        /// The number after these words.
+        fn offered(said: &str, words: &str) -> Option<f64> {
+            let rest = said.split_once(words)?.1;
+            rest.split(' ').next()?.parse().ok()
+        }
+        let mut steps = 0;
+        for depth in [0.02, 0.37, 1.8, 4.2, 12.0, 61.0] {
+            for focal in [120.0, 585.0, 5850.0] {
+                for (radius_m, turn_deg) in [(15.0, 3.0), (900.0, 40.0)] {
+                    let camera = Intrinsics {
+                        fx: focal,
+                        fy: focal,
+                        cx: 320.0,
+                        cy: 240.0,
+                        width: 640,
+                        height: 480,
+                    };
+                    let size = SceneSize {
+                        depth_m: Some(depth),
+                        spacing_m: Some(1.0),
+                        turn_deg: Some(turn_deg),
+                        extent_m: Some(30.0),
+                        ..SceneSize::PAPER
+                    };
+                    let mut protocol = Protocol { radii_m: vec![radius_m], ..Protocol::default() };
+                    let mut params = Params::default();
+                    // Each option is named once at most.
+                    for _ in 0..3 {
+                        let Some(said) = misfit(&size, &protocol, &params, &camera) else { break };
+                        if let Some(step) = offered(&said, "grid.coarse_step=") {
+                            assert!(step < params.grid.coarse_step_m, "{said}");
+                            params.assign(&format!("grid.coarse_step={step}")).expect("in range");
+                            steps += 1;
+                        } else if let Some(range) = offered(&said, "grid.yaw_range=") {
+                            params.assign(&format!("grid.yaw_range={range}")).expect("in range");
+                        } else {
+                            protocol.radii_m = vec![offered(&said, "--radius ").expect(&said)];
+                        }
+                    }
+                    assert_eq!(misfit(&size, &protocol, &params, &camera), None);
+                }
+            }
+        }
+        assert!(steps > 10, "{steps}");
+    }
 }
