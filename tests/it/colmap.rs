@@ -182,7 +182,7 @@ fn both_forms_say_the_same() {
 }
 
 /// A model of two cameras whose photos have the same number.
-fn write_rig(folder: &Path) {
+pub fn write_rig(folder: &Path) {
     write(folder, Form::Text);
     let images = folder.join("images");
     for (name, renamed) in [("a/1.png", "cam0/000001.png"), ("b side/2.png", "cam1/000001.png")] {

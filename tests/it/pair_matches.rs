@@ -4,6 +4,7 @@ use std::fs;
 use std::io::Write as _;
 use std::path::Path;
 
+use posescope::features::PairMatches;
 use posescope::foreign::MatchSource as _;
 use posescope::localize::QueryResult;
 use posescope::method::Method;
@@ -11,6 +12,7 @@ use posescope::scene::MatchFolder;
 use tempfile::TempDir;
 
 use crate::binary::{has, run_in, write};
+use crate::colmap::write_rig;
 use crate::damage;
 use crate::real_pair::authors_pair;
 
@@ -218,7 +220,7 @@ fn all_forms_say_the_same_in_both_directions() {
         let source = MatchFolder::open(folder.path()).unwrap_or_else(|error| panic!("{error}"));
         let pairs = |query: &str, reference: &str| {
             let found = source.matches(query, reference).unwrap_or_else(|error| panic!("{error}"));
-            let Some(posescope::features::PairMatches::Found(found)) = found else {
+            let Some(PairMatches::Found(found)) = found else {
                 panic!("{form} has the pair");
             };
             let decision = found.decisions.iter().flatten().next().expect("one match");
@@ -232,6 +234,53 @@ fn all_forms_say_the_same_in_both_directions() {
         let other = source.matches("000070", "000063");
         assert!(other.is_ok_and(|found| found.is_none()));
     }
+}
+
+/// Features and matches of hloc, a keypoint of each image and their match.
+fn write_hloc_of_the_rig(folder: &Path) {
+    fs::create_dir(folder).expect("writable");
+    let mut features = hdf5_pure::FileBuilder::new();
+    for (camera, place) in [("cam0", [3.0, 4.0]), ("cam1", [50.0, 40.0])] {
+        let mut outer = features.create_group(camera);
+        let mut group = outer.create_group("000001.png");
+        group.create_dataset("keypoints").with_f32_data(&place).with_shape(&[1, 2]);
+        outer.add_group(group.finish());
+        features.add_group(outer.finish());
+    }
+    features.write(folder.join("feats.h5")).expect("writable");
+    let mut matches = hdf5_pure::FileBuilder::new();
+    let mut first = matches.create_group("cam1-000001.png");
+    let mut second = first.create_group("cam0-000001.png");
+    second.create_dataset("matches0").with_i16_data(&[0]).with_shape(&[1]);
+    first.add_group(second.finish());
+    matches.add_group(first.finish());
+    matches.write(folder.join("matches.h5")).expect("writable");
+}
+
+#[test]
+fn hlocs_matches_of_a_rig_are_those_of_its_cameras() {
+    let folder = TempDir::new().expect("a folder");
+    write_rig(folder.path());
+    write_hloc_of_the_rig(&folder.path().join("hloc"));
+    let scene = damage::open(folder.path());
+    let source = MatchFolder::open(&folder.path().join("hloc"));
+    let source = source.unwrap_or_else(|error| panic!("{error}"));
+    let source = source.between(scene.as_ref(), scene.as_ref());
+    for (query, reference) in [("cam1/000001", "cam0/000001"), ("cam0/000001", "cam1/000001")] {
+        let found = source.matches(query, reference).unwrap_or_else(|error| panic!("{error}"));
+        let Some(PairMatches::Found(found)) = found else { panic!("no matches of {query}") };
+        assert_eq!(found.count(), 1);
+        let of_query = found.query.keypoints[0];
+        // Camera 0 has no lens, so that its pixels are those of the file.
+        let of_camera0 =
+            if query.starts_with("cam0") { of_query } else { found.reference.keypoints[0] };
+        assert_eq!((of_camera0.x, of_camera0.y), (3.0, 4.0));
+    }
+    assert!(source.matches("cam0/000001", "cam0/000001").is_ok_and(|found| found.is_none()));
+    let line = "run . --query cam1/000001 --reference cam0/000001 --method fb --matches hloc";
+    let said = run_in(folder.path(), line);
+    assert!(!said.out.contains("E1"), "{}", said.out);
+    has(&said.out, "R2");
 }
 
 #[test]
