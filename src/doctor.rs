@@ -23,7 +23,7 @@ use crate::image::RgbImage;
 use crate::scene::Scene;
 
 pub use calibration::{CALIBRATION_STEPS, Calibration, Estimate, NotJudged, calibration};
-pub use inventory::{Inventory, Remark};
+pub use inventory::{Inventory, Remark, unseen_map};
 pub use reading::{Correction, Mistake, Place, Subject};
 pub use sample::Agreement;
 pub use trial::{Finding, Fit};

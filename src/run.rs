@@ -32,7 +32,7 @@ pub use estimates_file::EstimatesFile;
 pub use evaluate::{Evaluation, FailedQuery, RunError, RunObserver};
 pub use inputs::{content, inputs};
 #[cfg(feature = "rerun")]
-pub use judge::{Judgement, examine};
+pub use judge::{Judgement, examine, warn_of_unseen_map};
 pub use limit::Limit;
 pub use outputs::{JSON_LINES, OutputError, refuse_in_folder, refuse_to_replace};
 pub use plan::{EvaluationRequest, Judging, Plan, PlanError, Refusal, failed_queries};

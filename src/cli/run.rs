@@ -8,7 +8,7 @@ use posescope::localize::{
     ChoiceError, Chooser, Localizer, QueryResult, Ranking, References, Request, Selection,
 };
 use posescope::method::Method;
-use posescope::run::{JSON_LINES, refuse_to_replace};
+use posescope::run::{JSON_LINES, refuse_to_replace, warn_of_unseen_map};
 use posescope::scene::{Retriever, Scene, frame_range, why_no_cloud};
 use posescope::session::{Breakpoints, StopAtBreakpoint, Task, none_near};
 use posescope::sink::rerun::{Identity, Recorder, Targets};
@@ -135,6 +135,7 @@ pub fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), CliError> {
     });
     observer.bar.finish_and_clear();
 
+    warn_of_unseen_map(references, results.iter().map(|(result, _)| result));
     // After an error, finished results are still shown and the recording is closed.
     let shown = plan.show(&results, terminal);
     let reached = observer.stop.as_ref().and_then(StopAtBreakpoint::reached);

@@ -198,6 +198,23 @@ fn cloud(
     !depths.is_empty()
 }
 
+/// How map and poses lie, if none of these frames has a point of the map in view; `None` without a map.
+pub fn unseen_map(scene: &dyn Scene, frames: &[usize]) -> Option<String> {
+    let sees = |&frame: &usize| {
+        let camera = scene.intrinsics(frame);
+        let is_seen = |point: &nalgebra::Point3<f32>| {
+            camera.project(&point.cast()).is_some_and(|pixel| camera.contains(&pixel))
+        };
+        scene.cloud(frame).is_ok_and(|cloud| cloud.points.iter().any(is_seen))
+    };
+    if frames.iter().any(sees) {
+        return None;
+    }
+    let poses: Vec<Option<Pose>> = (0..scene.frames().len()).map(|at| scene.pose(at)).collect();
+    let name = &scene.frames()[*frames.first()?];
+    Some(out_of_view(&scene.cloud_facts().map?, &poses, name))
+}
+
 /// What is known of a map that no frame has in view.
 fn out_of_view(map: &MapFacts, poses: &[Option<Pose>], frame: &str) -> String {
     let positions = || poses.iter().flatten().map(|pose| pose.translation.vector);

@@ -8,11 +8,12 @@ use super::plan::Judging;
 use super::run_file::RunFile;
 use super::run_folder::FolderError;
 use super::scenes::Scenes;
-use crate::doctor::mistake;
+use crate::doctor::{mistake, unseen_map};
 use crate::localize::QueryResult;
 use crate::measure::{
     Change, Finding, Report, RunComparison, failing_scenes, of_examination, read_rows,
 };
+use crate::scene::Scene;
 
 /// How good a run is.
 #[derive(Clone, Debug)]
@@ -75,6 +76,18 @@ fn compare(
     Ok(RunComparison::of(&rows_before, rows, &RunComparison::TOLERANCE))
 }
 
+/// Warns where no reference of failed results has any of its scene's map in view.
+pub fn warn_of_unseen_map<'a>(scene: &dyn Scene, results: impl Iterator<Item = &'a QueryResult>) {
+    /// The most references that are looked at.
+    const SAMPLE: usize = 20;
+    let failed = results.filter(|result| result.grade.is_failure());
+    let names: BTreeSet<&String> = failed.flat_map(|result| &result.references).collect();
+    let frames = names.into_iter().filter_map(|name| scene.find(name).ok());
+    if let Some(why) = unseen_map(scene, &frames.take(SAMPLE).collect::<Vec<_>>()) {
+        log::warn!("{}: {why}", scene.name());
+    }
+}
+
 /// What `posescope doctor` says of scenes whose queries fail often. A part of a run asks about each scene: how often its
 /// queries fail is known only when all parts are there. Nobody asked for it, so a scene that cannot be examined is only
 /// a warning.
@@ -87,6 +100,7 @@ pub fn examine(run: &RunFile, scenes: &Scenes, rows: &[QueryResult]) -> Vec<Find
         let Some(label) = pair.map(|pair| pair.scene.as_str()).filter(is_asked) else {
             continue;
         };
+        warn_of_unseen_map(scene.as_ref(), rows.iter().filter(|row| row.scene == label));
         match catch_unwind(AssertUnwindSafe(|| mistake(scene.as_ref()))) {
             Ok(found) => examined.extend(found.map(|found| of_examination(label, &found))),
             Err(_) => log::warn!("`posescope doctor` cannot examine {label}"),

@@ -12,6 +12,7 @@ use crate::binary::{has, run_in};
 use crate::damage::open;
 use crate::data;
 use crate::planted::{FAULTS, Fault, Planted};
+use crate::scene_toml;
 use crate::small_sequence::SmallSequence;
 use crate::written::Written as _;
 
@@ -329,4 +330,26 @@ fn the_command_reports_and_draws() {
     assert_eq!(image::open(at("a.png")).expect("a picture").width(), 160);
     assert!(fs::metadata(at("a.rrd")).expect("a recording").len() > 1000);
     assert_eq!(sequence.run("doctor nowhere").code, Some(3));
+}
+
+#[test]
+fn a_map_out_of_view_is_named_where_localisation_fails() {
+    let folder = TempDir::new().expect("a folder");
+    scene_toml::write(folder.path());
+    // The poses of a local frame.
+    let row = |at: u32| format!("1 0 0 0.5 0 1 0 0 0 0 1 {at}\n");
+    let rows: String = (0..3).map(row).collect();
+    fs::write(folder.path().join("poses.txt"), rows).expect("writable");
+    let words = "none of the 429 points of the map is in view ~ the map spans ~ the poses";
+    has(&run_in(folder.path(), "doctor .").out, words);
+    for line in [
+        "run . --query img1 --reference nearest:1 --method fb,mi",
+        "eval . --reference nearest:1 --method fb,mi --out run",
+    ] {
+        has(&run_in(folder.path(), line).err, words);
+    }
+    // Where the map is in view, nothing is said of it.
+    scene_toml::write(folder.path());
+    let line = "run . --query img1 --reference nearest:1 --method fb,mi";
+    assert!(!run_in(folder.path(), line).err.contains("spans"));
 }
