@@ -35,14 +35,13 @@ fn open(path: &Path) -> Result<Box<dyn Scene>, SceneError> {
     let camera = Camera::of_path(path, &CAMERAS);
     let (folder, images) = (camera.folder, camera.name()?);
     let photos = numbered::<usize>(&folder.join(images), "png")?;
-    let (Some((_, first)), Some((&last, _))) = (photos.first_key_value(), photos.last_key_value())
-    else {
+    let Some((&last, _)) = photos.last_key_value() else {
         return Err(SceneError::expected(
             folder.join(images),
             "images NNNNNN.png expected, none found",
         ));
     };
-    let size = photo_file::dimensions(first)?;
+    let (size, _) = photo_file::common_size(&photos.values().cloned().collect::<Vec<_>>())?;
     let calibration = TextFile::read(&folder.join(CALIBRATION))?;
     let label = images.replace("image_", "P");
     let projection = labelled(&calibration, &label)?;

@@ -123,14 +123,15 @@ fn open(path: &Path, keeps_all: bool) -> Result<Box<dyn Scene>, SceneError> {
     };
     let driven = if motion.samples().is_empty() { &ins } else { &motion };
     let photos = photos(&traversal, camera, driven, keeps_all)?;
-    let Some((_, first)) = photos.first() else {
+    if photos.is_empty() {
         return Err(SceneError::expected(
             traversal.join(camera.folder),
             "photos TIMESTAMP.png expected, none found among every tenth while the car moves; \
              append :all to the path to keep all",
         ));
-    };
-    let model = sdk.camera_model(camera.model, photo_file::dimensions(first)?)?;
+    }
+    let paths: Vec<PathBuf> = photos.iter().map(|(_, photo)| photo.clone()).collect();
+    let model = sdk.camera_model(camera.model, photo_file::common_size(&paths)?.0)?;
     let camera_from_vehicle = sdk.extrinsics(camera.rig())?;
     let vehicle_from_image = camera_from_vehicle.inverse() * model.camera_from_image;
     let intrinsics = model.intrinsics;

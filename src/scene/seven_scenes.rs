@@ -61,7 +61,8 @@ const COLOR_FROM_DEPTH: (Matrix3<f64>, [f64; 3]) = (
 
 fn open(folder: &Path, split: Option<&str>) -> Result<Box<dyn Scene>, SceneError> {
     let (name, photos) = listing(folder, split)?;
-    let size = photo_file::dimensions(&photos[0].1)?;
+    let paths: Vec<PathBuf> = photos.iter().map(|(_, photo)| photo.clone()).collect();
+    let (size, _) = photo_file::common_size(&paths)?;
     let cameras = Cameras::of(folder, size)?;
     let scene = if is_sequence(folder) { scene_of(folder) } else { folder_name(folder) };
     let mut frames = Vec::with_capacity(photos.len());

@@ -37,13 +37,14 @@ const KINECT_SIZE: (u32, u32) = (640, 480);
 fn open(folder: &Path) -> Result<Box<dyn Scene>, SceneError> {
     let photos = image_list(folder, "rgb.txt")?;
     let depths = image_list(folder, "depth.txt")?;
-    let Some((_, first)) = photos.first() else {
+    if photos.is_empty() {
         return Err(SceneError::expected(
             folder.join("rgb.txt"),
             "lines `time file` expected, none found",
         ));
-    };
-    let intrinsics = camera(folder, photo_file::dimensions(first)?)?;
+    }
+    let paths: Vec<PathBuf> = photos.iter().map(|(_, photo)| photo.clone()).collect();
+    let intrinsics = camera(folder, photo_file::common_size(&paths)?.0)?;
     let truth = folder.join("groundtruth.txt");
     let trajectory = if truth.is_file() {
         Some(Trajectory::in_seconds(by_time(&TextFile::read(&truth)?)?))

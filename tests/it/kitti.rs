@@ -72,6 +72,7 @@ fn what_is_wrong_with_a_sequence_is_named() {
         sequences/42/velodyne/000004.bin | text  | velodyne/000004.bin ~ empty
         sequences/42/velodyne/000004.bin | gone | velodyne/000004.bin ~ 2 frames have one
         sequences/42/image_0/000005.png | image 80x64 | image_0/000005.png ~ 160x64 ~ 80x64
+        sequences/42/image_0/000004.png | image 80x64 | image_0/000004.png ~ 160x64 ~ 80x64
         sequences/42/image_0/000005.png | cut 400 | image_0/000005.png
         sequences/42/calib.txt | P0: 100 0 80 0 -> P0: 100 0 80 | calib.txt:1 ~ 12 numbers expected, 11 found
         sequences/42/calib.txt | P0: 100 -> P0: 0 | calib.txt ~ focal lengths
