@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 
 pub(super) use self::camera::ModelCamera;
 use self::model::ModelImage;
-pub(super) use self::text::{camera_of_line, image_of_line, lines_of_images};
+pub(super) use self::text::{CAMERA_COLUMNS, camera_of_line, image_of_line, lines_of_images};
 use super::file_scene::{Clouds, FileScene, Frame};
 use super::folder::{entries, folder_name, stem, within};
 use super::frame_names::names_of;

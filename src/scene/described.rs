@@ -28,7 +28,7 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use self::correction::{Turn, Units, axes};
-use self::poses::FramePoses;
+use self::poses::{DescribedPoses, FramePoses};
 use super::cloud_file::{self, MapCloud, Note};
 use super::file_scene::{Clouds, Develop, FileScene, Frame};
 use super::folder::{folder_name, stem, warn_without_poses, within};
@@ -74,8 +74,8 @@ struct Description {
     pose: Option<Spanned<PoseMeaning>>,
     /// The axes of the poses' cameras.
     axes: Option<Spanned<String>>,
-    /// From the frame of a body whose poses they are: a 3 × 4 matrix, row by row.
-    camera_from_body: Option<Spanned<[f64; 12]>>,
+    /// The camera in the frame of the body whose poses the file has: a 3 × 4 matrix, row by row.
+    body_from_camera: Option<Spanned<[f64; 12]>>,
     /// The unit of poses and clouds.
     unit: Option<Spanned<Units>>,
     /// How the images in files must be turned.
@@ -239,13 +239,25 @@ fn open(path: &Path) -> Result<Box<dyn Scene>, SceneError> {
     let file_names: Vec<String> =
         file_names.map(|name| name.to_string_lossy().into_owned()).collect();
     let names = names_of(&file_names);
-    let (poses, is_inverted) = match &description.poses {
+    let body_from_camera =
+        source.read_value(description.body_from_camera.as_ref(), pose_of_rows)?;
+    let DescribedPoses { poses, is_inverted, is_of_body } = match &description.poses {
         Some(name) => poses::read(&source.file(name)?, &names)?,
         None => {
             warn_without_poses(path, "poses");
-            (vec![FramePoses::default(); photos.len()], false)
+            DescribedPoses {
+                poses: vec![FramePoses::default(); photos.len()],
+                ..Default::default()
+            }
         }
     };
+    if is_of_body && body_from_camera.is_none() {
+        log::warn!(
+            "{}: the poses of an EuRoC file are those of the body, and are taken as those of the camera; give the first \
+             three rows of the camera's T_BS (sensor.yaml) as `body_from_camera = [12 numbers]`",
+            path.display()
+        );
+    }
     let meaning = description.pose.as_ref().map(Spanned::get_ref);
     if let (true, Some(PoseMeaning::WorldFromCamera), Some(pose)) =
         (is_inverted, meaning, &description.pose)
@@ -257,14 +269,12 @@ fn open(path: &Path) -> Result<Box<dyn Scene>, SceneError> {
     let turn = source.read_value(description.axes.as_ref(), |text| axes(text))?;
     let [unit_m, clouds_unit_m] =
         source.read_value(description.unit.as_ref(), Units::metres)?.unwrap_or([1.0, 1.0]);
-    let camera_from_body =
-        source.read_value(description.camera_from_body.as_ref(), pose_of_rows)?;
-    if let (Some(axes), Some(_)) = (&description.axes, camera_from_body) {
-        let expected = "either `axes` or `camera_from_body` expected, both found";
+    if let (Some(axes), Some(_)) = (&description.axes, body_from_camera) {
+        let expected = "either `axes` or `body_from_camera` expected, both found";
         return Err(source.error(axes, expected));
     }
     let turn = turn.map(|turn| Pose::from_parts(Translation3::identity(), turn));
-    let posed_from_camera = turn.or(camera_from_body.map(|pose| pose.inverse()));
+    let posed_from_camera = turn.or(body_from_camera);
     let world_from_camera = |read: Pose| {
         let mut pose = if invert { read.inverse() } else { read };
         pose.translation.vector *= unit_m;
@@ -452,7 +462,7 @@ fn pose_of_rows(rows: &[f64; 12]) -> Result<Pose, String> {
     pose_from_matrix(&Matrix3x4::from_row_slice(rows)).map_err(|error| error.to_string())
 }
 
-/// The description with another `camera_from_cloud`, or `camera_from_body` where the clouds are in the world's frame.
+/// The description with another `camera_from_cloud`, or `body_from_camera` where the clouds are in the world's frame.
 pub(super) fn recalibrated(argument: &str, change: &Pose) -> Result<Recalibrated, SceneError> {
     let source = Source::read(&description_of(Path::new(argument)))?;
     let description = source.description()?;
@@ -464,17 +474,18 @@ pub(super) fn recalibrated(argument: &str, change: &Pose) -> Result<Recalibrated
             return Err(SceneError::expected(&source.path, expected));
         }
         Some(clouds) => ("camera_from_cloud", clouds.camera_from_cloud.as_ref()),
-        None => ("camera_from_body", description.camera_from_body.as_ref()),
+        None => ("body_from_camera", description.body_from_camera.as_ref()),
     };
     let mut better = match stated {
         Some(stated) => pose_of_rows(stated.get_ref()).map_err(|why| source.error(stated, &why))?,
         None => Pose::identity(),
     };
     if let (None, Some(axes_of_poses)) = (of_clouds, &description.axes) {
-        let expected = "`camera_from_body` in place of `axes` expected, to hold a turn and a shift";
+        let expected = "`body_from_camera` in place of `axes` expected, to hold a turn and a shift";
         return Err(source.error(axes_of_poses, expected));
     }
-    better = change * better;
+    // The map stays, so the cameras move.
+    better = if of_clouds.is_some() { change * better } else { better * change.inverse() };
     let numbers = matrix_from_pose(&better).transpose();
     let numbers: Vec<String> = numbers.iter().map(|number| format!("{number:.9}")).collect();
     let value = format!("[{}]", numbers.join(", "));

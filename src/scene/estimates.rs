@@ -20,7 +20,15 @@ pub fn read_estimates(path: &Path, scene: &dyn Scene) -> Result<Estimates, Scene
     let in_folder = path.join("images.txt");
     let file = TextFile::read(if path.is_dir() { &in_folder } else { path })?;
     let names = FrameNames::new(scene);
-    match PoseFile::read(&file, &names)?.poses {
+    let PoseFile { poses, is_of_body, .. } = PoseFile::read(&file, &names)?;
+    if is_of_body {
+        log::warn!(
+            "{}: the poses of an EuRoC file are those of the body, and are taken as those of the camera; multiply each \
+             by the camera's T_BS from its sensor.yaml",
+            file.name()
+        );
+    }
+    match poses {
         PoseText::Timed(poses) => by_time(&file, poses, scene),
         PoseText::Lines(poses) => by_line(&file, &poses, scene),
         PoseText::Named(poses) => by_name(&file, &poses, scene, &names),

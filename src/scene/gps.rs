@@ -102,7 +102,7 @@ fn read_rows(file: &TextFile) -> Result<(bool, Vec<Row<'_>>), SceneError> {
     };
     let mut rows = Vec::new();
     for line in lines {
-        let found: Vec<&str> = line.words().collect();
+        let found = line.fields();
         if found.len() != words.len() {
             let (count, found) = (words.len(), found.len());
             return Err(line.error(format!("{count} columns expected, {found} found")));

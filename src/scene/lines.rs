@@ -48,6 +48,21 @@ impl TextFile {
         self.path.display().to_string()
     }
 
+    /// An error if a comment names all of these columns in another order.
+    pub fn expect_order(&self, columns: &[&str]) -> Result<(), SceneError> {
+        let separators = |c: char| c.is_whitespace() || matches!(c, ',' | ';' | '#' | '[' | ']');
+        for line in self.all_lines().filter(|line| line.text.starts_with('#')) {
+            let named: Vec<String> = line.text.split(separators).map(str::to_lowercase).collect();
+            let place = |column: &&str| named.iter().position(|name| name == column);
+            let places: Option<Vec<usize>> = columns.iter().map(place).collect();
+            if places.is_some_and(|places| !places.is_sorted()) {
+                let columns = columns.join(", ");
+                return Err(line.error(format!("the columns in the order {columns} expected")));
+            }
+        }
+        Ok(())
+    }
+
     /// An error about the file as a whole.
     pub fn error(&self, expected: impl Into<String>) -> SceneError {
         SceneError::expected(&self.path, expected)
@@ -79,14 +94,14 @@ impl<'a> Line<'a> {
         SceneError::line(self.path, self.number, expected)
     }
 
-    /// The words, separated by white space or commas.
-    pub fn words(&self) -> impl Iterator<Item = &'a str> + use<'a> {
-        words(self.text)
+    /// The [`fields`].
+    pub fn fields(&self) -> Vec<&'a str> {
+        fields(self.text)
     }
 
     /// The names of the columns, in lower case, if the line is a header: several words and no number.
     pub fn header(&self) -> Option<Vec<String>> {
-        let columns: Vec<String> = self.words().map(str::to_lowercase).collect();
+        let columns: Vec<String> = self.fields().into_iter().map(str::to_lowercase).collect();
         let has_numbers = columns.iter().any(|word| word.parse::<f64>().is_ok());
         (columns.len() > 1 && !has_numbers).then_some(columns)
     }
@@ -131,15 +146,23 @@ pub(super) fn pose(position: [f64; 3], quaternion: [f64; 4]) -> Result<Pose, Str
 /// What a header calls the column of the frames' names.
 pub(super) const NAMES: &[&str] = &["name", "frame", "image", "file", "filename"];
 
-fn words(text: &str) -> impl Iterator<Item = &str> {
-    text.split(|c: char| c.is_whitespace() || c == ',').filter(|word| !word.is_empty())
+/// The fields of a line: separated by `;`, or else by commas, or else by white space. So a decimal comma gives other
+/// fields than the format has, and never another number.
+pub(super) fn fields(text: &str) -> Vec<&str> {
+    let separator = [';', ','].into_iter().find(|&separator| text.contains(separator));
+    match separator {
+        Some(separator) => {
+            text.split(separator).map(|field| field.trim().trim_matches('"')).collect()
+        }
+        None => text.split_whitespace().map(|field| field.trim_matches('"')).collect(),
+    }
 }
 
 /// As many finite numbers as are asked for, and nothing else.
 pub(super) fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
     let mut numbers = [0.0; N];
     let mut count = 0;
-    for word in words(text) {
+    for word in fields(text) {
         let number = number(word)?;
         if let Some(place) = numbers.get_mut(count) {
             *place = number;
@@ -154,10 +177,13 @@ pub(super) fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
 
 /// The finite numbers of a text, and nothing else.
 pub(super) fn parsed_numbers(text: &str) -> Result<Vec<f64>, String> {
-    words(text).map(number).collect()
+    fields(text).into_iter().map(number).collect()
 }
 
 fn number(word: &str) -> Result<f64, String> {
+    if word.is_empty() {
+        return Err("a number expected, an empty column found".to_owned());
+    }
     let number: f64 =
         word.parse().map_err(|_| format!("a number expected, `{}` found", excerpt(word)))?;
     if !number.is_finite() {
@@ -217,7 +243,7 @@ mod tests {
 
     #[test]
     fn lines_are_counted_with_those_that_say_nothing() {
-        let file = file("# a comment\n\n 1 2,3\nx 1 2\n4 5\n1 nan 2\n");
+        let file = file("# a comment\n\n 1, 2,3\nx 1 2\n4 5\n1 nan 2\n");
         let read: Vec<_> = file.lines().map(|line| said(line.numbers::<3>())).collect();
         assert_eq!(read[0], Ok([1.0, 2.0, 3.0]));
         let errors: Vec<_> = read[1..].iter().filter_map(|r| r.as_ref().err()).collect();
@@ -229,6 +255,28 @@ mod tests {
                 "a.txt:6: finite numbers expected, `nan` found",
             ]
         );
+    }
+
+    #[test]
+    fn numbers_with_decimal_commas_are_no_others() {
+        let read = |text: &str| said(file(text).rows::<1, 4>()).map(|[row]| row);
+        for text in ["1.5 2 3.5 4", "1.5,2,3.5,4", "1.5; 2;3.5;4", " 1.5\t2\t3.5\t4 "] {
+            assert_eq!(read(text), Ok([1.5, 2.0, 3.5, 4.0]), "{text}");
+        }
+        for text in ["1,5 2 3,5 4", "1,5;2;3,5;4", "1,5,2,3,5,4", "1 2,3 4", "1,2,,4", "1,5 2,5 3"]
+        {
+            assert!(read(text).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn a_comment_that_names_the_columns_in_another_order_is_an_error() {
+        let order = |text: &str| said(file(text).expect_order(&["fx", "fy", "cx"]));
+        for text in ["", "# fx, fy, cx\n", "#FX[] fy cx more\n1 2 3\n", "# cx and fx\n"] {
+            assert_eq!(order(text), Ok(()), "{text}");
+        }
+        let error = "a.txt:2: the columns in the order fx, fy, cx expected".to_owned();
+        assert_eq!(order("1 2 3\n# fx cx fy\n"), Err(error));
     }
 
     #[test]

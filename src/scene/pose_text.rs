@@ -22,6 +22,8 @@ pub(super) struct PoseFile<'a> {
     pub poses: PoseText<'a>,
     /// Whether the format says that its poses are `camera_from_world`. They are inverted already.
     pub is_camera_from_world: bool,
+    /// Whether the format says that its poses are those of a body that carries cameras, `world_from_body`.
+    pub is_of_body: bool,
 }
 
 /// The poses of a file, `world_from_camera`.
@@ -112,7 +114,7 @@ impl<'a> PoseFile<'a> {
             Some(Key::Name(_)) => PoseText::Named(rows.into_iter().filter_map(named).collect()),
             _ => PoseText::Lines(PoseLines::new(rows)?),
         };
-        Ok(Self { poses, is_camera_from_world })
+        Ok(Self { poses, is_camera_from_world, is_of_body: false })
     }
 }
 
@@ -187,8 +189,15 @@ fn named(row: Row<'_>) -> Option<NamedPose<'_>> {
     }
 }
 
-/// The poses of a TUM text with their times \[s\].
+/// The poses of a TUM text, or of a table, with their times \[s\].
 pub(super) fn by_time(file: &TextFile) -> Result<Vec<(f64, Pose)>, SceneError> {
+    if let Some(read) = table::read(file)? {
+        let PoseText::Timed(TimedPoses { samples, unit }) = read.poses else {
+            return Err(file.error("poses by time expected, poses by name found"));
+        };
+        let unit = unit.unwrap_or(TimeUnit::Second);
+        return Ok(samples.into_iter().map(|(time, pose)| (unit.seconds(time), pose)).collect());
+    }
     let rows = TUM.read(file).map_err(|misfit| misfit.line.error(misfit.why))?;
     warn_of_lost(file, &rows);
     Ok(timed(rows))

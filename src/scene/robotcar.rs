@@ -184,8 +184,7 @@ fn photos(
 fn times(list: &Path) -> Result<BTreeSet<u64>, SceneError> {
     let file = TextFile::read(list)?;
     let time = |line: Line<'_>| {
-        let word = line.words().next().unwrap_or_default();
-        let time = word.parse::<u64>();
+        let time = line.fields()[0].parse::<u64>();
         time.map_err(|_| line.error("a line `timestamp chunk` expected"))
     };
     file.lines().map(time).collect()

@@ -9,7 +9,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use nalgebra::{Matrix3, Matrix4, Translation3, UnitQuaternion};
+use nalgebra::{Matrix3, Matrix3x4, Translation3, UnitQuaternion};
 
 use super::depth_image::{DepthImages, unit_m};
 use super::file_scene::{FileScene, Frame};
@@ -203,12 +203,14 @@ fn read_pose(path: &Path) -> Result<Option<Pose>, SceneError> {
     }
     let file = TextFile::read(path)?;
     let is_lost = |word: &str| word.parse().is_ok_and(|number: f64| !number.is_finite());
-    if file.lines().any(|line| line.words().any(is_lost)) {
+    if file.lines().any(|line| line.fields().into_iter().any(is_lost)) {
         return Ok(None);
     }
     let rows = file.rows::<4, 4>()?;
-    let matrix = Matrix4::from_fn(|row, column| rows[row][column]);
-    let pose = pose_from_matrix(&matrix.fixed_rows::<3>(0).into_owned());
+    if rows[3] != [0.0, 0.0, 0.0, 1.0] {
+        return Err(file.error(format!("the last row 0 0 0 1 expected, {:?} found", rows[3])));
+    }
+    let pose = pose_from_matrix(&Matrix3x4::from_fn(|row, column| rows[row][column]));
     pose.map(Some).map_err(|error| file.error(error.to_string()))
 }
 

@@ -106,6 +106,7 @@ fn camera(folder: &Path, (width, height): (u32, u32)) -> Result<Intrinsics, Scen
     let path = folder.join("calibration.txt");
     if path.is_file() {
         let file = TextFile::read(&path)?;
+        file.expect_order(&["fx", "fy", "cx", "cy"])?;
         let [camera] = file.rows::<1, 4>()?;
         return pinhole(camera, (width, height)).map_err(|why| file.error(why));
     }

@@ -10,8 +10,9 @@ use posescope::method::Method;
 use posescope::scene;
 use tempfile::TempDir;
 
-use crate::binary::{has, refused, run_in, write};
+use crate::binary::{arg, has, refused, run_in, write};
 use crate::damage;
+use crate::scene_toml;
 use crate::small_sequence::SmallSequence;
 
 /// The results that a run prints.
@@ -272,4 +273,40 @@ fn an_unreadable_file_of_poses_is_bad_data() {
         sequence.path(),
         "3 | run sequences/42 --query 5 --reference 4 --estimates other=poses.txt | poses.txt:1: ~ TUM",
     );
+}
+
+#[test]
+fn poses_of_euroc_are_those_of_a_body() {
+    let folder = TempDir::new().expect("a folder");
+    scene_toml::write(folder.path());
+    for (at, name) in ["1.5", "2.5", "3.5"].iter().enumerate() {
+        let from = folder.path().join(format!("photos/img{at}.png"));
+        fs::rename(from, folder.path().join(format!("photos/{name}.png"))).expect("is there");
+    }
+    let [x, y, z] = scene_toml::ORIGIN;
+    let header = "#timestamp [ns], p_RS_R_x [m], p_RS_R_y [m], p_RS_R_z [m], q_RS_w [], q_RS_x [], q_RS_y [], q_RS_z []";
+    let row = |at: u32| format!("{at}500000000,{x},{y},{},1,0,0,0\n", z + f64::from(at));
+    let rows: String = (1..4).map(row).collect();
+    fs::write(folder.path().join("poses.txt"), format!("{header}\n{rows}")).expect("writable");
+    let scene = damage::open(folder.path());
+    assert_eq!(scene.pose(0).expect("a pose").translation.vector.z, z + 1.0);
+    let said = run_in(folder.path(), "doctor .").err;
+    has(
+        &said,
+        "poses of an EuRoC file are those of the body ~ T_BS ~ `body_from_camera = [12 numbers]`",
+    );
+    let line = "run . --query 2.5 --reference nearest:1 --method x --estimates x=poses.txt";
+    has(&run_in(folder.path(), line).err, "poses.txt: the poses of an EuRoC file ~ T_BS");
+    // Its rotation is by 90° about z.
+    let offset = "body_from_camera = [0, -1, 0, 0.5, 1, 0, 0, 0.25, 0, 0, 1, -0.125]";
+    scene_toml::with(folder.path(), "poses =", &format!("{offset}\nposes ="));
+    let camera = damage::open(folder.path()).pose(0).expect("a pose");
+    let expected = nalgebra::Vector3::new(x + 0.5, y + 0.25, z + 1.0 - 0.125);
+    assert!((camera.translation.vector - expected).norm() < 1e-9, "{camera}");
+    let right = camera.rotation * nalgebra::Vector3::x();
+    assert!((right - nalgebra::Vector3::y()).norm() < 1e-9, "{right}");
+    assert!(!run_in(folder.path(), "doctor .").err.contains("EuRoC"));
+    scene_toml::with(folder.path(), "poses =", "body_from_camera = [1, 2]\nposes =");
+    let error = scene::open(arg(folder.path()), None).err().expect("two numbers");
+    damage::expect_words(&error.to_string(), "scene.toml:2");
 }

@@ -61,6 +61,7 @@ mod storyboard;
 mod sweep;
 mod synth;
 mod text_clouds;
+mod text_files;
 mod tour;
 mod transforms;
 #[path = "../../crates/posescope-core/tests/it/two_walls.rs"]

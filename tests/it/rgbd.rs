@@ -290,6 +290,7 @@ fn a_pose_that_is_lost_is_none_and_one_that_is_wrong_is_named() {
         r#"
         seq-01/frame-000001.pose.txt | text 1 0 0 0\n0 1 0\n | pose.txt:2 ~ 4 numbers expected, 3 found
         seq-01/frame-000001.pose.txt | text 1 0 0 0\n0 2 0 0\n0 0 1 0\n0 0 0 1\n | pose.txt ~ not a rotation
+        seq-01/frame-000001.pose.txt | text 1 0 0 0\n0 1 0 0\n0 0 1 0\n4 5 6 1\n | pose.txt ~ last row 0 0 0 1
         seq-01/frame-000000.color.png | image 320x240 | seq-01/frame-000000.color.png ~ 640x480 ~ 320x240
         seq-02/frame-000000.color.png | image 320x240 | seq-02/frame-000000.color.png ~ 640x480 ~ 320x240
         camera-intrinsics.txt | text 585 1 320\n0 585 240\n0 0 1\n | camera-intrinsics.txt ~ fx 0 cx

@@ -185,7 +185,8 @@ fn what_is_wrong_with_a_traversal_is_named() {
         sdk/extrinsics/ldmrs.txt | gone | extrinsics/ldmrs.txt
         drive/stereo.timestamps | text soon 1\n | stereo.timestamps:1 ~ `timestamp chunk`
         drive/gps/ins.csv | text a,b\n | ins.csv:1 ~ `timestamp`
-        drive/vo/vo.csv | text a\n1,2,3\n | vo.csv:2 ~ columns
+        drive/vo/vo.csv | text a\n1,2,3\n | vo.csv:1 ~ a column `source_timestamp` expected
+        drive/vo/vo.csv | text source_timestamp,destination_timestamp,x,y,z,roll,pitch,yaw\n1,2,3\n | vo.csv:2 ~ 8 columns expected, 3 found
         drive/stereo/centre/1004000000.png | cut 200 | 1004000000.png
         drive/ldmrs/1004000000.bin | cut 5 | 1004000000.bin ~ 24 bytes
         "#,

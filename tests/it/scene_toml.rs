@@ -639,7 +639,7 @@ fn a_description_is_recalibrated_in_its_own_form() {
     }
     let scans = SIMPLE.replace("cloud = \"map.xyz\"\n", "") + "[clouds]\nfiles = \"scans/*.xyz\"\n";
     let stated = "camera_from_cloud = [0,-1,0,0, 0,0,-1,-0.5, 1,0,0,0]\n";
-    let body = "camera_from_body = [0,-1,0,0.1, 0,0,-1,0, 1,0,0,0]\n";
+    let body = "body_from_camera = [0,-1,0,0.1, 0,0,-1,0, 1,0,0,0]\n";
     for (text, of_clouds) in [
         (scans.clone(), true),
         (scans + stated, true),
@@ -670,7 +670,7 @@ fn a_description_is_recalibrated_in_its_own_form() {
     fs::write(folder.path().join("scene.toml"), "axes = \"opengl\"\n".to_owned() + SIMPLE)
         .expect("writable");
     let why = posescope::scene::recalibrated(arg(folder.path()), None, &change).err();
-    has(&why.expect("two places for a turn").to_string(), "scene.toml:1: `camera_from_body`");
+    has(&why.expect("two places for a turn").to_string(), "scene.toml:1: `body_from_camera`");
     let why = posescope::scene::recalibrated("street", None, &change).err();
     has(&why.expect("it has no file").to_string(), "KITTI");
 }

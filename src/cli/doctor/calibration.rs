@@ -179,13 +179,13 @@ fn report(
         let rows = matrix_from_pose(&found.camera_from_stated()).transpose();
         let numbers: Vec<String> = rows.iter().map(|number| format!("{number:.6}")).collect();
         let what = if has_map {
-            "To move the cameras against the map, multiply the stated camera_from_body of scene.toml (the identity, where \
-             there is none)"
+            "To move the cameras against the map, multiply the stated body_from_camera of scene.toml (the identity, where \
+             there is none) from the right by the inverse of"
         } else {
-            "Multiply the stated camera_from_cloud"
+            "Multiply the stated camera_from_cloud from the left by"
         };
         lines(&format!(
-            "{what} from the left by this [R|t], row by row: {}. --out FILE writes the scene's own file with it.",
+            "{what} this [R|t], row by row: {}. --out FILE writes the scene's own file with it.",
             numbers.join(" ")
         ))
     } else {

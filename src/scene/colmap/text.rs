@@ -9,7 +9,9 @@ use super::camera::ModelCamera;
 use super::model::{Model, ModelImage, Points};
 
 pub(super) fn read(folder: &Path) -> Result<Model, SceneError> {
-    let cameras = TextFile::read(&folder.join("cameras.txt"))?
+    let file = TextFile::read(&folder.join("cameras.txt"))?;
+    file.expect_order(CAMERA_COLUMNS)?;
+    let cameras = file
         .lines()
         .map(|line| {
             let (id, camera) = camera_of_line(line)?;
@@ -21,12 +23,15 @@ pub(super) fn read(folder: &Path) -> Result<Model, SceneError> {
     Ok(Model { cameras, images, points: points.positions })
 }
 
+/// The columns of cameras after their key, as comments name them.
+pub(in super::super) const CAMERA_COLUMNS: &[&str] = &["model", "width", "height", "params"];
+
 /// A line `KEY MODEL WIDTH HEIGHT PARAMS…`: its key, which is an id in COLMAP's files and a photo in hloc's, and the
 /// camera, or why it cannot be used.
 pub(in super::super) fn camera_of_line(
     line: Line<'_>,
 ) -> Result<(&str, Result<ModelCamera, SceneError>), SceneError> {
-    let words: Vec<&str> = line.words().collect();
+    let words: Vec<&str> = line.text.split_whitespace().collect();
     let [key, model, width, height, parameters @ ..] = words.as_slice() else {
         return Err(line.error("a line `id model width height parameters` expected"));
     };
@@ -45,8 +50,10 @@ fn points(path: &Path) -> Result<Points, SceneError> {
     if !path.is_file() {
         return Ok(points);
     }
-    for line in TextFile::read(path)?.lines() {
-        let words: Vec<&str> = line.words().take(4).collect();
+    let file = TextFile::read(path)?;
+    file.expect_order(&["point3d_id", "x", "y", "z", "r"])?;
+    for line in file.lines() {
+        let words: Vec<&str> = line.text.split_whitespace().take(4).collect();
         let [id, x, y, z] = words[..] else {
             return Err(line.error("a line `id x y z …` expected, it is cut off"));
         };
@@ -60,6 +67,18 @@ fn points(path: &Path) -> Result<Points, SceneError> {
 /// second line may be empty or missing.
 fn images(path: &Path, points: &Points) -> Result<Vec<ModelImage>, SceneError> {
     let file = TextFile::read(path)?;
+    file.expect_order(&[
+        "image_id",
+        "qw",
+        "qx",
+        "qy",
+        "qz",
+        "tx",
+        "ty",
+        "tz",
+        "camera_id",
+        "name",
+    ])?;
     let mut images = Vec::new();
     for (line, features) in pairs_of_lines(&file) {
         let ImageLine { name, camera, numbers } =
@@ -141,7 +160,7 @@ pub(in super::super) fn image_of_line(text: &str) -> Result<ImageLine<'_>, Strin
 
 /// The points of the features; −1 means none.
 fn observed(line: Line<'_>, points: &Points) -> Result<Vec<u32>, SceneError> {
-    let words = line.words().collect::<Vec<_>>();
+    let words = line.text.split_whitespace().collect::<Vec<_>>();
     if words.len() % 3 != 0 {
         return Err(
             line.error(format!("features `x y point` expected, {} numbers found", words.len()))

@@ -19,18 +19,26 @@ pub(super) struct FramePoses {
     pub time_s: Option<f64>,
 }
 
-/// The poses of photos, and whether the format of the file says that they are `camera_from_world`. They are inverted
-/// already then.
-pub(super) fn read(path: &Path, photos: &[String]) -> Result<(Vec<FramePoses>, bool), SceneError> {
+/// The poses of photos.
+#[derive(Default)]
+pub(super) struct DescribedPoses {
+    pub poses: Vec<FramePoses>,
+    /// Whether the format of the file says that they are `camera_from_world`. They are inverted already then.
+    pub is_inverted: bool,
+    /// Whether the format says that they are those of a body that carries the camera.
+    pub is_of_body: bool,
+}
+
+pub(super) fn read(path: &Path, photos: &[String]) -> Result<DescribedPoses, SceneError> {
     let file = TextFile::read(path)?;
-    let PoseFile { poses, is_camera_from_world } =
+    let PoseFile { poses, is_camera_from_world: is_inverted, is_of_body } =
         PoseFile::read(&file, &FrameNames::of("", photos))?;
     let poses = match poses {
         PoseText::Timed(poses) => by_time(&file, &poses, photos),
         PoseText::Lines(poses) => by_line(&file, &poses, photos),
         PoseText::Named(poses) => by_name(&file, &poses, photos),
     };
-    Ok((poses?, is_camera_from_world))
+    Ok(DescribedPoses { poses: poses?, is_inverted, is_of_body })
 }
 
 /// Poses of photos by their names; photos that the file does not name have none.

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use super::super::SceneError;
-use super::super::colmap::{ModelCamera, camera_of_line};
+use super::super::colmap::{CAMERA_COLUMNS, ModelCamera, camera_of_line};
 use posescope_core::scene::{stem, without_extension};
 
 use super::super::frame_names::agree;
@@ -67,8 +67,10 @@ impl CameraArgument {
             }
             Self::File(path) => {
                 let file = TextFile::read(path)?;
+                file.expect_order(CAMERA_COLUMNS)?;
                 let is_id = |line: Line<'_>| {
-                    line.words().next().is_some_and(|word| word.parse::<u32>().is_ok())
+                    let key = line.text.split_whitespace().next();
+                    key.is_some_and(|word| word.parse::<u32>().is_ok())
                 };
                 if !file.lines().all(is_id) {
                     return of_list(&file, photo, (width, height));
@@ -167,6 +169,12 @@ impl FromStr for CameraArgument {
             Ok(numbers) => match numbers[..] {
                 [fx, fy, ..] if fx <= 0.0 || fy <= 0.0 => {
                     Err(format!("positive focal lengths expected, {fx} and {fy} found"))
+                }
+                // Coefficients are fractions, so whole ones are halves of numbers with decimal commas.
+                [_, _, _, _, ref rest @ ..]
+                    if !text.contains(['.', 'e', 'E']) && rest.iter().any(|k| *k != 0.0) =>
+                {
+                    Err("numbers with decimal points expected, whole coefficients found".to_owned())
                 }
                 [fx, fy, cx, cy, ref rest @ ..] if [0, 4, 5, 8].contains(&rest.len()) => {
                     Ok(Self::Numbers { camera: [fx, fy, cx, cy], coefficients: rest.to_vec() })

@@ -10,17 +10,27 @@ use super::{PixelMaps, RawMatches, pair};
 use crate::scene::lines::TextFile;
 use crate::scene::{PixelMap, SceneError};
 
-/// Reads a file of matches. Further columns, such as a score, are ignored.
+/// Reads a file of matches. A fifth column and more, such as a score, are ignored.
 pub(super) fn read(path: &Path) -> Result<RawMatches, SceneError> {
     let file = TextFile::read(path)?;
     let mut found = RawMatches { first: Vec::new(), second: Vec::new(), partners: Vec::new() };
+    let mut count = None;
     for line in file.lines() {
+        let fields = line.fields();
+        if fields.len() < 4 {
+            return Err(line.error("a line `x y x y` expected, it is cut off"));
+        }
+        let columns = *count.get_or_insert(fields.len());
+        if fields.len() != columns {
+            let found = fields.len();
+            return Err(line.error(format!("{columns} columns as above expected, {found} found")));
+        }
+        // More whole numbers between commas may be halves of numbers with decimal commas.
+        if columns > 4 && line.text.contains(',') && !line.text.contains(['.', ';']) {
+            return Err(line.error("numbers with decimal points expected, commas alone found"));
+        }
         let mut numbers = [0.0_f32; 4];
-        let mut words = line.words();
-        for number in &mut numbers {
-            let word = words
-                .next()
-                .ok_or_else(|| line.error("a line `x y x y` expected, it is cut off"))?;
+        for (number, word) in numbers.iter_mut().zip(fields) {
             line.number(word)?;
             // Not via `f64`, which would round twice.
             *number = word.parse().unwrap_or(f32::INFINITY);

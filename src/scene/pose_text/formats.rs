@@ -5,7 +5,7 @@ use std::iter;
 use nalgebra::Matrix3x4;
 
 use super::super::colmap::{image_of_line, lines_of_images};
-use super::super::lines::{Line, TextFile, excerpt, pose};
+use super::super::lines::{Line, TextFile, excerpt, fields, pose};
 use super::{Key, Row};
 use crate::geometry::{Pose, pose_from_matrix};
 
@@ -167,18 +167,6 @@ impl Format {
 
 fn all_lines(file: &TextFile) -> Vec<Line<'_>> {
     file.lines().collect()
-}
-
-/// The fields of a line: separated by `;`, or else by commas, or else by white space. So a decimal comma gives other
-/// fields than the format has, and never another number.
-pub(super) fn fields(text: &str) -> Vec<&str> {
-    let separator = [';', ','].into_iter().find(|&separator| text.contains(separator));
-    match separator {
-        Some(separator) => {
-            text.split(separator).map(|field| field.trim().trim_matches('"')).collect()
-        }
-        None => text.split_whitespace().map(|field| field.trim_matches('"')).collect(),
-    }
 }
 
 /// A number, which may be NaN or infinite.

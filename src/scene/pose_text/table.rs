@@ -6,9 +6,9 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use super::super::SceneError;
-use super::super::lines::{Line, NAMES, TextFile};
+use super::super::lines::{Line, NAMES, TextFile, fields};
 use super::super::time_unit::TimeUnit;
-use super::formats::{Why, fields, number, posed};
+use super::formats::{Why, number, posed};
 use super::{Key, PoseFile, Row};
 
 /// The columns of a table by their positions.
@@ -22,12 +22,19 @@ struct Columns {
     quaternion: [usize; 4],
     /// The camera of a kapture trajectory.
     device: Option<usize>,
+    /// Whether the poses are those of a body that carries cameras, as in EuRoC's files.
+    is_of_body: bool,
+    /// A column of positions that are not in metres.
+    other_unit: Option<String>,
 }
 
 /// Reads a file whose header names the columns; `None` without one.
 pub(super) fn read(file: &TextFile) -> Result<Option<PoseFile<'_>>, SceneError> {
     let Some(first) = file.lines().next() else { return Ok(None) };
-    if first.header().is_some() {
+    if let Some(header) = first.header() {
+        if ["image_id", "camera_id"].iter().all(|column| header.contains(&(*column).to_owned())) {
+            return Err(first.error("`#` expected before the header of COLMAP's images"));
+        }
         let columns = Columns::named(first.text).ok_or_else(|| {
             first.error(
                 "a header with the columns `name` or `time`, and `x y z qx qy qz qw`, expected",
@@ -38,11 +45,18 @@ pub(super) fn read(file: &TextFile) -> Result<Option<PoseFile<'_>>, SceneError> 
     }
     let comments = file.all_lines().take_while(|line| !line.has_content());
     let found = fields(first.text).len();
-    let header = comments
-        .filter_map(|line| Columns::named(line.text.trim_start_matches('#').trim()))
-        // Comments also describe formats that need no header, such as COLMAP's, whose images have names.
-        .filter(|columns| !columns.is_name && columns.count == found)
-        .last();
+    let named = comments
+        .filter_map(|line| Some((line, Columns::named(line.text.trim_start_matches('#').trim())?)));
+    let (of_names, others): (Vec<_>, Vec<_>) = named.partition(|(_, columns)| columns.is_name);
+    // Comments also describe formats that need no header, such as COLMAP's, whose images have names.
+    if let Some((line, _)) = of_names.iter().find(|(_, columns)| !columns.are_in_usual_order()) {
+        return Err(line.error(
+            "the columns in the order qw qx qy qz x y z expected, or as a first line without `#` and with poses from \
+             camera to world",
+        ));
+    }
+    let mut others = others.into_iter().map(|(_, columns)| columns);
+    let header = others.rfind(|columns| columns.count == found);
     header.map(|columns| columns.read(file, 0)).transpose()
 }
 
@@ -53,14 +67,23 @@ impl Columns {
         let bare: Vec<String> = columns.iter().map(|column| bare(column)).collect();
         let find =
             |called: &[&str]| bare.iter().position(|column| called.contains(&column.as_str()));
-        let [x, y, z] = ["x", "y", "z"].map(|axis| {
+        let position = ["x", "y", "z"].map(|axis| {
             find(&[axis, &format!("t{axis}"), &format!("p{axis}"), &format!("p_rs_r_{axis}")])
         });
+        let [x, y, z] = position;
         let [qx, qy, qz, qw] = ["x", "y", "z", "w"].map(|part| {
             find(&[&format!("q{part}"), &format!("q_{part}"), &format!("q_rs_{part}")])
         });
         let name = find(NAMES);
         let key = name.or_else(|| find(&["time", "timestamp"]))?;
+        let is_metric = |column: &str| {
+            let unit =
+                column.split_once(['[', '(']).map(|(_, unit)| unit.trim_end_matches([']', ')']));
+            unit.is_none_or(|unit| ["", "m"].contains(&unit.trim()))
+        };
+        let of_positions = position.into_iter().flatten().map(|at| columns[at].as_str());
+        let other_unit = of_positions.clone().find(|column| !is_metric(column)).map(str::to_owned);
+        let is_of_body = of_positions.clone().any(|column| column.starts_with("p_rs_r_"));
         let unit = columns[key].split_once(['[', '(']).and_then(|(_, unit)| {
             TimeUnit::ALL
                 .into_iter()
@@ -74,6 +97,8 @@ impl Columns {
             position: [x?, y?, z?],
             quaternion: [qx?, qy?, qz?, qw?],
             device: find(&["device_id"]),
+            is_of_body,
+            other_unit,
         })
     }
 
@@ -90,7 +115,16 @@ impl Columns {
         }
     }
 
+    /// Whether quaternion and position stand as in the formats that have names and need no header.
+    fn are_in_usual_order(&self) -> bool {
+        let ([x, y, z], [qx, qy, qz, qw]) = (self.position, self.quaternion);
+        [qw, qx, qy, qz, x, y, z].is_sorted()
+    }
+
     fn read<'a>(&self, file: &'a TextFile, header: usize) -> Result<PoseFile<'a>, SceneError> {
+        if let Some(column) = &self.other_unit {
+            return Err(file.error(format!("positions in metres expected, `{column}` found")));
+        }
         let photos = match self.device {
             Some(_) => photos_of_kapture(file)?,
             None => BTreeMap::new(),
@@ -106,7 +140,8 @@ impl Columns {
         if rows.iter().all(|row| row.pose.is_none()) {
             return Err(file.error("poses with finite numbers expected, none found"));
         }
-        PoseFile::of_rows(file, rows, self.unit, self.device.is_some())
+        let read = PoseFile::of_rows(file, rows, self.unit, self.device.is_some())?;
+        Ok(PoseFile { is_of_body: self.is_of_body, ..read })
     }
 
     fn row(

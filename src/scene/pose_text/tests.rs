@@ -150,6 +150,57 @@ fn a_header_names_the_columns() {
 }
 
 #[test]
+fn a_comment_that_contradicts_its_format_is_refused() {
+    let line = "a.jpg 0 1 0 0 4 5 6\n";
+    let hloc = format!("# name qw qx qy qz tx ty tz\n{line}");
+    assert!(said(&hloc).is_ok(), "{:?}", said(&hloc));
+    for (text, words) in [
+        (
+            format!("# name qx qy qz qw tx ty tz\n{line}"),
+            "poses.txt:1: the columns in the order qw qx",
+        ),
+        (
+            format!("# name tx ty tz qw qx qy qz\n{line}"),
+            "poses.txt:1: the columns in the order qw qx",
+        ),
+        ("# time x [mm] y [mm] z [mm] qx qy qz qw\n".to_owned(), "poses expected"),
+        (
+            "time,x [mm],y,z,qx,qy,qz,qw\n1,4,5,6,0,0,0,1\n".to_owned(),
+            "positions in metres expected, `x [mm]`",
+        ),
+        (
+            "#time,x [mm],y,z,qx,qy,qz,qw\n1,4,5,6,0,0,0,1\n".to_owned(),
+            "positions in metres expected, `x [mm]`",
+        ),
+        (
+            "IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID, NAME\n1 1 0 0 0 4 5 6 1 a.jpg\n"
+                .to_owned(),
+            "`#` expected before the header of COLMAP",
+        ),
+    ] {
+        let error = said(&text).expect_err(words);
+        assert!(error.contains(words), "{error}");
+    }
+}
+
+#[test]
+fn the_table_of_a_trajectory_decides_the_order_of_its_columns() {
+    let read = |text: &str| {
+        let poses = by_time(&TextFile::from_text("groundtruth.txt", text));
+        let poses = poses.map_err(|error| error.to_string());
+        poses.map(|poses| poses.iter().map(|(time, at)| (*time, at.rotation.j)).collect::<Vec<_>>())
+    };
+    let usual = "# timestamp tx ty tz qx qy qz qw\n1.5 4 5 6 0 1 0 0\n";
+    let other = "# timestamp tx ty tz qw qx qy qz\n1.5 4 5 6 0 0 1 0\n";
+    let line = "timestamp[ms],tx,ty,tz,qw,qx,qy,qz\n1500,4,5,6,0,0,1,0\n";
+    for text in [usual, other, line, "1.5 4 5 6 0 1 0 0\n"] {
+        assert_eq!(read(text), Ok(vec![(1.5, 1.0)]), "{text}");
+    }
+    let named = read("name x y z qx qy qz qw\na 4 5 6 0 1 0 0\n");
+    assert!(named.is_err_and(|error| error.contains("poses by time expected")));
+}
+
+#[test]
 fn a_lost_camera_costs_its_own_pose_alone() {
     let text = "1 4 5 6 0 0 0 1\n2 nan nan nan nan nan nan nan\n3 7 8 9 0 1 0 0\n";
     assert_eq!(said(text), both(["1", "3"]));

@@ -42,30 +42,60 @@ pub(super) fn first_and_last_motion(track: &Trajectory) -> Option<(f64, f64)> {
     Some((samples[first].0, later(last)?.0))
 }
 
+/// A table whose first line names its columns.
+struct Table<'a> {
+    header: Line<'a>,
+    columns: Vec<&'a str>,
+    rows: Vec<Line<'a>>,
+}
+
+impl<'a> Table<'a> {
+    fn of(file: &'a TextFile) -> Result<Self, SceneError> {
+        let mut rows = file.lines();
+        let header = rows.next();
+        let header = header.ok_or_else(|| file.error("a header expected, the file is empty"))?;
+        Ok(Self { header, columns: header.fields(), rows: rows.collect() })
+    }
+
+    fn column(&self, name: &str) -> Result<usize, SceneError> {
+        let found = self.columns.iter().position(|column| *column == name);
+        found.ok_or_else(|| self.header.error(format!("a column `{name}` expected")))
+    }
+
+    fn places<const N: usize>(&self, names: [&str; N]) -> Result<[usize; N], SceneError> {
+        let mut places = [0; N];
+        for (place, name) in places.iter_mut().zip(names) {
+            *place = self.column(name)?;
+        }
+        Ok(places)
+    }
+
+    /// The fields of each line, as many as the header has.
+    fn rows(&self) -> impl Iterator<Item = Result<(Line<'a>, Vec<&'a str>), SceneError>> {
+        self.rows.iter().map(|line| {
+            let (fields, count) = (line.fields(), self.columns.len());
+            if fields.len() != count {
+                let found = fields.len();
+                return Err(line.error(format!("{count} columns expected, {found} found")));
+            }
+            Ok((*line, fields))
+        })
+    }
+}
+
 /// Reads the good rows of `gps/ins.csv`: the INS in the world frame (north, east, down).
 pub(super) fn read_ins(path: &Path) -> Result<Trajectory, SceneError> {
     let file = TextFile::read(path)?;
-    let mut lines = file.lines();
-    let header = lines.next().ok_or_else(|| file.error("a header expected, the file is empty"))?;
-    let column = |name: &str| {
-        let found = header.words().position(|word| word == name);
-        found.ok_or_else(|| header.error(format!("a column `{name}` expected")))
-    };
-    let time = column("timestamp")?;
-    let status = column("ins_status")?;
-    let mut columns = [0; 6];
-    let names = ["northing", "easting", "down", "roll", "pitch", "yaw"];
-    for (place, name) in columns.iter_mut().zip(names) {
-        *place = column(name)?;
-    }
+    let table = Table::of(&file)?;
+    let [time, status] = table.places(["timestamp", "ins_status"])?;
+    let columns = table.places(["northing", "easting", "down", "roll", "pitch", "yaw"])?;
     let mut samples = Vec::new();
-    for line in lines {
-        let words: Vec<&str> = line.words().collect();
-        if words.get(status) != Some(&GOOD) {
-            continue;
+    for row in table.rows() {
+        let (line, words) = row?;
+        if words[status] == GOOD {
+            let time = microseconds(&line, words[time])?;
+            samples.push((time, transform_at(&line, &words, columns)?));
         }
-        let time = microseconds(&line, word(&line, &words, time)?)?;
-        samples.push((time, transform_at(&line, &words, columns)?));
     }
     Ok(track(samples))
 }
@@ -73,17 +103,20 @@ pub(super) fn read_ins(path: &Path) -> Result<Trajectory, SceneError> {
 /// Reads `vo/vo.csv`: chains the motions of the vehicle from photo to photo.
 pub(super) fn read_odometry(path: &Path) -> Result<Trajectory, SceneError> {
     let file = TextFile::read(path)?;
+    let table = Table::of(&file)?;
+    let times = table.places(["source_timestamp", "destination_timestamp"])?;
+    let columns = table.places(["x", "y", "z", "roll", "pitch", "yaw"])?;
     let mut pose = Pose::identity();
     let mut samples: Vec<(u64, Pose)> = Vec::new();
-    for line in file.lines().skip(1) {
-        let words: Vec<&str> = line.words().collect();
+    for row in table.rows() {
+        let (line, words) = row?;
         // Of the columns source and destination, the motion is from the second to the first.
-        let at = microseconds(&line, word(&line, &words, 0)?)?;
-        let from = microseconds(&line, word(&line, &words, 1)?)?;
+        let at = microseconds(&line, words[times[0]])?;
+        let from = microseconds(&line, words[times[1]])?;
         if samples.is_empty() {
             samples.push((from.min(at), pose));
         }
-        pose *= transform_at(&line, &words, [2, 3, 4, 5, 6, 7])?;
+        pose *= transform_at(&line, &words, columns)?;
         samples.push((at.max(from), pose));
     }
     Ok(track(samples))
@@ -93,16 +126,10 @@ pub(super) fn read_odometry(path: &Path) -> Result<Trajectory, SceneError> {
 fn transform_at(line: &Line<'_>, words: &[&str], at: [usize; 6]) -> Result<Pose, SceneError> {
     let mut numbers = [0.0; 6];
     for (number, column) in numbers.iter_mut().zip(at) {
-        *number = line.number(word(line, words, column)?)?;
+        *number = line.number(words[column])?;
     }
     let [x, y, z, roll, pitch, yaw] = numbers;
     Ok(transform([x, y, z], [roll, pitch, yaw]))
-}
-
-fn word<'a>(line: &Line<'_>, words: &[&'a str], column: usize) -> Result<&'a str, SceneError> {
-    words.get(column).copied().ok_or_else(|| {
-        line.error(format!("{} columns or more expected, {} found", column + 1, words.len()))
-    })
 }
 
 fn microseconds(line: &Line<'_>, word: &str) -> Result<u64, SceneError> {
