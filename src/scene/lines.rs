@@ -206,18 +206,18 @@ pub(super) fn excerpt_of(text: &str, most: usize) -> String {
 
 /// Reads a text, without a byte order mark.
 pub(super) fn read_text(path: &Path) -> Result<String, SceneError> {
-    let bytes = std::fs::read(path).map_err(SceneError::io(path))?;
+    let mut bytes = std::fs::read(path).map_err(SceneError::io(path))?;
     let start = text_start(&bytes).map_err(|expected| SceneError::expected(path, expected))?;
-    let text = std::str::from_utf8(&bytes[start..]).map_err(|error| {
-        let before = &bytes[..start + error.valid_up_to()];
+    bytes.drain(..start);
+    String::from_utf8(bytes).map_err(|error| {
+        let before = &error.as_bytes()[..error.utf8_error().valid_up_to()];
         let line = before.iter().filter(|byte| **byte == b'\n').count() + 1;
         SceneError::line(
             path,
             line,
             "text in UTF-8 expected, other bytes found; save the file as UTF-8",
         )
-    })?;
-    Ok(text.to_owned())
+    })
 }
 
 /// The length of the byte order mark that a text begins with \[bytes\]. The error names UTF-16, which Windows programs

@@ -61,6 +61,9 @@ impl Elements {
     ) -> Result<(), String> {
         let kinds: Vec<&PropertyType> =
             element.properties.values().map(|property| &property.data_type).collect();
+        if let (true, Some(kinds)) = (self.encoding != Encoding::Ascii, scalars(&kinds)) {
+            return self.each_record(element, &kinds, places, take);
+        }
         for index in 0..element.count {
             let read = match self.encoding {
                 Encoding::Ascii => self.text_element(&kinds, places),
@@ -68,6 +71,28 @@ impl Elements {
             };
             let numbers = read.map_err(|why| format!("{} {index}: {why}", element.name))?;
             take(numbers)?;
+        }
+        Ok(())
+    }
+
+    /// The same of binary elements of one size, which are read as a whole.
+    fn each_record(
+        &mut self,
+        element: &ElementDef,
+        kinds: &[&ScalarType],
+        places: [usize; 3],
+        mut take: impl FnMut([f64; 3]) -> Result<(), String>,
+    ) -> Result<(), String> {
+        let start = |at: usize| kinds[..at].iter().map(|kind| bytes_of(kind) as usize).sum();
+        let axes: [Option<(usize, Decode)>; 3] = places
+            .map(|at| Some((start(at.min(kinds.len())), decoder(kinds.get(at)?, self.encoding))));
+        let mut record = vec![0; start(kinds.len())];
+        for index in 0..element.count {
+            self.reader.read_exact(&mut record).map_err(|_| {
+                format!("{} {index}: more bytes expected, the file is cut off", element.name)
+            })?;
+            let number = |(at, decode): (usize, Decode)| decode(&record[at..]);
+            take(axes.map(|axis| axis.map_or(f64::NAN, number)))?;
         }
         Ok(())
     }
@@ -151,23 +176,45 @@ impl Elements {
         let mut bytes = [0; 8];
         let bytes = &mut bytes[..bytes_of(kind) as usize];
         self.reader.read_exact(bytes).map_err(|_| "more bytes expected, the file is cut off")?;
-        // The number is then in the first bytes, the least significant first.
-        if self.encoding == Encoding::BinaryBigEndian {
-            bytes.reverse();
-        }
-        Ok(match *bytes {
-            [a] if *kind == ScalarType::Char => f64::from(i8::from_le_bytes([a])),
-            [a] => f64::from(a),
-            [a, b] if *kind == ScalarType::Short => f64::from(i16::from_le_bytes([a, b])),
-            [a, b] => f64::from(u16::from_le_bytes([a, b])),
-            [a, b, c, d] => match kind {
-                ScalarType::Int => f64::from(i32::from_le_bytes([a, b, c, d])),
-                ScalarType::UInt => f64::from(u32::from_le_bytes([a, b, c, d])),
-                _ => f64::from(f32::from_le_bytes([a, b, c, d])),
-            },
-            [a, b, c, d, e, f, g, h] => f64::from_le_bytes([a, b, c, d, e, f, g, h]),
-            _ => f64::NAN,
-        })
+        Ok(decoder(kind, self.encoding)(bytes))
+    }
+}
+
+/// The kinds of an element's properties, if none is a list.
+fn scalars<'a>(kinds: &[&'a PropertyType]) -> Option<Vec<&'a ScalarType>> {
+    let scalar = |kind: &&'a PropertyType| match kind {
+        PropertyType::Scalar(kind) => Some(kind),
+        PropertyType::List(..) => None,
+    };
+    kinds.iter().map(scalar).collect()
+}
+
+/// What reads the number in the first of some bytes.
+type Decode = fn(&[u8]) -> f64;
+
+fn decoder(kind: &ScalarType, encoding: Encoding) -> Decode {
+    fn first<const N: usize>(bytes: &[u8]) -> [u8; N] {
+        bytes.first_chunk().copied().unwrap_or([0; N])
+    }
+    /// Of both byte orders.
+    macro_rules! decode {
+        ($number:ty) => {{
+            let (little, big): (Decode, Decode) = (
+                |bytes| f64::from(<$number>::from_le_bytes(first(bytes))),
+                |bytes| f64::from(<$number>::from_be_bytes(first(bytes))),
+            );
+            if encoding == Encoding::BinaryBigEndian { big } else { little }
+        }};
+    }
+    match kind {
+        ScalarType::Char => decode!(i8),
+        ScalarType::UChar => decode!(u8),
+        ScalarType::Short => decode!(i16),
+        ScalarType::UShort => decode!(u16),
+        ScalarType::Int => decode!(i32),
+        ScalarType::UInt => decode!(u32),
+        ScalarType::Float => decode!(f32),
+        ScalarType::Double => decode!(f64),
     }
 }
 

@@ -53,7 +53,7 @@ fn points(path: &Path) -> Result<Points, SceneError> {
     let file = TextFile::read(path)?;
     file.expect_order(&["point3d_id", "x", "y", "z", "r"])?;
     for line in file.lines() {
-        let words: Vec<&str> = line.text.split_whitespace().take(4).collect();
+        let words: Vec<&str> = line.text.split_ascii_whitespace().take(4).collect();
         let [id, x, y, z] = words[..] else {
             return Err(line.error("a line `id x y z …` expected, it is cut off"));
         };
@@ -112,11 +112,18 @@ fn pairs_of_lines(file: &TextFile) -> impl Iterator<Item = (Line<'_>, Option<Lin
 
 /// Whether a line is that of an image and not of features, which are triples of numbers.
 fn is_image(text: &str) -> bool {
-    let words: Vec<&str> = text.split_whitespace().collect();
-    let has_name = words.iter().any(|word| word.parse::<f64>().is_err());
-    words.len() >= 10
-        && words[8].parse::<u32>().is_ok()
-        && (has_name || !words.len().is_multiple_of(3))
+    let mut words = text.split_ascii_whitespace();
+    if words.nth(8).is_none_or(|word| word.parse::<u32>().is_err()) {
+        return false;
+    }
+    let count = 9 + words.clone().count();
+    // Features are many, so their bytes are looked at before their numbers. A date has a sign behind a digit.
+    let is_of_number = |byte: &u8| byte.is_ascii_digit() || b" \t.+-eE".contains(byte);
+    let is_in_date = |pair: &[u8]| pair[0].is_ascii_digit() && pair[1] == b'-';
+    let bytes = text.as_bytes();
+    let is_odd = || !bytes.iter().all(is_of_number) || bytes.windows(2).any(is_in_date);
+    let mut has_name = || words.any(|word| word.parse::<f64>().is_err());
+    count >= 10 && (!count.is_multiple_of(3) || (is_odd() && has_name()))
 }
 
 /// How many images a file lists.
@@ -160,7 +167,7 @@ pub(in super::super) fn image_of_line(text: &str) -> Result<ImageLine<'_>, Strin
 
 /// The points of the features; −1 means none.
 fn observed(line: Line<'_>, points: &Points) -> Result<Vec<u32>, SceneError> {
-    let words = line.text.split_whitespace().collect::<Vec<_>>();
+    let words = line.text.split_ascii_whitespace().collect::<Vec<_>>();
     if words.len() % 3 != 0 {
         return Err(
             line.error(format!("features `x y point` expected, {} numbers found", words.len()))
