@@ -130,8 +130,12 @@ impl Axis {
 
     /// A logarithmic axis with ticks at powers of ten.
     pub(crate) fn log(label: impl Into<String>, from: f64, to: f64) -> Self {
+        /// More have no room.
+        const MOST: usize = 12;
+        let [from, to] = [from, to].map(|end| end.clamp(1e-300, 1e300));
         let powers = from.log10().ceil() as i32..=to.log10().floor() as i32;
-        let ticks = powers.map(|power| 10_f64.powi(power));
+        let step = powers.clone().count().div_ceil(MOST).max(1);
+        let ticks = powers.step_by(step).map(|power| 10_f64.powi(power));
         Self {
             ticks: ticks.map(|tick| (tick, format!("{tick}"))).collect(),
             is_log: true,

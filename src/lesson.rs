@@ -14,6 +14,7 @@ use std::ops::Range;
 use std::path::Path;
 
 use include_dir::{Dir, include_dir};
+use posescope_core::files;
 
 pub use file::LessonError;
 pub use moment::{Moment, MomentError, Watch};
@@ -76,9 +77,8 @@ impl Lesson {
     pub fn open(name: &str) -> Result<Self, LessonError> {
         let path = Path::new(name);
         if path.is_file() {
-            let text = std::fs::read_to_string(path).map_err(|error| LessonError::Unreadable {
-                path: path.to_owned(),
-                why: error.to_string(),
+            let text = files::read_text(path, files::DESCRIPTION).map_err(|error| {
+                LessonError::Unreadable { path: path.to_owned(), why: error.to_string() }
             })?;
             return Self::parse(name, &text);
         }

@@ -44,6 +44,8 @@ pub use posescope_core::scene::{
 };
 pub use posescope_street as street;
 
+use posescope_core::image::MAX_PIXELS;
+
 use crate::camera::Intrinsics;
 
 pub use cloud_file::is_decoding;
@@ -127,6 +129,20 @@ fn sound(argument: &str, scene: &dyn Scene) -> Result<(), SceneError> {
     let mut is_warned = false;
     for (frame, name) in frames.iter().enumerate() {
         let Intrinsics { fx, fy, cx, cy, width, height } = scene.intrinsics(frame);
+        let is_placed =
+            scene.pose(frame).is_none_or(|pose| pose.translation.vector.iter().all(lines::is_near));
+        if !is_placed {
+            let farthest = lines::FARTHEST;
+            let expected =
+                format!("a position within {farthest:e} of 0 expected, frame {name} has another");
+            return Err(SceneError::expected(argument, expected));
+        }
+        if u64::from(width) * u64::from(height) > MAX_PIXELS {
+            let expected = format!(
+                "a camera of at most {MAX_PIXELS} pixels expected, frame {name} has {width}x{height}"
+            );
+            return Err(SceneError::expected(argument, expected));
+        }
         let is_inside =
             (0.0..f64::from(width)).contains(&cx) && (0.0..f64::from(height)).contains(&cy);
         if !is_inside && !is_warned {

@@ -3,6 +3,8 @@
 use image::{Rgb, imageops};
 use nalgebra::{Point2, Vector3};
 
+use posescope_core::image::MAX_PIXELS;
+
 use super::picture::dot;
 use crate::geometry::Pose;
 use crate::image::RgbImage;
@@ -37,7 +39,7 @@ pub(super) fn below(picture: Option<RgbImage>, poses: &[Pose]) -> Option<RgbImag
         return picture;
     };
     let (width, top) = picture.as_ref().map_or((WIDTH, 0), RgbImage::dimensions);
-    let height = width / 2;
+    let height = (width / 2).clamp(1, (MAX_PIXELS / u64::from(width.max(1))) as u32);
     let mut canvas = RgbImage::from_pixel(width, top + height, Rgb([255; 3]));
     if let Some(picture) = &picture {
         imageops::replace(&mut canvas, picture, 0, 0);

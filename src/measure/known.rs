@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use posescope_core::files;
+
 use crate::diagnosis::Code;
 use crate::localize::QueryResult;
 use crate::method::Method;
@@ -55,7 +57,7 @@ impl KnownFailures {
     /// # Errors
     /// A file that cannot be read, or a malformed line.
     pub fn read(path: &Path) -> Result<Self, FolderError> {
-        let text = std::fs::read_to_string(path).map_err(FolderError::io(path))?;
+        let text = files::read_text(path, files::DESCRIPTION).map_err(FolderError::io(path))?;
         let mut lines = Vec::new();
         for (index, line) in text.lines().enumerate() {
             let words: Vec<&str> =

@@ -2,7 +2,6 @@
 //! both are derived from `run.toml` and `results.jsonl`.
 
 use std::collections::BTreeSet;
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
@@ -19,7 +18,7 @@ use crate::diagnosis::Code;
 use crate::localize::QueryResult;
 use crate::run::{FolderError, RunFile};
 use crate::table::Table;
-use posescope_core::files::write_whole;
+use posescope_core::files::{self, write_whole};
 use posescope_core::text::json_message;
 
 /// The version of `summary.json`.
@@ -129,7 +128,7 @@ impl StoredSummary {
     /// A summary that cannot be read.
     pub fn read(folder: &Path) -> Result<Self, FolderError> {
         let path = folder.join(SUMMARY);
-        let text = match fs::read_to_string(&path) {
+        let text = match files::read_text(&path, files::DESCRIPTION) {
             Ok(text) => text,
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
                 return Ok(Self::default());

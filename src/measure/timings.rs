@@ -1,7 +1,8 @@
 //! The times of results: `timings.jsonl`, which corresponds to them line by line.
 
-use std::fs;
 use std::path::Path;
+
+use posescope_core::files;
 
 use super::metrics::{Group, Measures, median};
 use crate::localize::QueryResult;
@@ -13,7 +14,7 @@ use crate::run::FolderError;
 /// A file that cannot be read.
 pub fn read(folder: &Path, results: &[QueryResult]) -> Result<Vec<Option<f64>>, FolderError> {
     let path = folder.join("timings.jsonl");
-    let text = match fs::read_to_string(&path) {
+    let text = match files::read_text(&path, files::TEXT) {
         Ok(text) => text,
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => String::new(),
         Err(error) => return Err(FolderError::io(path)(error)),

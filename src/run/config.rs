@@ -3,6 +3,8 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
+use posescope_core::files;
+
 use crate::describe::ParamError;
 use crate::params::Params;
 
@@ -43,7 +45,7 @@ pub fn with_config(
     if let Some(path) = file {
         let text = match path.to_str() {
             Some("paper") => include_str!("../../assets/paper.toml").to_owned(),
-            _ => std::fs::read_to_string(path)
+            _ => files::read_text(path, files::DESCRIPTION)
                 .map_err(|source| ConfigError::Io { path: path.to_owned(), source })?,
         };
         params

@@ -1,10 +1,11 @@
 //! Hashes of a run's input files besides its scenes: a resumed run must read the same content.
 
 use std::collections::BTreeMap;
-use std::fs::{self, File};
+use std::fs;
 use std::io::{self, Read as _};
 use std::path::{Path, PathBuf};
 
+use posescope_core::files as door;
 use xxhash_rust::xxh3::Xxh3;
 
 use super::protocol::Protocol;
@@ -50,7 +51,7 @@ fn files(path: &Path) -> io::Result<Vec<PathBuf>> {
 }
 
 fn add(sum: &mut Xxh3, file: &Path) -> io::Result<()> {
-    let mut file = File::open(file)?;
+    let mut file = door::open(file)?;
     let mut buffer = vec![0; 1 << 16];
     loop {
         match file.read(&mut buffer)? {

@@ -10,11 +10,11 @@ mod pcd;
 mod ply;
 mod text;
 
-use std::fs::File;
 use std::io::{BufReader, Read as _};
 use std::path::Path;
 
 use nalgebra::{Point3, Vector3};
+use posescope_core::files;
 
 pub(super) use collector::Note;
 pub use decoding::is_decoding;
@@ -68,7 +68,7 @@ impl MapCloud {
 pub(super) fn read(path: &Path) -> Result<MapCloud, SceneError> {
     let io = SceneError::io(path);
     let mut start = Vec::new();
-    let file = File::open(path).map_err(io)?;
+    let file = files::open(path).map_err(io)?;
     let size = file.metadata().map_err(io)?.len();
     BufReader::new(file).take(4096).read_to_end(&mut start).map_err(io)?;
     let read = if start.starts_with(b"ply\n") || start.starts_with(b"ply\r") {

@@ -111,12 +111,7 @@ pub(super) fn step((width, height): (u32, u32)) -> u32 {
 type DepthImage = image::ImageBuffer<image::Luma<u16>, Vec<u16>>;
 
 fn read_depth(path: &Path) -> Result<DepthImage, SceneError> {
-    let image = image::ImageReader::open(path)
-        .and_then(image::ImageReader::with_guessed_format)
-        .map_err(SceneError::io(path))?
-        .decode()
-        .map_err(SceneError::image(path))?;
-    match image {
+    match photo_file::decode_any(path)? {
         DynamicImage::ImageLuma16(depth) => Ok(depth),
         other => Err(SceneError::expected(
             path,

@@ -31,7 +31,7 @@ use self::correction::{Turn, Units, axes};
 use self::poses::{DescribedPoses, FramePoses};
 use super::cloud_file::{self, MapCloud, Note};
 use super::file_scene::{Clouds, Develop, FileScene, Frame};
-use super::folder::{folder_name, stem, warn_without_poses, within};
+use super::folder::{Bounds, folder_name, stem, warn_without_poses, within};
 use super::frame_names::names_of;
 use super::lens::{Distortion, developed_camera, pinhole};
 use super::map_blocks::MapBlocks;
@@ -163,6 +163,7 @@ struct Source {
 
 impl Source {
     fn read(path: &Path) -> Result<Self, SceneError> {
+        Bounds::Layout.check(path)?;
         Ok(Self { path: path.to_owned(), text: lines::read_text(path)? })
     }
 
@@ -185,7 +186,7 @@ impl Source {
         SceneError::line(
             &self.path,
             before.iter().filter(|byte| **byte == b'\n').count() + 1,
-            expected.replace('\n', " "),
+            lines::excerpt_of(&expected.replace('\n', " "), 400),
         )
     }
 
@@ -210,6 +211,7 @@ impl Source {
             let expected = format!("an existing file expected, `{}` found", path.display());
             return Err(self.error(name, &expected));
         }
+        Bounds::Folder(self.folder().to_owned()).check(&path)?;
         Ok(path)
     }
 
@@ -308,7 +310,8 @@ fn open(path: &Path) -> Result<Box<dyn Scene>, SceneError> {
             ..Frame::new(photo, intrinsics)
         })
         .collect();
-    Ok(Box::new(FileScene::new(name, frames, clouds)))
+    let bounds = Bounds::Folder(source.folder().to_owned());
+    Ok(Box::new(FileScene::new(name, frames, clouds).within(bounds)))
 }
 
 /// The camera of the undistorted photos, whose files are turned as said.

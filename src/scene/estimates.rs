@@ -5,11 +5,12 @@ use std::path::Path;
 use posescope_core::foreign::Estimates;
 
 use super::frame_names::FrameNames;
-use super::lines::TextFile;
+use super::lines::{FARTHEST, TextFile, is_near};
 use super::pose_text::{NamedPose, PoseFile, PoseLines, PoseText, TimedPoses, line_of};
 use super::time_unit::{TimeUnit, time_of_name};
 use super::trajectory::{SAME_MOMENT_S, associated};
 use super::{Scene, SceneError};
+use crate::geometry::Pose;
 
 /// Reads the poses of a scene's frames, `world_from_camera`. Poses of unknown frames are skipped, as long as some
 /// are of known frames.
@@ -18,7 +19,7 @@ use super::{Scene, SceneError};
 /// A file that cannot be read, has another format, has a frame twice, or has no frame of the scene.
 pub fn read_estimates(path: &Path, scene: &dyn Scene) -> Result<Estimates, SceneError> {
     let in_folder = path.join("images.txt");
-    let file = TextFile::read(if path.is_dir() { &in_folder } else { path })?;
+    let file = if path.is_dir() { TextFile::read(&in_folder)? } else { TextFile::named(path)? };
     let names = FrameNames::new(scene);
     let PoseFile { poses, is_of_body, .. } = PoseFile::read(&file, &names)?;
     if is_of_body {
@@ -28,10 +29,18 @@ pub fn read_estimates(path: &Path, scene: &dyn Scene) -> Result<Estimates, Scene
             file.name()
         );
     }
-    match poses {
+    let estimates = match poses {
         PoseText::Timed(poses) => by_time(&file, poses, scene),
         PoseText::Lines(poses) => by_line(&file, &poses, scene),
         PoseText::Named(poses) => by_name(&file, &poses, scene, &names),
+    }?;
+    // Poses of matrices have no check of their own.
+    let is_near = |pose: &Pose| pose.translation.vector.iter().all(is_near);
+    match estimates.iter().find(|(_, pose)| !is_near(pose)) {
+        Some((name, _)) => Err(file.error(format!(
+            "a position within {FARTHEST:e} of 0 expected, that of {name} is another"
+        ))),
+        None => Ok(estimates),
     }
 }
 

@@ -1,11 +1,11 @@
 //! The EXIF data of a photo: focal length and orientation.
 
-use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
 
 use exif::{In, Tag, Value};
 use image::metadata::Orientation;
+use posescope_core::files;
 
 /// The diagonal of 35 mm film, to which the equivalent focal length refers (CIPA DCG-001) \[mm\].
 const FILM_DIAGONAL_MM: f64 = 43.266_615;
@@ -15,7 +15,7 @@ pub(super) struct Exif(Option<exif::Exif>);
 
 impl Exif {
     pub fn read(path: &Path) -> Self {
-        let file = File::open(path).ok();
+        let file = files::open(path).ok();
         let read = |file| exif::Reader::new().read_from_container(&mut BufReader::new(file));
         Self(file.and_then(|file| read(file).ok()))
     }

@@ -6,7 +6,7 @@ use std::sync::{Arc, Once, OnceLock};
 use image::metadata::Orientation;
 use image::{DynamicImage, GenericImageView as _};
 
-use super::folder::stem;
+use super::folder::{Bounds, stem};
 use super::photo_file::GrayRange;
 use super::{CloudFacts, Lengths, PixelMap, Scene, SceneError, photo_file};
 use crate::camera::Intrinsics;
@@ -124,6 +124,8 @@ pub(super) struct FileScene<C> {
     gray_range: OnceLock<GrayRange>,
     /// Whether an EXIF orientation was looked for that the size of the camera does not decide.
     is_warned: Once,
+    /// Where photos and clouds may lie.
+    bounds: Bounds,
 }
 
 impl<C: Clouds> FileScene<C> {
@@ -136,12 +138,19 @@ impl<C: Clouds> FileScene<C> {
             clouds,
             gray_range: OnceLock::new(),
             is_warned: Once::new(),
+            bounds: Bounds::Layout,
         }
+    }
+
+    /// The scene with other bounds than those of a data set's layout.
+    pub fn within(self, bounds: Bounds) -> Self {
+        Self { bounds, ..self }
     }
 
     /// The image in a file, turned to the size that its camera has.
     fn image(&self, frame: &Frame, size: (u32, u32)) -> Result<DynamicImage, SceneError> {
         let path = &frame.photo;
+        self.bounds.check(path)?;
         let mut image = photo_file::decode(path)?;
         let stored = image.dimensions();
         let turned = match frame.turned {
@@ -246,6 +255,7 @@ impl<C: Clouds> Scene for FileScene<C> {
                 hint: missing.unwrap_or_else(|| self.frames_with_cloud()),
             });
         }
+        self.bounds.check(self.clouds.place(frame, &self.frames[frame]))?;
         self.clouds.read(frame, &self.frames[frame])
     }
 

@@ -59,6 +59,42 @@ pub(super) fn within(folder: &Path, name: &str) -> Result<PathBuf, String> {
     Ok(folder.join(name))
 }
 
+/// Where the files of a scene may lie by their real paths.
+#[derive(Clone, Debug)]
+pub(super) enum Bounds {
+    /// Anywhere: somebody named each of them.
+    Anywhere,
+    /// In this folder, which has a file that names them.
+    Folder(PathBuf),
+    /// In the folder that the layout of a data set has them in, or in the one above it. These folders may be links.
+    Layout,
+}
+
+impl Bounds {
+    /// Refuses a file that a link leads out of these bounds.
+    pub fn check(&self, path: &Path) -> Result<(), SceneError> {
+        let folders = match self {
+            Self::Anywhere => return Ok(()),
+            Self::Folder(folder) => vec![Some(folder.as_path())],
+            Self::Layout if !path.is_symlink() => return Ok(()),
+            Self::Layout => path.ancestors().skip(1).take(2).map(Some).collect(),
+        };
+        // Reading says why a file is not there.
+        let Ok(real) = path.canonicalize() else { return Ok(()) };
+        let here = |folder: &Path| {
+            if folder.as_os_str().is_empty() { Path::new(".") } else { folder }.canonicalize()
+        };
+        let holds = |folder: &Path| here(folder).is_ok_and(|folder| real.starts_with(folder));
+        if folders.into_iter().flatten().any(holds) {
+            return Ok(());
+        }
+        Err(SceneError::expected(
+            path,
+            "a file inside the scene's folder expected, a link to one outside found; copy the file",
+        ))
+    }
+}
+
 /// Warns that a scene has only queries because the file of its poses is missing.
 pub(super) fn warn_without_poses(place: &Path, missing: &str) {
     log::warn!(

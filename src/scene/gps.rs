@@ -34,7 +34,7 @@ pub fn located(
     references: &dyn Scene,
     path: &Path,
 ) -> Result<Arc<dyn Scene>, SceneError> {
-    let file = TextFile::read(path)?;
+    let file = TextFile::named(path)?;
     let (is_geographic, rows) = read_rows(&file)?;
     let scenes = [queries.as_ref(), references];
     let world = is_geographic.then(|| Tie::fit(&file, &rows, scenes)).transpose()?;

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use nalgebra::{Matrix3, Matrix3x4, Point3, Translation3, UnitQuaternion, Vector3};
+use posescope_core::files;
 
 use super::file_scene::{Clouds, Frame};
 use super::lens::pinhole;
@@ -131,7 +132,7 @@ fn read_scan(
     into_camera: impl Fn(Point3<f64>) -> Point3<f64>,
 ) -> Result<Cloud, SceneError> {
     const BYTES_PER_POINT: usize = 16;
-    let bytes = std::fs::read(path).map_err(SceneError::io(path))?;
+    let bytes = files::read(path, files::TEXT).map_err(SceneError::io(path))?;
     let content = |expected: String| SceneError::expected(path, expected);
     if bytes.is_empty() {
         return Err(content("points expected, the scan is empty".to_owned()));

@@ -4,7 +4,10 @@ use std::path::{Path, PathBuf};
 
 use nalgebra::{Quaternion, Translation3, UnitQuaternion};
 
+use posescope_core::files;
+
 use super::SceneError;
+use super::folder::Bounds;
 use crate::geometry::Pose;
 
 pub(super) struct TextFile {
@@ -23,7 +26,14 @@ pub(super) struct Line<'a> {
 }
 
 impl TextFile {
+    /// Reads a file of a scene. A link must not lead out of it: errors show words of the file.
     pub fn read(path: &Path) -> Result<Self, SceneError> {
+        Bounds::Layout.check(path)?;
+        Self::named(path)
+    }
+
+    /// Reads a file that somebody named.
+    pub fn named(path: &Path) -> Result<Self, SceneError> {
         Ok(Self { path: path.to_owned(), text: read_text(path)? })
     }
 
@@ -131,16 +141,27 @@ pub(super) fn pose(position: [f64; 3], quaternion: [f64; 4]) -> Result<Pose, Str
     let [x, y, z, w] = quaternion;
     let quaternion = Quaternion::new(w, x, y, z);
     let length = quaternion.norm();
-    // Rounding changes the length slightly; more means another convention.
     if !position.iter().all(|part| part.is_finite()) {
         return Err(format!("a finite position expected, {position:?} found"));
     }
+    if !position.iter().all(is_near) {
+        return Err(format!("a position within {FARTHEST:e} of 0 expected, {position:?} found"));
+    }
+    // Rounding changes the length slightly; more means another convention.
     if !length.is_finite() || (length - 1.0).abs() > 0.02 {
         return Err(format!(
             "a quaternion of length 1 expected, {x} {y} {z} {w} (x y z w) has length {length:.3}"
         ));
     }
     Ok(Pose::from_parts(Translation3::from(position), UnitQuaternion::from_quaternion(quaternion)))
+}
+
+/// The largest coordinate \[m\]: of anything on Earth, in millimetres too, and what is computed of it stays finite.
+pub(super) const FARTHEST: f64 = 1e12;
+
+/// Whether a coordinate is no larger than [`FARTHEST`].
+pub(super) fn is_near(coordinate: &f64) -> bool {
+    coordinate.abs() <= FARTHEST
 }
 
 /// What a header calls the column of the frames' names.
@@ -187,7 +208,7 @@ fn number(word: &str) -> Result<f64, String> {
     let number: f64 =
         word.parse().map_err(|_| format!("a number expected, `{}` found", excerpt(word)))?;
     if !number.is_finite() {
-        return Err(format!("finite numbers expected, `{word}` found"));
+        return Err(format!("finite numbers expected, `{}` found", excerpt(word)));
     }
     Ok(number)
 }
@@ -206,7 +227,7 @@ pub(super) fn excerpt_of(text: &str, most: usize) -> String {
 
 /// Reads a text, without a byte order mark.
 pub(super) fn read_text(path: &Path) -> Result<String, SceneError> {
-    let mut bytes = std::fs::read(path).map_err(SceneError::io(path))?;
+    let mut bytes = files::read(path, files::TEXT).map_err(SceneError::io(path))?;
     let start = text_start(&bytes).map_err(|expected| SceneError::expected(path, expected))?;
     bytes.drain(..start);
     String::from_utf8(bytes).map_err(|error| {

@@ -13,7 +13,7 @@ pub use camera::CameraArgument;
 
 use super::exif::Exif;
 use super::file_scene::{Clouds, FileScene, Frame};
-use super::folder::stem;
+use super::folder::{Bounds, stem};
 use super::lens::{developed_camera, pinhole};
 use super::{Lengths, Scene, SceneError, photo_file};
 use crate::camera::Intrinsics;
@@ -68,7 +68,7 @@ impl LoosePhotos {
         let frames = self.paths.iter().map(|path| self.frame(path, references));
         let frames = frames.collect::<Result<Vec<_>, _>>()?;
         let name = Self::NAME.to_owned();
-        let scene = FileScene::new(name, frames, NoClouds);
+        let scene = FileScene::new(name, frames, NoClouds).within(Bounds::Anywhere);
         super::sound(Self::NAME, &scene)?;
         Ok(Arc::new(scene))
     }

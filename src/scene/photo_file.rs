@@ -7,7 +7,9 @@ use std::io::{BufRead as _, BufReader};
 use std::path::{Path, PathBuf};
 
 use image::metadata::Orientation;
-use image::{DynamicImage, ImageReader};
+use image::{DynamicImage, ImageDecoder as _, ImageReader};
+use posescope_core::files;
+use posescope_core::image::MAX_PIXELS;
 
 pub(super) use self::gray_range::{GrayRange, photo};
 use super::SceneError;
@@ -18,7 +20,8 @@ const SAMPLE: usize = 9;
 
 /// The size of an image \[px\], from its header alone.
 pub(super) fn dimensions(path: &Path) -> Result<(u32, u32), SceneError> {
-    reader(path)?.into_dimensions().map_err(SceneError::image(path))
+    let size = reader(path)?.into_dimensions().map_err(SceneError::image(path))?;
+    expect_few_pixels(path, size)
 }
 
 /// The size that most of some photos have, and the first photo of this size. A few others may be broken.
@@ -40,9 +43,34 @@ pub(super) fn is_image(path: &Path) -> bool {
     reader(path).is_ok()
 }
 
-/// Decodes an image.
+/// Refuses an image that would take more memory than any photo: a small file may have a billion pixels.
+fn expect_few_pixels(path: &Path, (width, height): (u32, u32)) -> Result<(u32, u32), SceneError> {
+    if u64::from(width) * u64::from(height) <= MAX_PIXELS {
+        return Ok((width, height));
+    }
+    let expected = format!(
+        "a photo of at most {MAX_PIXELS} pixels expected, {width}x{height} found; scale the photos and their camera"
+    );
+    Err(SceneError::expected(path, expected))
+}
+
+/// Decodes an image with values of any kind.
+pub(super) fn decode_any(path: &Path) -> Result<DynamicImage, SceneError> {
+    let error = SceneError::image(path);
+    let decoder = reader(path)?.into_decoder().map_err(error)?;
+    expect_few_pixels(path, decoder.dimensions())?;
+    // Eight bytes for each pixel: four values of 16 bits.
+    if decoder.total_bytes() > 8 * MAX_PIXELS {
+        let expected =
+            format!("an image of at most {} bytes expected when decoded", 8 * MAX_PIXELS);
+        return Err(SceneError::expected(path, expected));
+    }
+    DynamicImage::from_decoder(decoder).map_err(SceneError::image(path))
+}
+
+/// Decodes a photo.
 pub(super) fn decode(path: &Path) -> Result<DynamicImage, SceneError> {
-    let image = reader(path)?.decode().map_err(SceneError::image(path))?;
+    let image = decode_any(path)?;
     if matches!(image, DynamicImage::ImageRgb32F(_) | DynamicImage::ImageRgba32F(_)) {
         let expected = "a photo with values of 8 or 16 bits expected, floating-point values found; \
                         convert it, for example by `magick a.tif -depth 16 a.png`";
@@ -53,7 +81,7 @@ pub(super) fn decode(path: &Path) -> Result<DynamicImage, SceneError> {
 
 fn reader(path: &Path) -> Result<ImageReader<BufReader<File>>, SceneError> {
     let io = SceneError::io(path);
-    let mut file = BufReader::new(File::open(path).map_err(io)?);
+    let mut file = BufReader::new(files::open(path).map_err(io)?);
     if let Some((format, command)) = unread_format(file.fill_buf().map_err(io)?) {
         let expected = format!(
             "a photo in PNG, JPEG, TIFF or WebP format expected, {format} found; convert it, for example by `{command}`"

@@ -11,7 +11,7 @@ use nalgebra::{Matrix3x4, Point2, Point3, Translation3, UnitQuaternion, Vector3}
 use serde::Deserialize;
 
 use super::file_scene::{Clouds, Develop, FileScene, Frame};
-use super::folder::{folder_name, within};
+use super::folder::{Bounds, folder_name, within};
 use super::frame_names::names_of;
 use super::lens::{Distortion, developed_camera, pinhole};
 use super::map_blocks::MapBlocks;
@@ -187,6 +187,7 @@ fn pose(rows: &[Vec<f64>]) -> Result<Pose, String> {
 }
 
 fn open(path: &Path) -> Result<Box<dyn Scene>, SceneError> {
+    Bounds::Layout.check(path)?;
     let content: Content = serde_json::from_str(&lines::read_text(path)?)
         .map_err(|error| SceneError::line(path, error.line().max(1), error.to_string()))?;
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
@@ -248,7 +249,8 @@ fn open(path: &Path) -> Result<Box<dyn Scene>, SceneError> {
         depths,
     };
     let name = format!("transforms/{}", folder_name(folder));
-    Ok(Box::new(FileScene::new(name, frames, clouds)))
+    let bounds = Bounds::Folder(folder.to_owned());
+    Ok(Box::new(FileScene::new(name, frames, clouds).within(bounds)))
 }
 
 /// A photo, whose name in the file may have no extension.

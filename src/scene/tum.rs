@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 
 use super::depth_image::{DepthImages, unit_m};
 use super::file_scene::{FileScene, Frame};
-use super::folder::{folder_name, warn_without_poses, within};
+use super::folder::{Bounds, folder_name, warn_without_poses, within};
 use super::lens::pinhole;
 use super::lines::TextFile;
 use super::pose_text::by_time;
@@ -82,7 +82,8 @@ fn open(folder: &Path) -> Result<Box<dyn Scene>, SceneError> {
         beside: None,
         unit_m: unit_m(folder, UNIT_M)?,
     };
-    Ok(Box::new(FileScene::new(name, frames, clouds)))
+    let bounds = Bounds::Folder(folder.to_owned());
+    Ok(Box::new(FileScene::new(name, frames, clouds).within(bounds)))
 }
 
 /// The images of a list in the order of their times \[s\].

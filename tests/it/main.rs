@@ -58,6 +58,8 @@ mod small_sequence;
 mod space;
 mod stored;
 mod storyboard;
+#[cfg(unix)]
+mod strangers;
 mod sweep;
 mod synth;
 mod text_clouds;

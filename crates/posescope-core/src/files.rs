@@ -1,12 +1,161 @@
 //! For posescope's own crates: may change in any version.
 //!
-//! Writing files that are whole or not there.
+//! Reading files that have an end, and writing files that are whole or not there.
 
-use std::fs::File;
-use std::io::{self, Write as _};
+use std::ffi::OsStr;
+use std::fs::{self, File, FileType};
+use std::io::{self, BufRead as _, BufReader, Read as _, Write as _};
 use std::path::Path;
 
-/// Writes a file under a temporary name beside it, which begins with `tmp-` and ends with the same
+/// The most of a description that a person or a program of ours wrote \[bytes\]: `run.toml`, a list, parameters.
+pub const DESCRIPTION: u64 = 64 << 20;
+/// The most of a text with numbers of all frames \[bytes\].
+pub const TEXT: u64 = 1 << 30;
+/// The longest line of a file that is read line by line \[bytes\].
+pub const LINE: u64 = 16 << 20;
+
+/// What the names of temporary files begin with.
+const TEMPORARY: &str = "tmp-posescope-";
+
+/// Opens a file to read it. What is no file is refused: a pipe has nothing to read until somebody writes, and a device
+/// may have no end.
+///
+/// # Errors
+/// The error of the system, or that the path is no file.
+pub fn open(path: &Path) -> io::Result<File> {
+    let found = fs::metadata(path)?.file_type();
+    if !found.is_file() {
+        return Err(io::Error::other(format!("a file expected, {} found", kind(found))));
+    }
+    File::open(path)
+}
+
+/// What a path is that is no file.
+fn kind(found: FileType) -> &'static str {
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::FileTypeExt as _;
+        if found.is_fifo() {
+            return "a named pipe";
+        }
+        if found.is_char_device() || found.is_block_device() {
+            return "a device";
+        }
+        if found.is_socket() {
+            return "a socket";
+        }
+    }
+    if found.is_dir() {
+        "a folder"
+    } else if found.is_symlink() {
+        "a link"
+    } else {
+        "something else"
+    }
+}
+
+/// Refuses a path that is there and is no file of its own: the files of a run are never links, whose target a run would
+/// change or show.
+///
+/// # Errors
+/// The error of the system, or that the path is no file.
+pub fn expect_no_link(path: &Path) -> io::Result<()> {
+    match fs::symlink_metadata(path) {
+        Ok(found) if found.is_file() => Ok(()),
+        Ok(found) => {
+            Err(io::Error::other(format!("a file expected, {} found", kind(found.file_type()))))
+        }
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
+        Err(error) => Err(error),
+    }
+}
+
+/// Reads a file of at most so many bytes.
+///
+/// # Errors
+/// The error of the system, or that the path is no file, or that it is larger.
+pub fn read(path: &Path, most: u64) -> io::Result<Vec<u8>> {
+    let file = open(path)?;
+    let too_large = || io::Error::other(format!("a file of at most {most} bytes expected"));
+    let size = file.metadata()?.len();
+    if size > most {
+        return Err(too_large());
+    }
+    let mut bytes = Vec::with_capacity(size as usize + 1);
+    // The size that is announced may be wrong.
+    file.take(most + 1).read_to_end(&mut bytes)?;
+    if bytes.len() as u64 > most { Err(too_large()) } else { Ok(bytes) }
+}
+
+/// Reads a text of at most so many bytes.
+///
+/// # Errors
+/// Those of [`read`], or that the file is no text.
+pub fn read_text(path: &Path, most: u64) -> io::Result<String> {
+    let no_text = |_| io::Error::new(io::ErrorKind::InvalidData, "text in UTF-8 expected");
+    String::from_utf8(read(path, most)?).map_err(no_text)
+}
+
+/// The lines of a file without their ends, each of at most [`LINE`] bytes.
+///
+/// # Errors
+/// The error of the system, or that the path is no file.
+pub fn lines(path: &Path) -> io::Result<impl Iterator<Item = io::Result<String>> + use<>> {
+    let mut reader = BufReader::new(open(path)?);
+    Ok(std::iter::from_fn(move || {
+        let mut line = Vec::new();
+        match next_line(&mut reader, &mut line) {
+            Ok(0) => None,
+            Ok(_) => {
+                if line.last() == Some(&b'\n') {
+                    line.pop();
+                }
+                if line.last() == Some(&b'\r') {
+                    line.pop();
+                }
+                let no_text =
+                    |_| io::Error::new(io::ErrorKind::InvalidData, "text in UTF-8 expected");
+                Some(String::from_utf8(line).map_err(no_text))
+            }
+            Err(error) => Some(Err(error)),
+        }
+    }))
+}
+
+/// Appends the next line with its end, and returns its length, 0 at the end of the file.
+///
+/// # Errors
+/// The error of the system, or a line of more than [`LINE`] bytes.
+pub fn next_line(reader: &mut impl io::BufRead, line: &mut Vec<u8>) -> io::Result<usize> {
+    let read = reader.by_ref().take(LINE + 1).read_until(b'\n', line)?;
+    if read as u64 > LINE {
+        return Err(io::Error::other(format!("lines of at most {LINE} bytes expected")));
+    }
+    Ok(read)
+}
+
+/// Whether a file has the name of a temporary file of ours.
+pub fn is_temporary(name: &OsStr) -> bool {
+    name.as_encoded_bytes().starts_with(TEMPORARY.as_bytes())
+}
+
+/// A file's name made from the name of something: letters, digits and `-_.`, at most 100 characters and 200 bytes.
+pub fn file_name(name: &str) -> String {
+    const BYTES: usize = 200;
+    let is_plain = |c: char| c.is_alphanumeric() || "-_.".contains(c);
+    let mut bytes = 0;
+    let plain = name.chars().map(|c| if is_plain(c) { c } else { '-' });
+    let fits = |c: &char| {
+        bytes += c.len_utf8();
+        bytes <= BYTES
+    };
+    plain.take(LONGEST_NAME).take_while(fits).collect()
+}
+
+/// The longest name that is made for a file, without what is appended to it \[characters\].
+const LONGEST_NAME: usize = 100;
+
+/// Writes a file under a temporary name beside it, which begins with `tmp-posescope-` and ends with the same
 /// extension, and gives it its name when it is complete: no reader sees half of it, and a full disk
 /// leaves nothing.
 ///
@@ -24,19 +173,29 @@ pub fn write_whole_with(
     path: &Path,
     write: impl FnOnce(&mut File) -> io::Result<()>,
 ) -> io::Result<()> {
+    replaced_with(path, write).map(drop)
+}
+
+/// Writes a file as [`write_whole`] does, and returns it, open at its end.
+///
+/// # Errors
+/// The error of the system or of `write`.
+pub fn replaced_with(
+    path: &Path,
+    write: impl FnOnce(&mut File) -> io::Result<()>,
+) -> io::Result<File> {
     let suffix = path
         .extension()
         .map(|extension| format!(".{}", extension.to_string_lossy()))
         .unwrap_or_default();
     let mut builder = tempfile::Builder::new();
-    builder.prefix("tmp-").suffix(&suffix);
+    builder.prefix(TEMPORARY).suffix(&suffix);
     // Not private to the user, as temporary files are, but what the umask says.
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
     let mut file = builder.tempfile_in(folder_of(path))?;
     write(file.as_file_mut())?;
-    file.persist(path).map(drop::<File>)?;
-    Ok(())
+    Ok(file.persist(path)?)
 }
 
 /// The folder that a file is in.
@@ -51,6 +210,42 @@ pub(crate) fn folder_of(path: &Path) -> &Path {
 mod tests {
     use super::*;
     use std::fs;
+
+    #[test]
+    fn what_has_no_end_or_is_too_large_is_refused() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let said = |read: io::Result<Vec<u8>>| read.map_err(|error| error.to_string());
+        let no_file = "a file expected, a folder found".to_owned();
+        assert_eq!(said(read(folder.path(), 9)), Err(no_file));
+        if cfg!(target_os = "linux") {
+            let no_file = "a file expected, a device found".to_owned();
+            assert_eq!(said(read(Path::new("/dev/zero"), 9)), Err(no_file));
+        }
+        let path = folder.path().join("a.txt");
+        fs::write(&path, "one\r\ntwo\n\nthree").expect("writable");
+        assert_eq!(read(&path, 15).expect("small enough").len(), 15);
+        let too_large = "a file of at most 14 bytes expected".to_owned();
+        assert_eq!(said(read(&path, 14)), Err(too_large));
+        let lines: Vec<String> = lines(&path).expect("a file").flatten().collect();
+        assert_eq!(lines, ["one", "two", "", "three"]);
+        assert!(expect_no_link(&path).is_ok() && expect_no_link(&folder.path().join("b")).is_ok());
+        assert!(expect_no_link(folder.path()).is_err());
+    }
+
+    #[test]
+    fn a_name_of_anything_is_a_name_of_a_file() {
+        for (name, expected) in [
+            ("cam0/000003", "cam0-000003"),
+            ("000070", "000070"),
+            ("a b\n\u{1b}", "a-b--"),
+            ("Zürich_1.x", "Zürich_1.x"),
+        ] {
+            assert_eq!(file_name(name), expected);
+        }
+        assert_eq!(file_name(&"x".repeat(300)).len(), 100);
+        assert_eq!(file_name(&"東".repeat(300)), "東".repeat(66));
+        assert!(is_temporary(OsStr::new("tmp-posescope-a")) && !is_temporary(OsStr::new("tmp-a")));
+    }
 
     #[test]
     fn a_file_is_replaced_and_nothing_else_stays_behind() {

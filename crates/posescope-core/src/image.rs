@@ -2,16 +2,23 @@
 
 mod degrade;
 
+use std::io::BufReader;
 use std::ops::Range;
 use std::path::Path;
 
 #[doc(hidden)]
 pub use degrade::{Degradation, DegradationError};
+use image::error::{LimitError, LimitErrorKind};
 pub use image::{GrayImage, RgbImage};
-use image::{ImageBuffer, Luma};
+use image::{ImageBuffer, ImageDecoder as _, Luma};
 use rayon::prelude::*;
 
+use crate::files;
 use crate::input::InputError;
+
+/// The most pixels of a photo that is read from a file: 8,192 × 8,192.
+#[doc(hidden)]
+pub const MAX_PIXELS: u64 = 1 << 26;
 
 /// A grey image of real values in 0 … 255.
 pub type FloatImage = ImageBuffer<Luma<f32>, Vec<f32>>;
@@ -55,9 +62,16 @@ impl Photo {
     /// Reads an image file of any supported format; the content decides, not the file's name.
     ///
     /// # Errors
-    /// When the file cannot be read or is not an image.
+    /// When the file cannot be read, is not an image, or has more than 67 million pixels.
     pub fn read(path: &Path) -> image::ImageResult<Self> {
-        let image = image::ImageReader::open(path)?.with_guessed_format()?.decode()?;
+        let file = BufReader::new(files::open(path)?);
+        let decoder = image::ImageReader::new(file).with_guessed_format()?.into_decoder()?;
+        let (width, height) = decoder.dimensions();
+        if u64::from(width) * u64::from(height) > MAX_PIXELS {
+            let kind = LimitErrorKind::DimensionError;
+            return Err(image::ImageError::Limits(LimitError::from_kind(kind)));
+        }
+        let image = image::DynamicImage::from_decoder(decoder)?;
         Ok(if image.color().has_color() {
             Self::from_color(image.into_rgb8())
         } else {

@@ -4,6 +4,7 @@ use std::fmt;
 
 use nalgebra::{Point3, Vector3};
 
+use super::super::lines::is_near;
 use super::{MAX_POINTS, MapCloud};
 
 /// The points whose median is the local origin: a few stray points among them do not move it.
@@ -22,7 +23,7 @@ pub(super) struct Collector {
     before_zero: usize,
     /// The number of points that the format itself calls beams without return.
     without_return: usize,
-    /// The number of points without finite coordinates.
+    /// The number of points without finite coordinates, or with those of no place.
     without_number: usize,
 }
 
@@ -69,7 +70,7 @@ impl fmt::Display for Note {
 impl Collector {
     /// Adds a point \[m\].
     pub fn add(&mut self, point: [f64; 3]) -> Result<(), String> {
-        if !point.iter().all(|coordinate| coordinate.is_finite()) {
+        if !point.iter().all(is_near) {
             self.without_number += 1;
             return Ok(());
         }

@@ -1,11 +1,11 @@
 //! E57 (ASTM E2807): scans of laser scanners, each moved by its own pose.
 
-use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
 
 use e57::{E57Reader, PointCloud, RecordDataType, RecordName, RecordValue};
 use nalgebra::{Isometry3, Point3, Quaternion, UnitQuaternion, Vector3};
+use posescope_core::files;
 
 use super::decoding::decoded;
 use super::{Collector, MapCloud};
@@ -17,7 +17,7 @@ pub(super) fn read(path: &Path, _size: u64) -> Result<MapCloud, String> {
 
 fn points(path: &Path) -> Result<MapCloud, String> {
     let text = |error: e57::Error| error.to_string();
-    let file = File::open(path).map_err(|error| error.to_string())?;
+    let file = files::open(path).map_err(|error| error.to_string())?;
     let mut reader = E57Reader::new(BufReader::new(file)).map_err(text)?;
     let mut cloud = Collector::default();
     for scan in reader.pointclouds() {

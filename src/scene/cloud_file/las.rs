@@ -1,11 +1,11 @@
 //! LAS and LAZ.
 
-use std::fs::File;
 use std::io::{BufReader, Read, Seek, SeekFrom};
 use std::path::Path;
 
 use las::{Header, Reader};
 use laz::{LazItem, LazItemType, LazVlr};
+use posescope_core::files;
 
 use super::decoding::decoded;
 use super::{Collector, MapCloud, expect_room};
@@ -22,7 +22,7 @@ pub(super) fn read(path: &Path, size: u64) -> Result<MapCloud, String> {
 
 fn points(path: &Path, size: u64) -> Result<MapCloud, String> {
     let text = |error: las::Error| error.to_string();
-    let file = File::open(path).map_err(|error| error.to_string())?;
+    let file = files::open(path).map_err(|error| error.to_string())?;
     let mut file = BufReader::new(file);
     expect_extended_records(&mut file, size)?;
     file.rewind().map_err(|error| error.to_string())?;

@@ -1,10 +1,10 @@
 //! PCD of the Point Cloud Library: text, binary and compressed.
 
-use std::fs::File;
 use std::io::{BufRead, BufReader, Read as _, Seek as _};
 use std::path::Path;
 
 use pcd_rs::{DataKind, DynReader, DynRecord, Field, PcdMeta};
+use posescope_core::files;
 
 use super::{Collector, MapCloud, expect_room};
 
@@ -28,7 +28,7 @@ pub(super) fn is_pcd(start: &[u8]) -> bool {
 pub(super) fn read(path: &Path, size: u64) -> Result<MapCloud, String> {
     let text = |error: pcd_rs::Error| error.to_string();
     let io = |error: std::io::Error| error.to_string();
-    let mut reader = BufReader::new(File::open(path).map_err(io)?);
+    let mut reader = BufReader::new(files::open(path).map_err(io)?);
     let stated = header(&mut reader).map_err(io)?;
     let body = reader.stream_position().map_err(io)?;
     let start = reader.fill_buf().map_err(io)?;

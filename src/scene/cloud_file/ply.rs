@@ -9,6 +9,7 @@ use std::path::Path;
 
 use ply_rs_bw::parser::Parser;
 use ply_rs_bw::ply::{DefaultElement, ElementDef, Encoding, PropertyType, ScalarType};
+use posescope_core::files;
 
 use super::super::lines::excerpt;
 use super::{Collector, MapCloud, expect_room};
@@ -16,7 +17,7 @@ use super::{Collector, MapCloud, expect_room};
 /// Reads the vertices one by one; other properties and other elements are skipped.
 pub(super) fn read(path: &Path, size: u64) -> Result<MapCloud, String> {
     let text = |error: std::io::Error| error.to_string();
-    let mut reader = BufReader::new(File::open(path).map_err(text)?);
+    let mut reader = BufReader::new(files::open(path).map_err(text)?);
     let header = Parser::<DefaultElement>::new().read_header(&mut reader).map_err(text)?;
     let mut elements = Elements { reader, encoding: header.encoding, bytes: Vec::new() };
     for element in header.elements.values() {

@@ -10,6 +10,8 @@ use std::fs::File;
 use std::io::{BufRead as _, BufReader};
 use std::path::{Path, PathBuf};
 
+use posescope_core::files;
+
 use self::layout::Layout;
 pub(super) use self::words::number;
 use super::super::lines::text_start;
@@ -121,7 +123,7 @@ struct Lines {
 
 impl Lines {
     fn open(path: &Path) -> Result<Self, SceneError> {
-        let mut reader = BufReader::new(File::open(path).map_err(SceneError::io(path))?);
+        let mut reader = BufReader::new(files::open(path).map_err(SceneError::io(path))?);
         let start = reader.fill_buf().map_err(SceneError::io(path))?;
         let skipped = text_start(start).map_err(|expected| SceneError::expected(path, expected))?;
         reader.consume(skipped);

@@ -7,6 +7,8 @@ use std::fs::File;
 use std::io::{BufRead as _, BufReader, Read as _};
 use std::path::{Path, PathBuf};
 
+use posescope_core::files;
+
 use super::super::{SceneError, lines};
 use super::camera::{ModelCamera, model_of_number};
 use super::model::{Model, ModelImage, Points};
@@ -101,7 +103,7 @@ struct BinaryFile {
 impl BinaryFile {
     fn open(path: &Path) -> Result<Self, SceneError> {
         let io = SceneError::io(path);
-        let file = File::open(path).map_err(io)?;
+        let file = files::open(path).map_err(io)?;
         let size = file.metadata().map_err(io)?.len();
         Ok(Self { path: path.to_owned(), reader: BufReader::new(file), size, left: size })
     }
@@ -136,7 +138,7 @@ impl BinaryFile {
 
     fn finite(&mut self) -> Result<f64, SceneError> {
         let number = self.f64()?;
-        if !number.is_finite() {
+        if !lines::is_near(&number) {
             return Err(self.error(format!("finite coordinates expected, {number} found")));
         }
         Ok(number)

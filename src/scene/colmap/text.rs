@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use super::super::SceneError;
-use super::super::lines::{Line, TextFile, excerpt};
+use super::super::lines::{FARTHEST, Line, TextFile, excerpt, is_near};
 use super::camera::ModelCamera;
 use super::model::{Model, ModelImage, Points};
 
@@ -58,6 +58,9 @@ fn points(path: &Path) -> Result<Points, SceneError> {
             return Err(line.error("a line `id x y z …` expected, it is cut off"));
         };
         let position = [line.number(x)?, line.number(y)?, line.number(z)?];
+        if !position.iter().all(is_near) {
+            return Err(line.error(format!("a position within {FARTHEST:e} of 0 expected")));
+        }
         points.add(whole(&line, id)?, position);
     }
     Ok(points)

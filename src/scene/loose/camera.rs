@@ -66,7 +66,7 @@ impl CameraArgument {
                 Ok(camera)
             }
             Self::File(path) => {
-                let file = TextFile::read(path)?;
+                let file = TextFile::named(path)?;
                 file.expect_order(CAMERA_COLUMNS)?;
                 let is_id = |line: Line<'_>| {
                     let key = line.text.split_whitespace().next();

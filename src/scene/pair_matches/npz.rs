@@ -2,11 +2,11 @@
 //! partner of each keypoint of the first or −1 (SuperGlue), or pairs of keypoints, K × 2 (LightGlue). Arrays may have a
 //! batch axis of length 1 in front.
 
-use std::fs::File;
 use std::io::Read as _;
 use std::path::Path;
 
 use half::f16;
+use posescope_core::files;
 use zip::ZipArchive;
 
 use super::{MAX_KEYPOINTS, RawMatches};
@@ -18,7 +18,7 @@ const MAX_BYTES: u64 = 16 * MAX_KEYPOINTS as u64 + 4096;
 
 pub(super) fn read(path: &Path) -> Result<RawMatches, SceneError> {
     let error = |expected: String| SceneError::expected(path, expected.replace('\n', " "));
-    let file = File::open(path).map_err(SceneError::io(path))?;
+    let file = files::open(path).map_err(SceneError::io(path))?;
     let mut archive =
         ZipArchive::new(file).map_err(|why| error(format!("an .npz archive expected: {why}")))?;
     let names: Vec<String> = archive.file_names().flatten().map(|name| name.into_owned()).collect();

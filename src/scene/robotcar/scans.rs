@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use nalgebra::Point3;
+use posescope_core::files;
 
 use super::super::file_scene::{Clouds, Frame};
 use super::super::folder::numbered;
@@ -124,7 +125,7 @@ fn read(file: &ScanFile) -> Result<Vec<Point3<f64>>, SceneError> {
             ),
         ));
     }
-    let bytes = std::fs::read(path).map_err(io)?;
+    let bytes = files::read(path, files::TEXT).map_err(io)?;
     let (points, _) = bytes.as_chunks::<24>();
     let point = |point: &[u8; 24]| {
         let (numbers, _) = point.as_chunks::<8>();

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use image::RgbImage;
 use image::imageops::interpolate_bilinear;
 use nalgebra::{Matrix3x4, Rotation3, Translation3, UnitQuaternion};
+use posescope_core::files;
 
 use super::super::SceneError;
 use super::super::lens::pinhole;
@@ -69,7 +70,7 @@ impl Sdk {
 /// The position in the original photo for each pixel of undistorted photos \[px\]. The file has all columns first, then
 /// all rows.
 fn read_table(path: &Path, (width, height): (u32, u32)) -> Result<Vec<[f32; 2]>, SceneError> {
-    let bytes = std::fs::read(path).map_err(SceneError::io(path))?;
+    let bytes = files::read(path, files::TEXT).map_err(SceneError::io(path))?;
     let pixels = width as usize * height as usize;
     if bytes.len() != pixels * 16 {
         return Err(SceneError::expected(

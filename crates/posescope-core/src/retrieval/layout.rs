@@ -23,6 +23,7 @@ use xxhash_rust::xxh3::Xxh3;
 
 use super::error::IndexError;
 use crate::features::{Descriptor, Keypoint};
+use crate::files;
 
 /// Raised with every change of the layout.
 const LAYOUT: u8 = 1;
@@ -122,7 +123,7 @@ impl MappedIndex {
             _ => IndexError::Io { path: path.to_owned(), source },
         };
         let damaged = |what| IndexError::Damaged { path: path.to_owned(), what };
-        let mut file = File::open(path).map_err(io)?;
+        let mut file = files::open(path).map_err(io)?;
         let length = file.metadata().map_err(io)?.len();
         let length = usize::try_from(length).map_err(|_| damaged("it is too long"))?;
         let mut magic = [0; MAGIC];

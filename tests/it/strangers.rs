@@ -1,0 +1,157 @@
+//! Folders that others sent: nothing outside of the output folder changes or is shown, and no file takes the machine.
+
+use std::fs;
+use std::os::unix::fs::symlink;
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+use image::{GrayImage, Luma};
+use rustix::fs::{CWD, FileType, Mode, mknodat};
+use tempfile::TempDir;
+
+use crate::binary::{Said, has, run_in, text, write};
+use crate::scene_toml;
+use crate::small_sequence::SmallSequence;
+
+/// What is in a file outside of every folder.
+const SECRET: &str = "1 2 3\nTOPSECRET=hunter2\n";
+
+/// Makes a pipe that nobody writes to.
+pub fn pipe(path: &Path) {
+    mknodat(CWD, path, FileType::Fifo, Mode::RUSR | Mode::WUSR, 0).expect("a pipe");
+}
+
+/// Runs the binary, and ends it where it waits for a pipe.
+pub fn run(folder: &Path, line: &str) -> Said {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_posescope"));
+    command.env("POSESCOPE_CACHE", crate::binary::CACHE).current_dir(folder);
+    command.args(shlex::split(line).expect("words"));
+    command.stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut child = command.spawn().expect("it starts");
+    let since = Instant::now();
+    while child.try_wait().expect("ours").is_none() {
+        if since.elapsed() > Duration::from_secs(120) {
+            child.kill().ok();
+            panic!("{line} does not end");
+        }
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    Said::of(&child.wait_with_output().expect("it ended"))
+}
+
+#[test]
+fn what_is_no_file_is_not_waited_for() {
+    let sequence = SmallSequence::write();
+    let path = |name: &str| sequence.path().join(name);
+    // Files that may be missing are missing where they are pipes.
+    for (name, command, words) in [
+        ("sequences/42/image_0/000004.png", "doctor sequences/42", "a named pipe found"),
+        ("sequences/42/calib.txt", "doctor sequences/42", "sequences/42"),
+        ("poses/42.txt", "doctor sequences/42", "no pose file"),
+    ] {
+        let kept = path("kept");
+        fs::rename(path(name), &kept).expect("is there");
+        pipe(&path(name));
+        let said = run(sequence.path(), command);
+        assert!(matches!(said.code, Some(0 | 3)), "{name}: {}", said.err);
+        has(&said.err, words);
+        fs::remove_file(path(name)).expect("ours");
+        symlink("/dev/zero", path(name)).expect("writable");
+        let said = run(sequence.path(), command);
+        assert!(matches!(said.code, Some(0 | 3)), "{name}: {}", said.err);
+        fs::remove_file(path(name)).expect("ours");
+        fs::rename(&kept, path(name)).expect("ours");
+    }
+    let asked = "run sequences/42 --query 5 --reference 4 --method fb";
+    for option in ["--gps", "--matches", "--config", "--estimates other="] {
+        let pipe_path = path("a-pipe");
+        if !pipe_path.exists() {
+            pipe(&pipe_path);
+        }
+        let given = format!("{option} a-pipe").replace("= ", "=");
+        let said = run(sequence.path(), &format!("{asked} {given}"));
+        assert!(matches!(said.code, Some(2 | 3)), "{given}: {}", said.err);
+    }
+}
+
+/// A scene that `write` changes so that one of its files is a link to a secret.
+fn shows_no_secret(name: &str, command: &str, write_scene: impl FnOnce(&Path, &Path)) {
+    let root = TempDir::new().expect("a folder");
+    let (scene, secret) = (root.path().join("scene"), root.path().join("secret.env"));
+    fs::create_dir(&scene).expect("writable");
+    write(&secret, SECRET);
+    scene_toml::write(&scene);
+    write_scene(&scene, &secret);
+    let said = run_in(root.path(), command);
+    let all = said.out.clone() + &said.err;
+    assert!(!all.contains("hunter2"), "{name}: {all}");
+    assert_eq!(said.code, Some(3), "{name}: {all}");
+    has(&all, "inside the scene's folder expected");
+}
+
+#[test]
+fn no_link_shows_a_file_outside_of_a_scene() {
+    let replaced = |name: &'static str| {
+        move |scene: &Path, secret: &Path| {
+            fs::remove_file(scene.join(name)).expect("is there");
+            symlink(secret, scene.join(name)).expect("writable");
+        }
+    };
+    for name in ["map.xyz", "poses.txt"] {
+        shows_no_secret(name, "doctor scene", replaced(name));
+    }
+    shows_no_secret("a link to a folder", "doctor scene", |scene, secret| {
+        symlink(secret.parent().expect("a folder"), scene.join("deep")).expect("writable");
+        let described = text(scene.join("scene.toml")).replace("map.xyz", "deep/secret.env");
+        write(scene.join("scene.toml"), described);
+    });
+    let command = "run scene --query img1 --reference img0 --method fb";
+    shows_no_secret("a photo", command, |scene, secret| {
+        fs::copy(scene.join("photos/img1.png"), secret).expect("writable");
+        replaced("photos/img1.png")(scene, secret);
+    });
+    // Links inside of a scene are followed.
+    let root = TempDir::new().expect("a folder");
+    scene_toml::write(root.path());
+    fs::rename(root.path().join("map.xyz"), root.path().join("other.xyz")).expect("ours");
+    symlink("other.xyz", root.path().join("map.xyz")).expect("writable");
+    fs::rename(root.path().join("photos/img1.png"), root.path().join("one.png")).expect("ours");
+    symlink("../one.png", root.path().join("photos/img1.png")).expect("writable");
+    run_in(root.path(), "run . --query img1 --reference img0 --method fb").ok();
+    // So is a folder of a data set that lies on another disk.
+    let sequence = SmallSequence::write();
+    fs::rename(sequence.folder().join("velodyne"), sequence.path().join("disk")).expect("ours");
+    symlink("../../disk", sequence.folder().join("velodyne")).expect("writable");
+    sequence.run("run sequences/42 --query 5 --reference 4 --method fb").ok();
+    let secret = sequence.path().join("sequences/secret.env");
+    write(&secret, SECRET);
+    fs::create_dir(sequence.path().join("out")).expect("writable");
+    fs::rename(&secret, sequence.path().join("out/secret.env")).expect("ours");
+    fs::remove_file(sequence.folder().join("times.txt")).ok();
+    symlink("../../out/secret.env", sequence.folder().join("times.txt")).expect("writable");
+    let said = sequence.run("doctor sequences/42").fails(3, "inside the scene's folder expected");
+    assert!(!said.err.contains("hunter2"), "{}", said.err);
+}
+
+#[test]
+fn a_small_file_of_a_huge_photo_is_refused_by_its_size() {
+    let root = TempDir::new().expect("a folder");
+    scene_toml::write(root.path());
+    let huge = GrayImage::from_pixel(13_000, 6_000, Luma([0]));
+    for frame in 0..3 {
+        huge.save(root.path().join(format!("photos/img{frame}.png"))).expect("writable");
+    }
+    let said = run_in(root.path(), "doctor .");
+    said.fails_in_one_line(3, "at most 67108864 pixels expected, 13000x6000 found");
+}
+
+#[test]
+fn a_long_word_of_a_file_is_not_shown_whole() {
+    let root = TempDir::new().expect("a folder");
+    scene_toml::write(root.path());
+    let described = text(root.path().join("scene.toml"));
+    write(root.path().join("scene.toml"), format!("{described}\n[{}]\n", "x".repeat(100_000)));
+    let said = run_in(root.path(), "doctor .").fails_in_one_line(3, "unknown field `xxx");
+    assert!(said.err.len() < 1000, "{}", said.err.len());
+}
