@@ -32,6 +32,9 @@ pub use self::text::write_matches;
 /// The most keypoints of a photo, more than any photo of 8,000 × 8,000 pixels has.
 const MAX_KEYPOINTS: usize = 1 << 20;
 
+/// The farthest keypoint from the first pixel \[px\].
+const FARTHEST_PX: f32 = 1e6;
+
 /// Which photo of a pair comes first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Order {
@@ -72,8 +75,11 @@ impl RawMatches {
             )));
         }
         let mut places = self.first.iter().chain(&self.second).flatten();
-        if places.any(|place| !place.is_finite()) {
-            return Err(error("finite positions of keypoints expected".to_owned()));
+        if let Some(place) = places.find(|place| !(-FARTHEST_PX..=FARTHEST_PX).contains(*place)) {
+            return Err(error(format!(
+                "positions of keypoints within {FARTHEST_PX:e} px of 0 expected, {place} found; numpy writes large \
+                 numbers where an array is masked"
+            )));
         }
         Ok(self)
     }

@@ -9,6 +9,7 @@ use posescope::foreign::MatchSource as _;
 use posescope::localize::QueryResult;
 use posescope::method::Method;
 use posescope::scene::MatchFolder;
+use posescope_core::features::PairMatches;
 use tempfile::TempDir;
 
 use crate::binary::{has, run_in, write};
@@ -329,4 +330,69 @@ fn keypoints_of_resized_photos_are_named_with_the_factor() {
     // The matches themselves are those of no resized photo.
     write(&path, text);
     assert!(!run_in(folder.path(), line).out.contains("resized"));
+}
+
+/// What a folder says of a pair whose features are in a file that `features` writes.
+fn matched(features: &dyn Fn(&Path)) -> Result<Vec<[f32; 2]>, String> {
+    let folder = TempDir::new().expect("a folder");
+    features(&folder.path().join("feats.h5"));
+    let mut matches = hdf5_pure::FileBuilder::new();
+    let mut first = matches.create_group("000070.png");
+    let mut second = first.create_group("000062.png");
+    second.create_dataset("matches0").with_i16_data(&[-1, 1, -1]).with_shape(&[3]);
+    first.add_group(second.finish());
+    matches.add_group(first.finish());
+    matches.write(folder.path().join("matches.h5")).expect("writable");
+    let source = MatchFolder::open(folder.path());
+    let found = source.and_then(|source| source.matches("000070", "000062"));
+    match found.map_err(|error| error.to_string())?.expect("is stored") {
+        PairMatches::Found(found) => {
+            Ok(found.query.keypoints.iter().map(|keypoint| [keypoint.x, keypoint.y]).collect())
+        }
+        PairMatches::Absent => panic!("no matches"),
+    }
+}
+
+#[test]
+fn arrays_of_matches_are_read_as_what_they_are() {
+    let fixtures = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/hdf5");
+    let fixture = |name: &'static str| {
+        let from = fixtures.join(name);
+        matched(&move |path| {
+            fs::copy(&from, path).expect("a fixture");
+        })
+    };
+    for (name, words) in [
+        ("groups-in-themselves.h5", "feats.h5 ~ a group is reached on many ways"),
+        ("many-links.h5", "feats.h5 ~ the same groups are linked more than 32 times"),
+        ("soft-links.h5", "feats.h5 ~ 000062.png: ~ a soft link found"),
+        ("words.h5", "000070.png/keypoints: positions as numbers expected"),
+    ] {
+        has(&fixture(name).expect_err(name), words);
+    }
+    let expected = vec![[1.0, 2.0], [3.0, 4.0], [5.0, 6.0]];
+    assert_eq!(fixture("big-endian-halves.h5"), Ok(expected.clone()));
+    let whole = matched(&|path| {
+        let mut features = hdf5_pure::FileBuilder::new();
+        for image in ["000062.png", "000070.png"] {
+            let mut group = features.create_group(image);
+            let set = group.create_dataset("keypoints");
+            set.with_i16_data(&[1, 2, 3, 4, 5, 6]).with_shape(&[3, 2]);
+            features.add_group(group.finish());
+        }
+        features.write(path).expect("writable");
+    });
+    assert_eq!(whole, Ok(expected));
+    // Numpy writes 1e20 where an array is masked.
+    let masked = matched(&|path| {
+        let mut features = hdf5_pure::FileBuilder::new();
+        for image in ["000062.png", "000070.png"] {
+            let mut group = features.create_group(image);
+            let set = group.create_dataset("keypoints");
+            set.with_f32_data(&[1.0, 2.0, 1e20, 1e20, 5.0, 6.0]).with_shape(&[3, 2]);
+            features.add_group(group.finish());
+        }
+        features.write(path).expect("writable");
+    });
+    has(&masked.expect_err("masked"), "within 1e6 px ~ masked");
 }

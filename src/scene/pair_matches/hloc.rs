@@ -4,20 +4,68 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use half::f16;
-use hdf5_pure::{Dataset, File, Group};
+use hdf5_pure::{
+    DType, Dataset, Datatype, DatatypeByteOrder, File, FloatingPointLayout, FormatError, Group,
+    ReadSeekSource, Source,
+};
 
+use posescope_core::files;
 use posescope_core::scene::{stem, without_kind};
 
 use super::{MAX_KEYPOINTS, Names, RawMatches};
 use crate::scene::SceneError;
 use crate::scene::frame_names::{agree, flat};
+use crate::scene::lines::excerpt_of;
 
 /// How deep groups are searched for images.
 const DEEPEST: usize = 8;
 /// The most images and pairs; limits the search in a damaged file.
 const MAX_ENTRIES: usize = 1 << 20;
+
+/// The least bytes of a link from a group to what it contains.
+const LEAST_LINK: u64 = 8;
+
+/// A file that is read no more than so many times over while it is searched. A large group may be linked by many names,
+/// and each link reads it.
+struct Metered {
+    source: ReadSeekSource<std::fs::File>,
+    /// How many more bytes may be read.
+    left: Arc<AtomicU64>,
+}
+
+impl Metered {
+    /// How often a file may be read over. Files of hloc are read up to five times.
+    const TIMES: u64 = 32;
+    /// Small files have more overhead \[bytes\].
+    const AT_LEAST: u64 = 1 << 20;
+
+    fn new(file: std::fs::File) -> Result<Self, FormatError> {
+        let source = ReadSeekSource::new(file)?;
+        let left = source.len().saturating_mul(Self::TIMES).max(Self::AT_LEAST);
+        Ok(Self { source, left: Arc::new(AtomicU64::new(left)) })
+    }
+}
+
+impl Source for Metered {
+    fn len(&self) -> u64 {
+        self.source.len()
+    }
+
+    fn read_at(&self, offset: u64, bytes: &mut [u8]) -> Result<(), FormatError> {
+        let without = |left: u64| left.checked_sub(bytes.len() as u64);
+        self.left.fetch_update(Ordering::Relaxed, Ordering::Relaxed, without).map_err(|_| {
+            FormatError::Source(format!(
+                "the same groups are linked more than {} times",
+                Self::TIMES
+            ))
+        })?;
+        self.source.read_at(offset, bytes)
+    }
+}
 
 /// The open files, and their content by name.
 pub(super) struct HlocFiles {
@@ -40,9 +88,14 @@ impl HlocFiles {
     pub(super) fn open(folder: &Path, files: &[&PathBuf]) -> Result<Self, SceneError> {
         let (mut features, mut matches) = (None, None);
         for path in files {
-            let file = File::open_streaming(path).map_err(|why| content(path, &why))?;
-            let mut found = Found::default();
+            let source = files::open(path).map_err(SceneError::io(path))?;
+            let source = Metered::new(source).map_err(|why| content(path, &why))?;
+            let (size, left) = (source.len(), Arc::clone(&source.left));
+            let file = File::from_source(source).map_err(|why| content(path, &why))?;
+            let mut found = Found { links_left: size / LEAST_LINK, ..Found::default() };
             walk(&file.root(), &mut Vec::new(), &mut found).map_err(|why| content(path, &why))?;
+            // Pairs are read as often as they are asked for.
+            left.store(u64::MAX, Ordering::Relaxed);
             let slot = match (found.keypoints.is_empty(), found.matches.is_empty()) {
                 (false, _) => &mut features,
                 (true, false) => &mut matches,
@@ -167,8 +220,26 @@ impl HlocFiles {
 }
 
 fn text_of(why: hdf5_pure::Error) -> String {
-    why.to_string()
+    // What a link by name has in place of the address of an object.
+    let nowhere = u64::MAX.to_string();
+    match why.to_string() {
+        said if said.contains(&nowhere) => {
+            "arrays and groups expected, a soft link found; store the array itself".to_owned()
+        }
+        said => said,
+    }
 }
+
+/// IEEE 754 in 16 bits.
+const HALF: FloatingPointLayout = FloatingPointLayout {
+    bit_offset: 0,
+    bit_precision: 16,
+    exponent_location: 10,
+    exponent_size: 5,
+    mantissa_location: 0,
+    mantissa_size: 10,
+    exponent_bias: 15,
+};
 
 fn content(path: &Path, expected: &dyn std::fmt::Display) -> SceneError {
     SceneError::expected(path, expected.to_string().replace('\n', " "))
@@ -184,6 +255,8 @@ fn without_ending(image: &str) -> String {
 
 #[derive(Default)]
 struct Found {
+    /// How many more links the file has room for: groups that contain each other would be visited without end.
+    links_left: u64,
     keypoints: Vec<String>,
     /// The groups with matches.
     matches: Vec<Vec<String>>,
@@ -213,7 +286,18 @@ fn pair_of(
 
 /// Searches groups for keypoints and matches.
 fn walk(group: &Group, path: &mut Vec<String>, found: &mut Found) -> Result<(), String> {
-    let sets = group.datasets().map_err(text_of)?;
+    let named = |why: hdf5_pure::Error| {
+        let place = if path.is_empty() { "/".to_owned() } else { path.join("/") };
+        format!("{}: {}", excerpt_of(&place, 100), text_of(why))
+    };
+    let sets = group.datasets().map_err(named)?;
+    // By name, each group would be searched for again.
+    let groups = group.iter_groups().map_err(named)?;
+    let links = (sets.len() + groups.len()) as u64;
+    found.links_left = found.links_left.checked_sub(links).ok_or_else(|| {
+        "groups that contain each other at most once expected, a group is reached on many ways"
+            .to_owned()
+    })?;
     if sets.iter().any(|name| name == "keypoints") {
         found.keypoints.push(path.join("/"));
     }
@@ -226,8 +310,7 @@ fn walk(group: &Group, path: &mut Vec<String>, found: &mut Found) -> Result<(), 
     if path.len() == DEEPEST {
         return Ok(());
     }
-    for name in group.groups().map_err(text_of)? {
-        let inside = group.group(&name).map_err(text_of)?;
+    for (name, inside) in groups {
         path.push(name);
         walk(&inside, path, found)?;
         path.pop();
@@ -247,18 +330,37 @@ fn check_size(set: &Dataset) -> Result<Vec<u64>, String> {
     }
 }
 
+fn no_numbers(kind: &dyn std::fmt::Display) -> String {
+    format!("positions as numbers expected, {} found", excerpt_of(&kind.to_string(), 40))
+}
+
 fn positions(set: &Dataset) -> Result<Vec<[f32; 2]>, String> {
     let [_, 2] = check_size(set)?[..] else {
         return Err("positions expected, an array N × 2".to_owned());
     };
-    let numbers: Vec<f32> = match set.element_size().map_err(text_of)? {
+    let numbers: Vec<f32> = match (set.dtype().map_err(text_of)?, set.datatype().map_err(text_of)?)
+    {
         // hloc stores half floats, which the crate cannot convert.
-        2 => {
+        (_, Datatype::FloatingPoint { size: 2, byte_order, layout }) if layout == HALF => {
             let bytes = set.read_raw().map_err(text_of)?;
-            let halves = bytes.chunks_exact(2);
-            halves.map(|half| f16::from_le_bytes([half[0], half[1]]).to_f32()).collect()
+            let (halves, _) = bytes.as_chunks();
+            let number = match byte_order {
+                DatatypeByteOrder::LittleEndian => f16::from_le_bytes,
+                DatatypeByteOrder::BigEndian => f16::from_be_bytes,
+                DatatypeByteOrder::Vax => return Err(no_numbers(&"VAX half floats")),
+            };
+            halves.iter().map(|half| number(*half).to_f32()).collect()
         }
-        _ => set.read_f32().map_err(text_of)?,
+        (DType::F32 | DType::F64, _) => set.read_f32().map_err(text_of)?,
+        (DType::I8 | DType::I16 | DType::I32 | DType::I64, _) => {
+            let numbers = set.read_i64().map_err(text_of)?;
+            numbers.into_iter().map(|number| number as f32).collect()
+        }
+        (DType::U8 | DType::U16 | DType::U32 | DType::U64, _) => {
+            let numbers = set.read_u64().map_err(text_of)?;
+            numbers.into_iter().map(|number| number as f32).collect()
+        }
+        (other, _) => return Err(no_numbers(&other)),
     };
     Ok(numbers.chunks_exact(2).map(|pair| [pair[0], pair[1]]).collect())
 }
@@ -267,6 +369,21 @@ fn partners_of(set: &Dataset) -> Result<Vec<Option<usize>>, String> {
     let [_] = check_size(set)?[..] else {
         return Err("one number for each keypoint expected".to_owned());
     };
+    let kind = set.dtype().map_err(text_of)?;
+    let is_whole = matches!(
+        kind,
+        DType::I8
+            | DType::I16
+            | DType::I32
+            | DType::I64
+            | DType::U8
+            | DType::U16
+            | DType::U32
+            | DType::U64
+    );
+    if !is_whole {
+        return Err(format!("whole numbers expected, {} found", excerpt_of(&kind.to_string(), 40)));
+    }
     let numbers = set.read_i64().map_err(text_of)?;
     let partner = |number: i64| match number {
         -1 => Ok(None),
