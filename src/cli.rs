@@ -65,7 +65,7 @@ pub fn run(arguments: Vec<OsString>) -> u8 {
         Ok(Ok(()) | Err(CliError::ReaderGone)) => failure::DONE,
         Ok(Err(CliError::Arguments(error))) => answered(&error),
         Ok(Err(error)) => {
-            tell(&format!("posescope: {error}"));
+            tell(&format!("posescope: {}", error.to_string().replace(['\n', '\r'], " ")));
             error.exit_code()
         }
         Err(_) => failure::INTERNAL,

@@ -87,6 +87,12 @@ impl Table {
     /// If a row does not fit, the layout changes: sentences wrap below their rows, and shared cells are above
     /// them. A table without sentences is transposed.
     pub fn to_text(&self, width: Option<usize>) -> String {
+        if self.all().flatten().any(|cell| cell.contains(is_line_end)) {
+            let one_line = |cell: &String| cell.replace(is_line_end, " ");
+            let line = |row: &Vec<String>| row.iter().map(one_line).collect();
+            let rows = self.rows.iter().map(line).collect();
+            return Self { header: line(&self.header), rows, ..self.clone() }.to_text(width);
+        }
         let limit = width.unwrap_or(usize::MAX);
         let caption = match self.caption.as_str() {
             "" => String::new(),
@@ -280,13 +286,39 @@ fn length(text: &str) -> usize {
     text.width()
 }
 
-/// A cell of a Markdown table.
-fn cell_of(text: &str) -> String {
-    text.replace('|', "\\|").replace(['\n', '\r'], " ")
+fn is_line_end(c: char) -> bool {
+    c == '\n' || c == '\r'
 }
 
-/// A CSV field, quoted as in RFC 4180.
+/// A cell of a Markdown table. What would be a tag or a link is text.
+fn cell_of(text: &str) -> String {
+    let text = text.replace('|', "\\|").replace(is_line_end, " ").replace("](", "]\\(");
+    let mut escaped = String::with_capacity(text.len());
+    let mut rest = text.as_str();
+    while let Some((before, after)) = rest.split_once('<') {
+        let is_tag = after.starts_with(|c: char| c.is_alphabetic() || "/!?".contains(c));
+        escaped += before;
+        escaped += if is_tag { "&lt;" } else { "<" };
+        rest = after;
+    }
+    escaped + rest
+}
+
+/// Whether a spreadsheet would compute a cell instead of showing it.
+fn is_formula(cell: &str) -> bool {
+    match cell.strip_prefix(['+', '-']) {
+        Some(_) if cell.parse::<f64>().is_ok() => false,
+        // Numbers with a unit.
+        Some(rest) => !rest.chars().all(|c| c.is_alphanumeric() || " .,%°²/–".contains(c)),
+        None => cell.starts_with(['=', '@', '\t', '\r']),
+    }
+}
+
+/// A CSV field, quoted as in RFC 4180. What a spreadsheet would take for a formula begins with `'`.
 fn quoted(cell: &str) -> String {
+    if is_formula(cell) {
+        return format!("\"'{}\"", cell.replace('"', "\"\""));
+    }
     if cell.contains(['"', ',', '\n', '\r']) {
         format!("\"{}\"", cell.replace('"', "\"\""))
     } else {
@@ -341,6 +373,32 @@ mod tests {
         assert!(latex.contains("\\begin{tabular}{lr}"), "{latex}");
         assert!(latex.contains("    only &  \\\\\n"), "{latex}");
         assert!(latex.contains("two lines & a $\\rightarrow$ b $\\le$ c"), "{latex}");
+    }
+
+    #[test]
+    fn no_cell_is_a_formula_a_tag_or_a_second_line() {
+        let mut table = Table::new("t", "", ["query", "x"]);
+        for cell in [
+            "=cmd|' /C calc'!A0",
+            "@SUM(A1)",
+            "-2+3+cmd|'x'!A0",
+            "<img src=x>",
+            "[a](http://b)",
+            "c\nd",
+        ] {
+            table.push([cell, "-1.5"]);
+        }
+        let csv = table.to_csv();
+        for cell in ["\"'=cmd", "\"'@SUM", "\"'-2+3", "\n<img", ",-1.5\n"] {
+            assert!(csv.contains(cell), "{cell}: {csv}");
+        }
+        let markdown = table.to_markdown();
+        assert!(markdown.contains("&lt;img") && markdown.contains("[a]\\(http"), "{markdown}");
+        assert_eq!(table.to_text(None).lines().count(), 7);
+        // Figures, and what is less than others, stay as they are.
+        for cell in ["-1e-5", "-0.3 m", "+5.0 %", "-", "a < b", "000070"] {
+            assert_eq!((quoted(cell), cell_of(cell)), (cell.to_owned(), cell.to_owned()));
+        }
     }
 
     fn with_notes() -> Table {

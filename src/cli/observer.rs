@@ -17,7 +17,7 @@ use posescope::trace::{Cancelled, Record, Sink};
 
 use super::interrupt::Interrupt;
 use super::match_export::MatchExport;
-use super::stderr::tell;
+use super::stderr::{plain, tell};
 
 /// From this number of candidates, an index is worth building.
 const MANY: usize = 100;
@@ -103,7 +103,7 @@ impl Sink for CliObserver {
                     problem.map(|problem| (problem.query().name(), problem.reference().name()));
                 let task = names.map(|(query, reference)| format!("{query} ← {reference}"));
                 let path = self.stages.join(" › ");
-                self.bar.set_message(format!("{} {path}", task.unwrap_or_default()));
+                self.bar.set_message(plain(&format!("{} {path}", task.unwrap_or_default())));
             }
             Event::StageEnded(_) => drop(self.stages.pop()),
             _ => {}
@@ -180,7 +180,7 @@ impl LocalizeObserver for CliObserver {
         }
         let explaining =
             Explaining { method: result.method, tried, remedies, since: self.explaining_since };
-        self.bar.set_message(format!("{} {explaining}", result.query));
+        self.bar.set_message(plain(&format!("{} {explaining}", result.query)));
     }
 
     fn explained(&mut self, result: &QueryResult) {

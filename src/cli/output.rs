@@ -36,6 +36,15 @@ impl JsonLines {
 
     /// Writes one object that is serialised already.
     pub fn write_line(&mut self, line: &str) -> Result<(), CliError> {
+        if is_stdout(&self.path) && line.chars().any(|c| c.is_control()) {
+            // JSON may have them as numbers, too, which no terminal obeys.
+            let escaped = |c: char| match c {
+                c if c.is_control() => format!("\\u{:04x}", u32::from(c)),
+                c => c.to_string(),
+            };
+            let line: String = line.chars().map(escaped).collect();
+            return print_to(&mut self.writer, &line, &self.path);
+        }
         print_to(&mut self.writer, &line, &self.path)
     }
 }

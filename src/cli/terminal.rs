@@ -8,7 +8,7 @@ use indicatif_log_bridge::LogWrapper;
 use log::{Level, LevelFilter};
 
 use super::args::Everywhere;
-use super::stderr::{plain, tell};
+use super::stderr::{message, tell};
 
 pub struct Terminal {
     bars: MultiProgress,
@@ -34,9 +34,12 @@ impl Terminal {
                 Level::Error | Level::Warn => {
                     let is_error = record.level() == Level::Error;
                     let word = if is_error { "error" } else { "warning" };
-                    writeln!(buffer, "posescope: {word}: {}", plain(&record.args().to_string()))
+                    writeln!(buffer, "posescope: {word}: {}", message(&record.args().to_string()))
                 }
-                level => writeln!(buffer, "{level} {}: {}", record.target(), record.args()),
+                level => {
+                    let text = message(&record.args().to_string());
+                    writeln!(buffer, "{level} {}: {text}", record.target())
+                }
             })
             .filter_level(foreign)
             .filter_module("posescope", own)

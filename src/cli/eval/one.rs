@@ -17,6 +17,7 @@ use crate::cli::args::EvalArgs;
 use crate::cli::failure::CliError;
 use crate::cli::interrupt::Interrupt;
 use crate::cli::opened;
+use crate::cli::stderr::plain;
 use crate::cli::terminal::Terminal;
 
 /// A run that is complete and judged.
@@ -123,7 +124,7 @@ struct User {
 
 impl Follower for User {
     fn done(&mut self, query: &str) {
-        self.bar.set_message(query.to_owned());
+        self.bar.set_message(plain(query));
         self.bar.inc(1);
     }
 
