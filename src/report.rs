@@ -18,11 +18,10 @@ use posescope_core::files::write_whole;
 use crate::chart::Chart;
 use crate::localize::{LocalizeError, Localizer, QueryResult, Request};
 use crate::measure::{
-    Change, Measures, Plot, RunComparison, RunResults, StoredSummary, read_rows, tables,
-    worst_first,
+    Change, Measures, Plot, RunComparison, RunResults, StoredSummary, tables, worst_first,
 };
 use crate::params::Params;
-use crate::run::{FAILURES, FolderError, RecordingNames, RunFile, Scenes, read_run};
+use crate::run::{FAILURES, FolderError, RecordingNames, RunFile, Scenes, read_results, read_run};
 use crate::scale::LengthUnit;
 use crate::table::Table;
 use pictures::thumbnail;
@@ -98,7 +97,7 @@ pub fn write_html(
 impl RunReport {
     fn of(folder: &Path, baseline: Option<&Path>, pictures: usize) -> Result<Self, FolderError> {
         let run = read_run(folder)?;
-        let measured = RunResults::of(read_rows(folder)?, run.failure_radius_m());
+        let measured = RunResults::of(read_results(folder, &run)?, run.failure_radius_m());
         let charts = Plot::value_variants().iter().flat_map(|plot| plot.charts(&measured));
         let charts = charts.collect();
         let tables = tables(&measured, run.protocol.preset.map(|one| one.name()));

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use posescope::app::{self, KnownResults, Results, Setup, WindowError};
 use posescope::localize::QueryResult;
 use posescope::measure::StoredSummary;
-use posescope::run::{ConfigError, ScenePair, read_run, results_of_pair};
+use posescope::run::{ConfigError, RunFile, ScenePair, read_run, results_of_pair};
 use posescope::scene::{Scene, why_no_cloud};
 use posescope::session::{IndexFile, Job, RunMode, Task, TaskScenes, none_near};
 
@@ -59,8 +59,13 @@ pub fn setup(args: &ViewArgs) -> Result<(Setup, KnownResults), CliError> {
 }
 
 /// The results of a run folder for a pair of scenes. Prints how many results belong to other scenes.
-fn results_of(folder: &Path, pair: &ScenePair, queries: &dyn Scene) -> Result<Results, CliError> {
-    let (results, elsewhere) = results_of_pair(folder, pair, queries)?;
+fn results_of(
+    folder: &Path,
+    run: &RunFile,
+    pair: &ScenePair,
+    queries: &dyn Scene,
+) -> Result<Results, CliError> {
+    let (results, elsewhere) = results_of_pair(folder, run, pair, queries)?;
     if elsewhere > 0 {
         let (references, queries) = (&pair.scene, &pair.query_scene);
         tell(&format!(
@@ -169,15 +174,16 @@ fn of_a_run(args: &ViewArgs, folder: &Path) -> Result<(Setup, KnownResults), Cli
         .params()
         .map_err(|source| ConfigError::File { path: folder.join("run.toml"), source })?;
     task.params = args.task.config.over(params)?;
-    let results_of = |folder: &Path| -> Result<Results, CliError> {
-        let mut results = results_of(folder, pair, queries)?;
+    let results_of = |folder: &Path, run: &RunFile| -> Result<Results, CliError> {
+        let mut results = results_of(folder, run, pair, queries)?;
         for result in results.values_mut().flatten() {
             *result = result.clone().graded(task.protocol.right);
         }
         Ok(results)
     };
-    let results = results_of(folder)?;
-    let before = args.before.as_deref().map(results_of).transpose()?;
+    let results = results_of(folder, &file)?;
+    let before = args.before.as_deref().map(|before| results_of(before, &read_run(before)?));
+    let before = before.transpose()?;
     let has_failed = |(_, results): &(&usize, &Vec<QueryResult>)| {
         results.iter().any(|result| result.grade.is_failure())
     };

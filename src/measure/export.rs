@@ -51,6 +51,11 @@ pub enum ExportError {
         "kitti has one line per frame and cannot leave out a pose: {0}; use --as vloc or colmap"
     )]
     Gap(String),
+    /// The format cannot hold a name.
+    #[error(
+        "vloc has names without white space, commas and # in front, `{0}` is another; use --as colmap"
+    )]
+    Name(String),
     /// The format needs times, and the scene has none.
     #[error("tum needs times, and the frames of {0} have none; use --as vloc or colmap")]
     NoTime(String),
@@ -95,7 +100,7 @@ pub fn export(
     let files = match format {
         Format::Tum => vec![("", tum(&localized)?)],
         Format::Kitti => vec![("", kitti(&localized)?)],
-        Format::Vloc => vec![("", vloc(&localized))],
+        Format::Vloc => vec![("", vloc(&localized)?)],
         Format::Colmap => colmap(&localized),
     };
     Ok(Export { files, excluded })
@@ -109,11 +114,10 @@ fn localized<'a>(
 ) -> Result<Vec<Localized<'a>>, ExportError> {
     let per_item = run.results_per_item();
     let mut all = Vec::new();
-    let mut results = read_results::<QueryResult>(folder)?;
+    let mut results = read_results(folder, run)?.into_iter();
     for item in run.items() {
         let mut chosen: Option<QueryResult> = None;
         for result in results.by_ref().take(per_item) {
-            let result = result?;
             if !takes(&result) {
                 continue;
             }
@@ -175,12 +179,18 @@ fn camera_from_world(pose: &Pose) -> String {
     format!("{} {} {} {} {} {} {}", q.w, q.x, q.y, q.z, t.x, t.y, t.z)
 }
 
-fn vloc(localized: &[Localized<'_>]) -> String {
-    let lines = localized.iter().filter_map(|one| {
-        let pose = camera_from_world(one.pose.as_ref()?);
-        Some(format!("{} {pose}\n", one.item.query))
-    });
-    lines.collect()
+fn vloc(localized: &[Localized<'_>]) -> Result<String, ExportError> {
+    let mut text = String::new();
+    for Localized { item, pose } in localized {
+        let Some(pose) = pose else { continue };
+        // A name is the first word of a line.
+        let is_word = |c: char| !c.is_whitespace() && c != ',';
+        if item.query.starts_with('#') || !item.query.chars().all(is_word) {
+            return Err(ExportError::Name(item.query.to_owned()));
+        }
+        text += &format!("{} {}\n", item.query, camera_from_world(pose));
+    }
+    Ok(text)
 }
 
 fn colmap(localized: &[Localized<'_>]) -> Vec<ExportedFile> {

@@ -34,15 +34,15 @@ impl RunResults {
     /// # Errors
     /// A folder without a run, or a line that is not a result.
     pub fn read(folder: &Path) -> Result<Self, FolderError> {
-        let radius_m = read_run(folder)?.failure_radius_m();
-        Ok(Self::of(read_rows(folder)?, radius_m))
+        let run = read_run(folder)?;
+        Ok(Self::of(read_results(folder, &run)?, run.failure_radius_m()))
     }
 }
 
 /// Reads the results of a folder.
 ///
 /// # Errors
-/// A line that is no result.
+/// A folder without a run, or a line that is not its result.
 pub fn read_rows(folder: &Path) -> Result<Vec<QueryResult>, FolderError> {
-    read_results(folder)?.collect()
+    read_results(folder, &read_run(folder)?)
 }

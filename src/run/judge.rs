@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use super::plan::Judging;
 use super::run_file::RunFile;
-use super::run_folder::FolderError;
+use super::run_folder::{FolderError, read_results};
 use super::scenes::Scenes;
 use crate::doctor::{mistake, unseen_map};
 use crate::localize::QueryResult;
@@ -39,7 +39,7 @@ impl Judgement {
         judging: &Judging,
         examine: impl FnOnce(&[QueryResult]) -> Vec<Finding>,
     ) -> Result<Self, FolderError> {
-        let rows = read_rows(folder)?;
+        let rows = read_results(folder, run)?;
         let Judging { gates, known, before, only_repeated } = judging;
         let compared = before.as_deref().map(|before| compare(before, &rows, *only_repeated));
         let comparison = compared.transpose()?;

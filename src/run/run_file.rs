@@ -116,6 +116,15 @@ fn invalid(run: &RunFile) -> Option<(String, String)> {
         let message = "at least one radius above 0 expected".to_owned();
         return Some(("protocol.radius".to_owned(), message));
     }
+    for (at, pair) in run.pairs.iter().enumerate() {
+        let names = [&pair.scene, &pair.query_scene].into_iter().chain(&pair.queries);
+        let mut names = names.chain(&pair.drawn);
+        if let Some(name) = names.find(|name| name.contains(char::is_control)) {
+            let name: String = name.escape_default().take(100).collect();
+            let message = format!("names without control characters expected, `{name}` found");
+            return Some((format!("pair.{at}"), message));
+        }
+    }
     let scenes = run.scenes.len();
     let pair = run.pairs.iter().position(|pair| pair.scene_index >= scenes)?;
     let message = format!(
@@ -309,7 +318,7 @@ impl RunFile {
     pub(super) fn read(text: &str) -> Result<Self, RunFileError> {
         let error_at = |at: usize, message: String| RunFileError {
             line: text[..at.min(text.len())].matches('\n').count() + 1,
-            message: message.replace('\n', " "),
+            message: message.replace('\n', " ").chars().take(400).collect(),
         };
         let syntax = |error: toml::de::Error| {
             let at = error.span().map_or(0, |span| span.start);

@@ -3,12 +3,13 @@
 //! A query's results are appended together once all are computed, so a killed run loses at most the current
 //! query. Resuming cuts off incomplete lines and ends with the same bytes.
 
+mod checking;
 mod merging;
 mod reading;
 mod recording_names;
 
 use std::fs::{self, File, OpenOptions, TryLockError};
-use std::io::{self, BufRead as _, BufReader, Seek as _, SeekFrom, Write as _};
+use std::io::{self, BufReader, Seek as _, SeekFrom, Write as _};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
@@ -16,11 +17,15 @@ use serde::Serialize;
 
 use super::run_file::RunFile;
 use crate::diagnosis::Code;
-use crate::localize::{QueryResult, StageTimes};
+use crate::fusion::Fusion;
+use crate::localize::{QueryResult, Setting, StageTimes};
 use crate::method::Method;
-use posescope_core::files::write_whole;
+use posescope_core::files::{
+    self, expect_no_link, is_temporary, next_line, replaced_with, write_whole,
+};
 use posescope_core::text::json_message;
 
+use checking::{Line, PlannedLines};
 pub use merging::merge;
 pub use reading::{read_results, read_run, result_lines, results_of_pair};
 pub use recording_names::RecordingNames;
@@ -139,7 +144,7 @@ impl RunFolder {
         let folder = Self::open(path)?;
         let file = path.join(RUN);
         // Another process may have run in the meantime.
-        if file.exists() {
+        if file.is_symlink() || file.exists() {
             return Err(FolderError::NotEmpty { path: path.to_owned(), is_run: true });
         }
         let text = toml_of(&run.located_in(path));
@@ -163,9 +168,8 @@ impl RunFolder {
         same_run(path, &read_run(path)?, run)?;
         let mut folder = Self::open(path)?;
         remove_temporary_files(path).map_err(FolderError::io(path))?;
-        let results: Prefix = folder.prefix(RESULTS)?;
-        let timings: Prefix = folder.prefix(TIMINGS)?;
-        folder.check_order(run, &results, results_per_item)?;
+        let results: Prefix = folder.prefix(RESULTS, run)?;
+        let timings: Prefix = folder.prefix(TIMINGS, run)?;
         let whole = |prefix: &Prefix| prefix.ends.len() / results_per_item;
         let done = whole(&results).min(whole(&timings));
         let is_unread = |query: &usize| {
@@ -188,6 +192,7 @@ impl RunFolder {
     fn open(path: &Path) -> Result<Self, FolderError> {
         let open = |name: &str| {
             let file = path.join(name);
+            expect_no_link(&file).map_err(FolderError::io(&file))?;
             let options = OpenOptions::new().create(true).read(true).append(true).open(&file);
             options.map_err(FolderError::io(file))
         };
@@ -253,16 +258,14 @@ impl RunFolder {
     fn replaced(&self, name: &str, lines: Range<usize>, new: &[u8]) -> Result<File, FolderError> {
         let path = self.path.join(name);
         let replace = || {
-            let old = fs::read(&path)?;
+            let old = files::read(&path, u64::MAX - 1)?;
             let old: Vec<&[u8]> = old.split_inclusive(|byte| *byte == b'\n').collect();
             let whole = [&old[..lines.start].concat(), new, &old[lines.end..].concat()].concat();
-            let temporary = self.path.join(format!("tmp-{name}"));
-            fs::write(&temporary, whole)?;
-            let file = OpenOptions::new().read(true).append(true).open(&temporary)?;
-            // The lock of the old file ends with it.
-            file.try_lock().ok();
-            fs::rename(temporary, &path)?;
-            Ok(file)
+            replaced_with(&path, |file| {
+                // The lock of the old file ends with it.
+                file.try_lock().ok();
+                file.write_all(&whole)
+            })
         };
         replace().map_err(FolderError::io(&path))
     }
@@ -281,22 +284,23 @@ impl RunFolder {
         Ok((lines, times))
     }
 
-    /// Complete lines of a file.
-    fn prefix(&self, name: &str) -> Result<Prefix, FolderError> {
+    /// Complete lines of a file of the run.
+    fn prefix(&self, name: &str, run: &RunFile) -> Result<Prefix, FolderError> {
         let path = self.path.join(name);
-        let file = File::open(&path).map_err(FolderError::io(&path))?;
+        let file = files::open(&path).map_err(FolderError::io(&path))?;
         let mut reader = BufReader::new(file);
         let mut prefix = Prefix::default();
+        let mut planned = PlannedLines::of(run);
         let (mut line, mut end) = (Vec::new(), 0);
         loop {
             line.clear();
-            let length = reader.read_until(b'\n', &mut line).map_err(FolderError::io(&path))?;
-            let head = serde_json::from_slice::<Head>(&line);
+            let length = next_line(&mut reader, &mut line).map_err(FolderError::io(&path))?;
+            let head = serde_json::from_slice::<Head>(&line).map_err(|error| json_message(&error));
+            let head = head.and_then(|head| planned.check(&head.line()).map(|()| head));
             match head {
                 Ok(head) if line.ends_with(b"\n") => {
                     end += length as u64;
                     prefix.ends.push(end);
-                    prefix.queries.push(head.query);
                     prefix
                         .unread
                         .push(head.reason.is_some_and(|reason| reason.code == Code::I1.name()));
@@ -304,46 +308,36 @@ impl RunFolder {
                 // What a killed process wrote last has no end.
                 _ if !line.ends_with(b"\n") => return Ok(prefix),
                 head => {
-                    let expected =
-                        head.err().map_or_else(String::new, |error| json_message(&error));
-                    return Err(FolderError::Damaged {
-                        path,
-                        line: prefix.ends.len() + 1,
-                        message: format!(
-                            "{expected}; remove this line and all below, and --resume localises their queries again"
-                        ),
-                    });
+                    let (line, expected) = (prefix.ends.len() + 1, head.err().unwrap_or_default());
+                    return Err(checking::damaged(&path, line, &expected));
                 }
             }
         }
-    }
-
-    fn check_order(
-        &self,
-        run: &RunFile,
-        results: &Prefix,
-        per_item: usize,
-    ) -> Result<(), FolderError> {
-        let expected = run.items().flat_map(|item| vec![item.query; per_item]);
-        let found = results.queries.iter().enumerate();
-        for ((line, found), expected) in found.zip(expected) {
-            if found != expected {
-                return Err(FolderError::Damaged {
-                    path: self.path.join(RESULTS),
-                    line: line + 1,
-                    message: format!("query {expected} expected, {found} found"),
-                });
-            }
-        }
-        Ok(())
     }
 }
 
 /// The common fields of both kinds of line.
 #[derive(serde::Deserialize)]
 struct Head {
+    schema: Option<String>,
+    scene: Option<String>,
+    query_scene: Option<String>,
     query: String,
+    method: String,
+    setting: Option<Setting>,
+    fusion: Option<Fusion>,
     reason: Option<HeadReason>,
+}
+
+impl Head {
+    fn line(&self) -> Line<'_> {
+        let Self { schema, scene, query_scene, query, method, setting, fusion, .. } = self;
+        let schema = schema.as_deref();
+        let scenes = scene.as_deref().map(|scene| [scene, query_scene.as_deref().unwrap_or(scene)]);
+        // Times have neither scenes nor settings.
+        let case = scenes.map(|_| (*setting, *fusion));
+        Line { schema, scenes, query, method, case }
+    }
 }
 
 #[derive(serde::Deserialize)]
@@ -352,11 +346,10 @@ struct HeadReason {
     code: String,
 }
 
-/// The complete lines at the beginning of a file: their ends \[bytes\], queries, and whether files could not be read.
+/// The complete lines at the beginning of a file: their ends \[bytes\], and whether files could not be read.
 #[derive(Default)]
 struct Prefix {
     ends: Vec<u64>,
-    queries: Vec<String>,
     unread: Vec<bool>,
 }
 
@@ -393,9 +386,9 @@ fn holds_anything(path: &Path) -> Result<bool, FolderError> {
     };
     for entry in entries {
         let entry = entry.map_err(FolderError::io(path))?;
-        let is_temporary = entry.file_name().to_string_lossy().starts_with("tmp-");
+        let is_temporary = is_temporary(&entry.file_name());
         let is_empty = [RESULTS, TIMINGS].iter().any(|name| entry.file_name() == *name)
-            && entry.metadata().is_ok_and(|file| file.len() == 0);
+            && entry.metadata().is_ok_and(|file| file.is_file() && file.len() == 0);
         if !is_temporary && !is_empty {
             return Ok(true);
         }
@@ -407,7 +400,7 @@ fn holds_anything(path: &Path) -> Result<bool, FolderError> {
 fn remove_temporary_files(folder: &Path) -> io::Result<()> {
     for entry in fs::read_dir(folder)? {
         let entry = entry?;
-        if entry.file_name().to_string_lossy().starts_with("tmp-") {
+        if is_temporary(&entry.file_name()) && entry.file_type()?.is_file() {
             fs::remove_file(entry.path())?;
         }
     }
@@ -475,12 +468,25 @@ mod tests {
         assert!(!path.join(RUN).exists());
         drop(other);
         let other = RunFolder::create(path, &run).expect("nobody has the lock");
-        let temporary = path.join("tmp-results.jsonl");
+        let temporary = path.join("tmp-posescope-a.jsonl");
         fs::write(&temporary, "of the other process").expect("writable");
         is_in_use(RunFolder::resume(path, &run));
         assert!(temporary.exists());
         drop(other);
         RunFolder::resume(path, &run).expect("nobody has the lock");
         assert!(!temporary.exists());
+    }
+
+    #[test]
+    fn files_of_others_stay_whatever_they_are_called() {
+        let root = TempDir::new().expect("a folder");
+        let (path, run) = (root.path(), run(&["70"]));
+        drop(RunFolder::create(path, &run).expect("an empty folder"));
+        let foreign = ["tmp-notes.txt", "tmp-a.json", "tmp-results.jsonl"];
+        for name in foreign {
+            fs::write(path.join(name), "").expect("writable");
+        }
+        RunFolder::resume(path, &run).expect("our own");
+        assert!(foreign.iter().all(|name| path.join(name).exists()));
     }
 }

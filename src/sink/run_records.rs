@@ -13,7 +13,7 @@ use super::rerun::{Identity, RecordError, Recorder, Targets};
 use crate::diagnosis::Code;
 use crate::event::KindSet;
 use crate::geometry::Pose;
-use crate::localize::{LocalizeError, LocalizeObserver, QueryResult};
+use crate::localize::{LocalizeError, LocalizeObserver};
 use crate::method::Method;
 use crate::problem::Problem;
 use crate::run::{
@@ -67,8 +67,7 @@ impl<'a> RunRecords<'a> {
         events: Option<EventExport>,
         follower: &'a mut dyn Follower,
     ) -> Result<Self, FolderError> {
-        let path = folder.path().join(FAILURES);
-        fs::create_dir_all(&path).map_err(FolderError::io(&path))?;
+        let path = own_folder(folder.path())?;
         let failures = failures(folder.path(), &plan.run)?;
         Ok(Self {
             folder: path,
@@ -130,13 +129,13 @@ pub fn merge_failures(
     kept: usize,
     run: &RunFile,
 ) -> Result<(), FolderError> {
-    let folder = target.join(FAILURES);
-    fs::create_dir_all(&folder).map_err(FolderError::io(&folder))?;
+    let folder = own_folder(target)?;
     let failures = failures(target, run)?;
     warn_of_missed(failures.len().saturating_sub(kept));
     for file in failures.iter().take(kept) {
         let mut sources = parts.iter().map(|part| part.join(FAILURES).join(file));
-        if let Some(source) = sources.find(|path| path.exists()) {
+        let is_own = |path: &PathBuf| path.symlink_metadata().is_ok_and(|file| file.is_file());
+        if let Some(source) = sources.find(is_own) {
             let copied = fs::copy(&source, folder.join(file));
             copied.map_err(FolderError::io(source))?;
         }
@@ -144,11 +143,21 @@ pub fn merge_failures(
     Ok(())
 }
 
+/// The folder of the failures' recordings, which is made if it is not there. A link would lead out of the run folder.
+fn own_folder(run: &Path) -> Result<PathBuf, FolderError> {
+    let path = run.join(FAILURES);
+    if path.is_symlink() {
+        let error = std::io::Error::other("a folder expected, a link found");
+        return Err(FolderError::io(&path)(error));
+    }
+    fs::create_dir_all(&path).map_err(FolderError::io(&path))?;
+    Ok(path)
+}
+
 /// The recordings of all failures of a run folder, in the order of its results.
 fn failures(folder: &Path, run: &RunFile) -> Result<Vec<String>, FolderError> {
     let (mut files, names): (Vec<String>, _) = (Vec::new(), RecordingNames::of(run));
-    for result in read_results::<QueryResult>(folder)? {
-        let result = result?;
+    for result in read_results(folder, run)? {
         // Queries whose files cannot be read have no recording.
         let is_unread = result.reason.as_ref().is_some_and(|reason| reason.code == Code::I1);
         let file = names.of_result(&result).filter(|_| result.grade.is_failure() && !is_unread);

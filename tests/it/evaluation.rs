@@ -407,8 +407,7 @@ fn a_query_that_panics_is_a_failed_result_and_the_rest_goes_on() {
     };
     Evaluation::run(&plan, &mut folder, &mut NoRunObserver(NoObserver))
         .expect("a panic is a result");
-    let results = read_results(&out).expect("results");
-    let results: Vec<QueryResult> = results.map(|one| one.expect("a result")).collect();
+    let results = read_results(&out, &plan.run).expect("results");
     assert_eq!(results.len(), 8);
     for result in &results {
         let code = result.reason.as_ref().map(|reason| reason.code);

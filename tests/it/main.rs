@@ -19,6 +19,8 @@ mod documents;
 mod evaluation;
 mod events;
 mod foreign;
+#[cfg(unix)]
+mod foreign_runs;
 mod frame_cache;
 mod frame_layout;
 mod gps;

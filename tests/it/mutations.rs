@@ -11,7 +11,6 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use posescope::foreign::MatchSource as _;
-use posescope::localize::QueryResult;
 use posescope::params::Params;
 use posescope::run::{FolderError, RunFolder, read_results, read_run};
 use posescope::scene::{
@@ -39,7 +38,7 @@ fn mutations() -> usize {
 /// A file as it may arrive: cut off, with bytes or pieces of another, doubled, or not there.
 fn damaged(whole: &[u8], random: &mut Pcg64Mcg) -> Option<Vec<u8>> {
     let mut bytes = whole.to_vec();
-    match random.random_range(0..8) {
+    match random.random_range(0..9) {
         0 => return None,
         1 => bytes.truncate(random.random_range(0..=whole.len())),
         2 => bytes.extend_from_slice(whole),
@@ -53,11 +52,12 @@ fn damaged(whole: &[u8], random: &mut Pcg64Mcg) -> Option<Vec<u8>> {
         4 if whole.len() >= 8 => {
             // A length or a number that is too large.
             let at = random.random_range(0..=whole.len() - 8);
-            let value =
-                [u64::MAX, 1 << 31, 1 << 40, 0x7ff0_0000_0000_0000][random.random_range(0..4)];
+            let value = [u64::MAX, 1 << 31, 1 << 40, 1 << 63, 0x7ff0_0000_0000_0000]
+                [random.random_range(0..5)];
             let width = [2, 4, 8][random.random_range(0..3)];
             bytes[at..at + width].copy_from_slice(&value.to_le_bytes()[..width]);
         }
+        5 => hostile_number(&mut bytes, random),
         _ => {
             for _ in 0..random.random_range(1..8) {
                 if bytes.is_empty() {
@@ -74,6 +74,35 @@ fn damaged(whole: &[u8], random: &mut Pcg64Mcg) -> Option<Vec<u8>> {
         }
     }
     Some(bytes)
+}
+
+/// Replaces a number that is written as text, often a count or a size of a header, with one that has no place there.
+fn hostile_number(bytes: &mut Vec<u8>, random: &mut Pcg64Mcg) {
+    const NUMBERS: [&str; 10] = [
+        "0",
+        "-1",
+        "1e308",
+        "1e155",
+        "nan",
+        "4294967296",
+        "9223372036854775808",
+        "18446744073709551615",
+        "99999999999999999999999",
+        "0.0000000000000000000001",
+    ];
+    let is_digit = |byte: Option<&u8>| byte.is_some_and(u8::is_ascii_digit);
+    // Headers are at the beginning.
+    let end = if random.random() { bytes.len().min(400) } else { bytes.len() };
+    let starts: Vec<usize> = (0..end)
+        .filter(|&at| is_digit(bytes.get(at)) && (at == 0 || !is_digit(bytes.get(at - 1))))
+        .collect();
+    if starts.is_empty() {
+        return;
+    }
+    let start = starts[random.random_range(0..starts.len())];
+    let length = bytes[start..].iter().take_while(|byte| byte.is_ascii_digit()).count();
+    let number = NUMBERS[random.random_range(0..NUMBERS.len())];
+    bytes.splice(start..start + length, number.bytes());
 }
 
 /// Damages one file after the other, reads, and mends it. `read` says what it was told.
@@ -216,10 +245,7 @@ fn no_damage_to_a_run_folder_makes_its_reader_panic() {
     let files = names.map(|name| out.join(name));
     mutate("a run folder", &files, || {
         let read = || -> Result<(), FolderError> {
-            read_run(&out)?;
-            for result in read_results(&out)? {
-                let _: QueryResult = result?;
-            }
+            read_results(&out, &read_run(&out)?)?;
             posescope::measure::read_rows(&out)?;
             Ok(())
         };

@@ -1,17 +1,20 @@
 //! Putting the parts of a run together.
 
-use std::fs::File;
-use std::io::{self, Write as _};
+use std::fs;
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
+use super::checking::PlannedLines;
 use super::reading::{lines_of, read_run};
-use super::{FolderError, RESULTS, RUN, RunFolder, TIMINGS, same_run};
-use crate::run::RunFile;
+use super::{FolderError, Head, RESULTS, RUN, RunFolder, TIMINGS, checking, same_run};
+use crate::run::{RunFile, RunItem};
+use posescope_core::text::json_message;
 
-/// Merges the shards of a run into one folder, with the same content as an unsplit run.
+/// Merges the shards of a run into one folder, with the same content as an unsplit run. If that fails, the folder has
+/// no run.
 ///
 /// # Errors
-/// [`FolderError`]: parts of different runs, or a missing, repeated or incomplete part.
+/// [`FolderError`]: parts of different runs, or a missing, repeated, damaged or incomplete part.
 pub fn merge(shards: &[PathBuf], target: &Path) -> Result<RunFile, FolderError> {
     let mut runs = Vec::new();
     for path in shards {
@@ -23,51 +26,76 @@ pub fn merge(shards: &[PathBuf], target: &Path) -> Result<RunFile, FolderError> 
     let whole = first.whole();
     for (path, run) in &runs {
         same_run(path, &run.whole(), &whole)?;
-    }
-    let per_item = whole.results_per_item();
-    let mut sources = Vec::new();
-    for (path, run) in &runs {
-        let lines = (lines_of(path, RESULTS)?, lines_of(path, TIMINGS)?);
-        let lines_in = |name: &str| Ok::<usize, FolderError>(lines_of(path, name)?.count());
-        let complete = lines_in(RESULTS)?.min(lines_in(TIMINGS)?) / per_item;
-        let items = run.items().count();
-        if complete != items {
-            return Err(FolderError::Incomplete { path: (*path).clone(), done: complete, items });
+        for name in [TIMINGS, RESULTS] {
+            expect_whole(path, name, run)?;
         }
-        sources.push((run.shard, lines));
     }
-    let mut folder = RunFolder::create(target, &whole)?;
-    for item in whole.plan() {
-        let mut owners =
-            sources.iter_mut().filter(|(shard, _)| shard.is_none_or(|shard| shard.has(item.index)));
+    // Which part each query is in.
+    let owner = |item: &RunItem<'_>| {
+        let mut owners = (0..runs.len())
+            .filter(|&part| runs[part].1.shard.is_none_or(|shard| shard.has(item.index)));
         let problem = |message: &str| FolderError::Damaged {
             path: first_path.join(RUN),
             line: 1,
             message: format!("query {} is in {message} of the parts to merge", item.query),
         };
-        let Some((_, (results, timings))) = owners.next() else {
-            return Err(problem("none"));
-        };
-        if owners.next().is_some() {
-            return Err(problem("more than one"));
+        let owner = owners.next().ok_or_else(|| problem("none"))?;
+        match owners.next() {
+            Some(_) => Err(problem("more than one")),
+            None => Ok(owner),
         }
-        for _ in 0..per_item {
-            copy_line(timings, &mut folder.timings, target)?;
+    };
+    let owners = whole.plan().map(|item| owner(&item)).collect::<Result<Vec<usize>, _>>()?;
+    let folder = RunFolder::create(target, &whole)?;
+    let parts: Vec<&Path> = runs.iter().map(|(path, _)| path.as_path()).collect();
+    let copied = copy(&parts, &owners, whole.results_per_item(), folder);
+    if copied.is_err() {
+        // All of them are new: the folder was empty.
+        for name in [RUN, TIMINGS, RESULTS] {
+            fs::remove_file(target.join(name)).ok();
         }
-        for _ in 0..per_item {
-            copy_line(results, &mut folder.results, target)?;
-        }
-        folder.done += 1;
     }
-    Ok(whole)
+    copied.map(|()| whole)
 }
 
-fn copy_line(
-    lines: &mut impl Iterator<Item = io::Result<String>>,
-    file: &mut File,
-    target: &Path,
+/// Copies the lines of all queries, each from its owner among the parts.
+fn copy(
+    parts: &[&Path],
+    owners: &[usize],
+    per_item: usize,
+    mut folder: RunFolder,
 ) -> Result<(), FolderError> {
-    let Some(line) = lines.next() else { return Ok(()) };
-    let written = line.and_then(|line| writeln!(file, "{line}"));
-    written.map_err(FolderError::io(target))
+    for (name, file) in [(TIMINGS, &mut folder.timings), (RESULTS, &mut folder.results)] {
+        let sources = parts.iter().map(|part| lines_of(part, name));
+        let mut sources = sources.collect::<Result<Vec<_>, _>>()?;
+        for &owner in owners {
+            for line in sources[owner].by_ref().take(per_item) {
+                let line = line.map_err(FolderError::io(parts[owner].join(name)))?;
+                writeln!(file, "{line}").map_err(FolderError::io(&folder.path))?;
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Checks that the lines of a file are those of the run, and that none is missing.
+fn expect_whole(folder: &Path, name: &str, run: &RunFile) -> Result<(), FolderError> {
+    let path = folder.join(name);
+    let mut planned = PlannedLines::of(run);
+    let mut count = 0;
+    for line in lines_of(folder, name)? {
+        let line = line.map_err(FolderError::io(&path))?;
+        count += 1;
+        let head = serde_json::from_str::<Head>(&line).map_err(|error| json_message(&error));
+        head.and_then(|head| planned.check(&head.line()))
+            .map_err(|expected| checking::damaged(&path, count, &expected))?;
+    }
+    if planned.are_all() {
+        return Ok(());
+    }
+    Err(FolderError::Incomplete {
+        path: folder.to_owned(),
+        done: count / run.results_per_item(),
+        items: run.items().count(),
+    })
 }

@@ -1,13 +1,13 @@
 //! Reading a run folder.
 
 use std::collections::{BTreeMap, HashMap};
-use std::fs::{self, File};
-use std::io::{self, BufRead as _, BufReader};
+use std::io;
 use std::path::Path;
 
+use posescope_core::files::{self, expect_no_link};
 use posescope_core::text::json_message;
-use serde::de::DeserializeOwned;
 
+use super::checking::{self, Line, PlannedLines};
 use super::{FolderError, RESULTS, RUN};
 use crate::localize::QueryResult;
 use crate::params::Params;
@@ -21,7 +21,8 @@ use crate::scene::Scene;
 /// [`FolderError::NoRun`], or an error in the file.
 pub fn read_run(folder: &Path) -> Result<RunFile, FolderError> {
     let path = folder.join(RUN);
-    let text = match fs::read_to_string(&path) {
+    expect_no_link(&path).map_err(FolderError::io(&path))?;
+    let text = match files::read_text(&path, files::DESCRIPTION) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => {
             return Err(FolderError::NoRun(folder.to_owned()));
         }
@@ -43,29 +44,59 @@ fn completed(params: toml::Table) -> toml::Table {
     }
 }
 
-/// Reads the lines of `results.jsonl` one by one, as the fields of `T`.
+/// Reads the results of a run in a folder, in the order of its plan. There may be fewer than the plan has.
 ///
 /// # Errors
-/// A line that is not a result.
-pub fn read_results<T: DeserializeOwned>(
-    folder: &Path,
-) -> Result<impl Iterator<Item = Result<T, FolderError>>, FolderError> {
+/// A line that is no result, or not the one that the plan has in its place.
+pub fn read_results(folder: &Path, run: &RunFile) -> Result<Vec<QueryResult>, FolderError> {
     let path = folder.join(RESULTS);
-    Ok(result_lines(folder)?.enumerate().map(move |(index, line)| {
-        serde_json::from_str(&line?).map_err(|error| FolderError::Damaged {
-            path: path.clone(),
-            line: index + 1,
-            message: json_message(&error),
+    let mut planned = PlannedLines::of(run);
+    let lines = result_lines(folder)?.enumerate();
+    lines
+        .map(|(index, line)| {
+            let result: Result<QueryResult, String> =
+                serde_json::from_str(&line?).map_err(|error| json_message(&error));
+            let checked = result.and_then(|result| {
+                planned.check(&Line::of(&result))?;
+                expect_numbers(&result)?;
+                Ok(result)
+            });
+            checked.map_err(|expected| checking::damaged(&path, index + 1, &expected))
         })
-    }))
+        .collect()
 }
 
-/// The results that are about a pair of the run's scenes, by the frames of the queries, and how many are about others.
+/// Refuses numbers that nothing can be computed with: what is made of them is not to be lost for one line.
+fn expect_numbers(result: &QueryResult) -> Result<(), String> {
+    /// The square of a number is one, too.
+    const LARGEST: f64 = 1e150;
+    let all = std::iter::once(result).chain(result.per_reference.iter().flatten());
+    for QueryResult { pose, error, initial_error, .. } in all {
+        let errors = [error, initial_error].into_iter().flatten();
+        let mut lengths = errors.map(|error| error.translation_m).collect::<Vec<f64>>();
+        if let Some(pose) = pose {
+            lengths.extend(pose.position_m);
+            let length = pose.quaternion_xyzw.map(|part| part * part).iter().sum::<f64>().sqrt();
+            if !(0.98..1.02).contains(&length) {
+                return Err(format!("a quaternion of length 1 expected, one of {length} found"));
+            }
+        }
+        if let Some(large) =
+            lengths.into_iter().find(|length| !(-LARGEST..=LARGEST).contains(length))
+        {
+            return Err(format!("lengths up to {LARGEST:e} expected, {large:e} found"));
+        }
+    }
+    Ok(())
+}
+
+/// The results of a run that are about a pair of its scenes, by the frames of the queries, and how many are about others.
 ///
 /// # Errors
 /// Results that cannot be read.
 pub fn results_of_pair(
     folder: &Path,
+    run: &RunFile,
     pair: &ScenePair,
     queries: &dyn Scene,
 ) -> Result<(BTreeMap<usize, Vec<QueryResult>>, usize), FolderError> {
@@ -73,8 +104,7 @@ pub fn results_of_pair(
     let frames: HashMap<&str, usize> = frames.map(|(at, name)| (name.as_str(), at)).collect();
     let mut results = BTreeMap::<usize, Vec<QueryResult>>::new();
     let mut elsewhere = 0;
-    for result in read_results::<QueryResult>(folder)? {
-        let result = result?;
+    for result in read_results(folder, run)? {
         let of_queries = result.query_scene.as_ref().unwrap_or(&result.scene);
         let is_of_pair = result.scene == pair.scene && *of_queries == pair.query_scene;
         match frames.get(result.query.as_str()).filter(|_| is_of_pair) {
@@ -103,6 +133,5 @@ pub(super) fn lines_of(
     name: &str,
 ) -> Result<impl Iterator<Item = io::Result<String>>, FolderError> {
     let path = folder.join(name);
-    let file = File::open(&path).map_err(FolderError::io(path))?;
-    Ok(BufReader::new(file).lines())
+    expect_no_link(&path).and_then(|()| files::lines(&path)).map_err(FolderError::io(path))
 }

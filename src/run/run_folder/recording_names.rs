@@ -2,6 +2,8 @@
 
 use std::collections::{HashMap, HashSet};
 
+use posescope_core::files::file_name;
+
 use crate::localize::QueryResult;
 use crate::method::Method;
 use crate::run::{RunFile, ScenePair};
@@ -14,8 +16,8 @@ pub struct RecordingNames(HashMap<[String; 3], String>);
 impl RecordingNames {
     /// Those of all queries of a run.
     pub fn of(run: &RunFile) -> Self {
-        let is_plain = |c: char| c.is_alphanumeric() || "-_.".contains(c);
         let several_pairs = run.pairs.len() > 1;
+        let methods = &run.protocol.methods;
         let queries = run.plan().map(|item| {
             let ScenePair { scene, query_scene, .. } = item.pair;
             let scenes = several_pairs.then(|| format!("{scene}-{query_scene}-"));
@@ -23,16 +25,24 @@ impl RecordingNames {
             ([scene, query_scene, item.query].map(str::to_owned), name)
         });
         let (exact, changed): (Vec<_>, Vec<_>) =
-            queries.partition(|(_, name)| name.chars().all(is_plain));
-        let mut used: HashSet<String> = exact.iter().map(|(_, name)| name.clone()).collect();
-        let changed = changed.into_iter().map(|(key, name)| {
-            let plain: String = name.chars().map(|c| if is_plain(c) { c } else { '-' }).collect();
+            queries.partition(|(_, name)| file_name(name) == *name);
+        let mut used: HashSet<String> = HashSet::new();
+        let mut named = |(key, name): ([String; 3], String)| {
+            let plain = file_name(&name);
             let numbered = (2..).map(|number| format!("{plain}-{number}"));
-            let mut free = [plain.clone()].into_iter().chain(numbered);
-            let name = free.find(|name| used.insert(name.clone()));
-            (key, name.unwrap_or(plain))
-        });
-        let changed: Vec<_> = changed.collect();
+            let free = [plain.clone()].into_iter().chain(numbered).find(|name| {
+                let files: Vec<String> =
+                    methods.iter().map(|method| format!("{name}-{method}")).collect();
+                let is_free = !files.iter().any(|file| used.contains(file));
+                if is_free {
+                    used.extend(files);
+                }
+                is_free
+            });
+            (key, free.unwrap_or(plain))
+        };
+        let exact: Vec<_> = exact.into_iter().map(&mut named).collect();
+        let changed: Vec<_> = changed.into_iter().map(named).collect();
         Self(exact.into_iter().chain(changed).collect())
     }
 
