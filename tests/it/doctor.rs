@@ -112,7 +112,7 @@ fn are_mended(faults: &[Fault]) {
                 fs::write(&poses, lines + rest).expect("writable");
                 text
             }
-            other => panic!("{fault:?}: {other:?}"),
+            Place::DepthPerMetre => panic!("{fault:?} has no depth images"),
         };
         fs::write(&scene, text).expect("writable");
         let mended = examine(open(folder.path()).as_ref());

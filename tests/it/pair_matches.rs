@@ -9,7 +9,6 @@ use posescope::foreign::MatchSource as _;
 use posescope::localize::QueryResult;
 use posescope::method::Method;
 use posescope::scene::MatchFolder;
-use posescope_core::features::PairMatches;
 use tempfile::TempDir;
 
 use crate::binary::{has, run_in, write};
