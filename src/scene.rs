@@ -47,13 +47,14 @@ pub use posescope_street as street;
 use posescope_core::image::MAX_PIXELS;
 
 use crate::camera::Intrinsics;
+use crate::geometry::Pose;
 
 pub use cloud_file::is_decoding;
 pub use estimates::read_estimates;
 pub use gps::located;
 pub use loose::{CameraArgument, LoosePhotos};
 pub use pair_matches::{MatchFolder, PixelMaps, write_matches};
-pub use recalibrated::{Recalibrated, recalibrated};
+pub use recalibrated::Recalibrated;
 pub use retriever::{IndexOptions, NoIndex, Retriever};
 
 /// Every format, in the order in which they are tried.
@@ -101,6 +102,28 @@ pub fn open(argument: &str, format: Option<&str>) -> Result<Box<dyn Scene>, Scen
     let scene = (entry?.open)(argument)?;
     sound(argument, scene.as_ref())?;
     Ok(scene)
+}
+
+/// The calibration file of a scene, for clouds that are moved in the camera's frame.
+///
+/// # Errors
+/// A format whose calibration is in no file, and files that cannot be read.
+pub fn recalibrated(
+    argument: &str,
+    format: Option<&str>,
+    camera_from_stated: &Pose,
+) -> Result<Recalibrated, SceneError> {
+    let made = match format_of(argument, format).map(|entry| entry.name) {
+        Some("kitti") => kitti::recalibrated,
+        Some("kitti-raw") => kitti_raw::recalibrated,
+        Some("toml") => described::recalibrated,
+        _ => {
+            let expected = "a scene of KITTI, KITTI raw or scene.toml expected: others have no file with the scanner's \
+                            place";
+            return Err(SceneError::expected(argument, expected));
+        }
+    };
+    made(argument, camera_from_stated)
 }
 
 /// Why no frame of a scene has a cloud, where its reader knows more than that.

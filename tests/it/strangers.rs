@@ -55,7 +55,7 @@ fn what_is_no_file_is_not_waited_for() {
         pipe(&path(name));
         let said = run(sequence.path(), command);
         assert!(matches!(said.code, Some(0 | 3)), "{name}: {}", said.err);
-        has(&said.err, words);
+        has(&(said.err + &said.out), words);
         fs::remove_file(path(name)).expect("ours");
         symlink("/dev/zero", path(name)).expect("writable");
         let said = run(sequence.path(), command);
