@@ -15,7 +15,6 @@ use posescope::app::{self, App, Arrangement, KnownResults, Results, Setup};
 use posescope::cloud::Cloud;
 use posescope::localize::QueryResult;
 use posescope::method::Method;
-use posescope::run::ScenePair;
 use posescope::scene::{self, Scene, SceneError};
 use posescope::session::{Job, RunMode, RunState, Task};
 
@@ -171,7 +170,6 @@ fn scrubbing_in_space(bencher: Bencher) {
 /// The results of the window's query, repeated over the frames of its scene: a run folder of so many.
 struct ManyResults {
     folder: tempfile::TempDir,
-    pair: ScenePair,
     scene: Arc<dyn Scene>,
 }
 
@@ -191,26 +189,17 @@ impl ManyResults {
             })
             .collect();
         std::fs::write(folder.path().join("results.jsonl"), lines).expect("written");
-        let camera = scene.intrinsics(0);
-        let pair = ScenePair {
-            scene_index: 0,
-            query_index: None,
-            scene: scene.name().to_owned(),
-            query_scene: scene.name().to_owned(),
-            camera: camera.into(),
-            cameras: Vec::new(),
-            drawn: Vec::new(),
-            queries: Vec::new(),
-            times_s: Vec::new(),
-        };
-        Self { folder, pair, scene }
+        Self { folder, scene }
     }
 
     fn read(&self) -> Results {
-        let read =
-            posescope::run::results_of_pair(self.folder.path(), &self.pair, self.scene.as_ref());
-        let (results, elsewhere) = read.expect("readable");
-        assert_eq!(elsewhere, 0);
+        let mut results = Results::new();
+        let text = std::fs::read_to_string(self.folder.path().join("results.jsonl"));
+        for line in text.expect("written").lines() {
+            let result: QueryResult = serde_json::from_str(line).expect("a result");
+            let frame = self.scene.find(&result.query).expect("a frame");
+            results.entry(frame).or_default().push(result);
+        }
         results
     }
 
