@@ -9,6 +9,7 @@
 
 mod agreement;
 mod calibration;
+mod correction;
 mod inventory;
 mod matches;
 mod picture;
@@ -23,8 +24,9 @@ use crate::image::RgbImage;
 use crate::scene::Scene;
 
 pub use calibration::{CALIBRATION_STEPS, Calibration, Estimate, NotJudged, calibration};
+pub use correction::{Correction, Place};
 pub use inventory::{Inventory, Remark, unseen_map};
-pub use reading::{Correction, Mistake, Place, Subject};
+pub use reading::{Mistake, Subject};
 pub use sample::Agreement;
 pub use trial::{Finding, Fit};
 

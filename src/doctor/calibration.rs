@@ -139,7 +139,7 @@ pub const CALIBRATION_STEPS: [&str; 4] = [
     "searching turn and shift",
 ];
 
-/// Estimates how far the calibration of a scene is off, from frames spread over it. `begins` is told the number of each of
+/// Estimates how far the calibration of a scene is off, from frames spread over it. It calls `begins` with the number of each of
 /// [`CALIBRATION_STEPS`].
 ///
 /// # Errors

@@ -2,7 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use super::reading::{Change, Correction, FOOT_M, Mistake, READ_WITH_5000, Reading, readings};
+use super::correction::Correction;
+use super::reading::{Change, FOOT_M, Mistake, READ_WITH_5000, Reading, readings};
 use super::sample::{AS_STATED, Agreement, Sample};
 
 /// The least mean gain of another reading over the frames.

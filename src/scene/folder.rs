@@ -62,7 +62,7 @@ pub(super) fn within(folder: &Path, name: &str) -> Result<PathBuf, String> {
 /// Where the files of a scene may lie by their real paths.
 #[derive(Clone, Debug)]
 pub(super) enum Bounds {
-    /// Anywhere: somebody named each of them.
+    /// Anywhere: the user named each file.
     Anywhere,
     /// In this folder, which has a file that names them.
     Folder(PathBuf),

@@ -32,7 +32,7 @@ impl TextFile {
         Self::named(path)
     }
 
-    /// Reads a file that somebody named.
+    /// Reads a file that the user named.
     pub fn named(path: &Path) -> Result<Self, SceneError> {
         Ok(Self { path: path.to_owned(), text: read_text(path)? })
     }

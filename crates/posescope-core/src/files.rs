@@ -17,8 +17,8 @@ pub const LINE: u64 = 16 << 20;
 /// What the names of temporary files begin with.
 const TEMPORARY: &str = "tmp-posescope-";
 
-/// Opens a file to read it. What is no file is refused: a pipe has nothing to read until somebody writes, and a device
-/// may have no end.
+/// Opens a file to read it. Pipes and devices are refused: reading a pipe waits for a writer, and a device may have no
+/// end.
 ///
 /// # Errors
 /// The error of the system, or that the path is no file.
