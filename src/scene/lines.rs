@@ -171,12 +171,17 @@ pub(super) const NAMES: &[&str] = &["name", "frame", "image", "file", "filename"
 /// fields than the format has, and never another number.
 pub(super) fn fields(text: &str) -> Vec<&str> {
     let separator = [';', ','].into_iter().find(|&separator| text.contains(separator));
+    let mut fields = Vec::with_capacity(16);
     match separator {
-        Some(separator) => {
-            text.split(separator).map(|field| field.trim().trim_matches('"')).collect()
-        }
-        None => text.split_whitespace().map(|field| field.trim_matches('"')).collect(),
+        Some(separator) => fields.extend(text.split(separator).map(str::trim)),
+        None => fields.extend(text.split_ascii_whitespace()),
     }
+    if text.contains('"') {
+        for field in &mut fields {
+            *field = field.trim_matches('"');
+        }
+    }
+    fields
 }
 
 /// As many finite numbers as are asked for, and nothing else.

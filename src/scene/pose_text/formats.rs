@@ -252,7 +252,11 @@ fn matrix(words: &[&str]) -> Result<Option<Pose>, Why> {
     if count != 12 && count != 16 {
         return Err(Why::Form(format!("12 or 16 numbers of a matrix expected, {count} found")));
     }
-    let numbers = words.iter().map(|word| number(word)).collect::<Result<Vec<f64>, _>>()?;
+    let mut numbers = [0.0; 16];
+    for (place, word) in iter::zip(&mut numbers, words) {
+        *place = number(word)?;
+    }
+    let numbers = &numbers[..count];
     if numbers.iter().any(|number| !number.is_finite()) {
         return Ok(None);
     }
