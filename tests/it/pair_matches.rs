@@ -363,6 +363,7 @@ fn arrays_of_matches_are_read_as_what_they_are() {
     };
     for (name, words) in [
         ("groups-in-themselves.h5", "feats.h5 ~ a group is reached on many ways"),
+        ("large-chunk.h5", "keypoints: a part of 4261412864 bytes expected"),
         ("many-links.h5", "feats.h5 ~ the same groups are linked more than 32 times"),
         ("soft-links.h5", "feats.h5 ~ 000062.png: ~ a soft link found"),
         ("words.h5", "000070.png/keypoints: positions as numbers expected"),

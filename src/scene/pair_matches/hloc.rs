@@ -203,7 +203,7 @@ impl HlocFiles {
             })?;
             let place = format!("{name}/keypoints");
             let found = self.features.dataset(&place).map_err(text_of);
-            let found = found.and_then(|set| positions(&set));
+            let found = found.and_then(|set| positions(&set, self.features.file_size()));
             found.map_err(|why| content(&self.features_path, &format!("{place}: {why}")))
         };
         let (first, second) = (keypoints(stored[0])?, keypoints(stored[1])?);
@@ -212,7 +212,7 @@ impl HlocFiles {
         let place = format!("{group}/matches0");
         let partners = self.matches.dataset(&place).map_err(text_of);
         let partners = partners
-            .and_then(|set| partners_of(&set))
+            .and_then(|set| partners_of(&set, self.matches.file_size()))
             .map_err(|why| content(&self.matches_path, &format!("{place}: {why}")))?;
         let found = RawMatches { first, second, partners };
         found.checked(&self.matches_path).map(Some)
@@ -318,15 +318,27 @@ fn walk(group: &Group, path: &mut Vec<String>, found: &mut Found) -> Result<(), 
     Ok(())
 }
 
-/// Refuses arrays that are larger than any photo's keypoints, before reading them.
-fn check_size(set: &Dataset) -> Result<Vec<u64>, String> {
+/// Refuses arrays and parts of them that are larger than any photo's keypoints, or than the file \[bytes\], before
+/// reading them.
+fn check_size(set: &Dataset, file: u64) -> Result<Vec<u64>, String> {
     let shape = set.shape().map_err(text_of)?;
-    let count = shape.iter().try_fold(1_u64, |all, &side| all.checked_mul(side));
-    match count {
-        Some(count) if count <= 2 * MAX_KEYPOINTS as u64 => Ok(shape),
-        _ => Err(format!(
-            "at most {MAX_KEYPOINTS} keypoints in a photo expected, an array of {shape:?} found"
+    let chunk = set.chunk_shape().map_err(text_of)?;
+    for sides in chunk.iter().chain([&shape]) {
+        let count = sides.iter().try_fold(1_u64, |all, &side| all.checked_mul(side));
+        if count.is_none_or(|count| count > 2 * MAX_KEYPOINTS as u64) {
+            return Err(format!(
+                "at most {MAX_KEYPOINTS} keypoints in a photo expected, an array of {sides:?} found"
+            ));
+        }
+    }
+    let chunks = if chunk.is_some() { set.chunks().map_err(text_of)? } else { Vec::new() };
+    let is_inside = |at: u64, size: u64| at.checked_add(size).is_some_and(|end| end <= file);
+    match chunks.iter().find(|chunk| !is_inside(chunk.address, chunk.storage_size)) {
+        Some(chunk) => Err(format!(
+            "a part of {} bytes expected, but the file has only {file} bytes; it is cut off or damaged",
+            chunk.storage_size
         )),
+        None => Ok(shape),
     }
 }
 
@@ -334,8 +346,8 @@ fn no_numbers(kind: &dyn std::fmt::Display) -> String {
     format!("positions as numbers expected, {} found", excerpt_of(&kind.to_string(), 40))
 }
 
-fn positions(set: &Dataset) -> Result<Vec<[f32; 2]>, String> {
-    let [_, 2] = check_size(set)?[..] else {
+fn positions(set: &Dataset, file: u64) -> Result<Vec<[f32; 2]>, String> {
+    let [_, 2] = check_size(set, file)?[..] else {
         return Err("positions expected, an array N × 2".to_owned());
     };
     let numbers: Vec<f32> = match (set.dtype().map_err(text_of)?, set.datatype().map_err(text_of)?)
@@ -365,8 +377,8 @@ fn positions(set: &Dataset) -> Result<Vec<[f32; 2]>, String> {
     Ok(numbers.chunks_exact(2).map(|pair| [pair[0], pair[1]]).collect())
 }
 
-fn partners_of(set: &Dataset) -> Result<Vec<Option<usize>>, String> {
-    let [_] = check_size(set)?[..] else {
+fn partners_of(set: &Dataset, file: u64) -> Result<Vec<Option<usize>>, String> {
+    let [_] = check_size(set, file)?[..] else {
         return Err("one number for each keypoint expected".to_owned());
     };
     let kind = set.dtype().map_err(text_of)?;
