@@ -83,6 +83,13 @@ pub fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), CliError> {
     }
     if task.photos.is_some() {
         plan.warn_of_copies(&tasks)?;
+    } else if task.query_scene().is_none() {
+        for (query, _) in tasks.iter().filter(|(query, of)| of.frames.contains(query)) {
+            let name = scenes.references.frames()[*query].as_str();
+            log::warn!(
+                "{name} is its own reference: the result says nothing; name another --reference"
+            );
+        }
     }
     let mut json = args.json.as_deref().map(JsonLines::create).transpose()?;
     let mut results = Vec::new();

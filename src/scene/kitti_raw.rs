@@ -65,7 +65,7 @@ fn open(path: &Path, correct: bool) -> Result<Box<dyn Scene>, SceneError> {
     let camera = Camera::of_path(path, &CAMERAS);
     let (drive, images) = (camera.folder, camera.name()?);
     let photos = numbered::<usize>(&drive.join(images).join("data"), "png")?;
-    let Some(first) = photos.values().next() else {
+    let (Some(first), Some(&last)) = (photos.values().next(), photos.keys().next_back()) else {
         return Err(SceneError::expected(
             drive.join(images).join("data"),
             "images NNNNNNNNNN.png expected, none found",
@@ -89,7 +89,7 @@ fn open(path: &Path, correct: bool) -> Result<Box<dyn Scene>, SceneError> {
         warn_without_poses(drive, "oxts packets");
     }
     let world_from_camera0 = oxts::world_from_camera0(&packets, &calibration.camera0_from_imu());
-    let times = timestamps::read(&drive.join(images).join("timestamps.txt"))?;
+    let times = timestamps::read(&drive.join(images).join("timestamps.txt"), last)?;
     let folder = drive.join("velodyne_points");
     let (paths, sweeps) = scans(&folder, photos.keys(), &packets, correct)?;
     if sweeps.iter().any(Option::is_some) {
@@ -112,7 +112,7 @@ fn open(path: &Path, correct: bool) -> Result<Box<dyn Scene>, SceneError> {
         world_from_camera: world_from_camera0
             .get(&number)
             .map(|pose| pose * calibration.camera_from_camera0.inverse()),
-        time_s: times.get(number).copied(),
+        time_s: times.get(number).copied().flatten(),
         ..Frame::new(photo, intrinsics)
     });
     let mut name = format!("kitti-raw/{}", folder_name(drive));
@@ -136,14 +136,15 @@ fn scans<'a>(
     let data = folder.join("data");
     let files: BTreeMap<usize, PathBuf> =
         if data.is_dir() { numbered(&data, "bin")? } else { BTreeMap::new() };
-    let starts = timestamps::read(&folder.join("timestamps_start.txt"))?;
-    let ends = timestamps::read(&folder.join("timestamps_end.txt"))?;
+    let last = files.keys().next_back().copied().unwrap_or(0);
+    let starts = timestamps::read(&folder.join("timestamps_start.txt"), last)?;
+    let ends = timestamps::read(&folder.join("timestamps_end.txt"), last)?;
     let scan = |number: &usize| {
         let Some(path) = files.get(number) else {
             return (folder.to_owned(), None);
         };
         let duration_s = match (starts.get(*number), ends.get(*number)) {
-            (Some(start), Some(end)) => end - start,
+            (Some(Some(start)), Some(Some(end))) => end - start,
             _ => sweep::USUAL_S,
         };
         let packet = packets.get(number).filter(|_| correct);

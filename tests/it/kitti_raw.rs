@@ -13,7 +13,7 @@ use posescope::problem::Problem;
 use posescope::scene::Scene;
 use tempfile::TempDir;
 
-use crate::binary::arg;
+use crate::binary::{arg, run_in};
 use crate::damage::open;
 use crate::small_sequence::{HEIGHT, WIDTH, scan_of_the_wall, wall};
 use crate::{damage, data};
@@ -114,6 +114,36 @@ fn scans_are_corrected_unless_told_otherwise() {
         let expected = Point3::new(raw.x, raw.y, raw.z - share as f32);
         assert!((corrected - expected).norm() < 1e-4);
     }
+}
+
+#[test]
+fn a_lost_line_of_times_shifts_no_time() {
+    let day = TempDir::new().expect("a folder");
+    let drive = write(day.path());
+    let times = drive.join("image_00/timestamps.txt");
+    let whole = fs::read_to_string(&times).expect("readable");
+    let known = |path: &Path| -> Vec<Option<f64>> {
+        let scene = open(path);
+        (0..scene.frames().len()).map(|frame| scene.time_s(frame)).collect()
+    };
+    let stated = known(&drive);
+    assert!(stated.iter().all(Option::is_some));
+    // A blank line stands for a frame that was lost.
+    let lines: Vec<&str> = whole.lines().collect();
+    let blank = |lost: usize| -> String {
+        let line = |(frame, line)| if frame == lost { "\n".into() } else { format!("{line}\n") };
+        lines.iter().copied().enumerate().map(line).collect()
+    };
+    fs::write(&times, blank(2)).expect("writable");
+    assert_eq!(known(&drive), stated);
+    fs::write(&times, blank(4)).expect("writable");
+    assert_eq!(known(&drive), [stated[0], None, stated[2]]);
+    // Without its first line, line k is no longer the time of frame k.
+    fs::write(&times, lines[1..].join("\n")).expect("writable");
+    assert_eq!(known(&drive), [None; 3]);
+    let told = run_in(day.path(), &format!("doctor {}", arg(&drive))).err;
+    let line = "line k is the time of frame k, so 7 lines expected for frames up to 6, 6 found";
+    assert!(told.contains(line), "{told}");
 }
 
 #[test]

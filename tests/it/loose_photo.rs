@@ -52,6 +52,10 @@ fn a_photo_of_its_own_has_the_pose_of_the_frame_that_it_is_and_no_error() {
     let line = format!("{itself} --camera {fx},{fy},{cx},{cy}");
     let warned = run_in(folder.path(), &line).ok().err;
     has(&warned, "000070 is the same photo as the reference 000070");
+    let itself = run_in(folder.path(), "run street --reference 70 --query 70 --method fb").ok().err;
+    has(&itself, "000070 is its own reference: the result says nothing");
+    let other = run_in(folder.path(), "run street --reference 62 --query 70 --method fb").ok().err;
+    assert!(!other.contains("its own reference"), "{other}");
 }
 
 #[test]
