@@ -45,7 +45,7 @@ fn a_full_disk_ends_a_run_with_what_was_computed() {
     let words = format!("/dev/full ~ {FULL}");
     let [said, _] = ["--json", "--save"].map(|option| {
         let said = sequence.run(&format!("{RUN} {option} /dev/full"));
-        said.fails_in_one_line(3, &words)
+        said.fails(3, &words)
     });
     has(&said.out, "000004");
     let full = File::options().write(true).open("/dev/full");
