@@ -24,6 +24,9 @@ pub struct Options {
     /// The towns.
     #[arg(long, value_delimiter = ',', default_values_t = [0, 1, 2])]
     towns: Vec<u64>,
+    /// Plant these alone, such as `WrongCamera`.
+    #[arg(long, value_delimiter = ',')]
+    faults: Vec<String>,
     /// The distances of a sound drive's frames in frames of the drive, about a metre each.
     #[arg(long, value_delimiter = ',', default_values_t = [1, 3, 8, 15, 30, 50])]
     spacings: Vec<usize>,
@@ -183,7 +186,10 @@ fn planted(options: &Options) -> Result<(), Failure> {
     let mut sums = [0; 5];
     let others =
         [(Fault::PoseOneLineOff, Some(Mistake::PoseOfNeighbour)), (Fault::DepthsOfNoise, None)];
-    for (fault, expected) in FAULTS.into_iter().chain(others) {
+    let is_asked_for =
+        |fault: Fault| options.faults.is_empty() || options.faults.contains(&format!("{fault:?}"));
+    let faults = FAULTS.into_iter().chain(others).filter(|(fault, _)| is_asked_for(*fault));
+    for (fault, expected) in faults {
         let mut counts = [0; 5];
         for part in &parts {
             let found = examine(&part.of(fault));

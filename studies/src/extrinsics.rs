@@ -10,7 +10,7 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
 use crate::Failure;
-use crate::numbers::{percent, percentile, print_table};
+use crate::numbers::{mean, percent, percentile, print_table};
 
 /// How well does `doctor --calibration` find a camera that is not where the scene says?
 ///
@@ -29,6 +29,9 @@ pub struct Options {
     frames: usize,
     #[arg(long, default_value_t = 0)]
     seed: u64,
+    /// Plant turns and shifts alone.
+    #[arg(long)]
+    poses_only: bool,
 }
 
 /// Frames of a scene with another calibration than stated.
@@ -113,20 +116,30 @@ fn quantiles(numbers: &[f64], decimals: usize) -> String {
 }
 
 pub fn run(options: &Options) -> Result<(), Failure> {
-    let mut rows = Vec::new();
+    let (mut rows, mut freedoms) = (Vec::new(), Vec::new());
     for argument in &options.scenes {
         let scene = scene::open(argument, None)?;
-        rows.push(row(scene.as_ref(), options)?);
+        let (row, of_freedoms) = row(scene.as_ref(), options)?;
+        rows.push(row);
+        freedoms.push(of_freedoms);
     }
     print_table(
         ",turn from stated [°],shift from stated [m],turn from own [°],shift from own [m],in the interval,\
          consistent parts,focal length [%],delay [ms]",
         &rows,
     );
+    println!(
+        "Error of each freedom, mean ± standard deviation, and the mean half of its interval:\n"
+    );
+    print_table(
+        ",about x [°],about y [°],about z [°],along x [m],along y [m],along z [m]",
+        &freedoms,
+    );
     Ok(())
 }
 
-fn row(scene: &dyn Scene, options: &Options) -> Result<Vec<String>, Failure> {
+/// The row of a scene, and its row of freedoms.
+fn row(scene: &dyn Scene, options: &Options) -> Result<(Vec<String>, Vec<String>), Failure> {
     let count = scene.frames().len();
     let part = options.frames.min(count);
     let mut random = Pcg64::seed_from_u64(options.seed);
@@ -140,6 +153,7 @@ fn row(scene: &dyn Scene, options: &Options) -> Result<Vec<String>, Failure> {
     let own = calibration(&as_it_is, &|_| ())?.camera_from_stated();
     let (mut turns, mut shifts, mut own_turns, mut own_shifts) = (vec![], vec![], vec![], vec![]);
     let (mut inside, mut judged) = (0, 0);
+    let mut each: [Vec<[f64; 2]>; 6] = Default::default();
     let (mut consistent, mut focal_lengths, mut delays) = (0, vec![], vec![]);
     for _ in 0..options.draws {
         let start = random.random_range(0..=count - part);
@@ -160,9 +174,14 @@ fn row(scene: &dyn Scene, options: &Options) -> Result<Vec<String>, Failure> {
         own_shifts.push(shift_m);
         let halves = found.turn.iter().chain(&found.shift).map(|one| one.half_width());
         let (turned, shifted) = (rest.rotation.scaled_axis(), rest.translation.vector);
-        for (off, half) in turned.iter().chain(&shifted).zip(halves) {
+        for (at, (off, half)) in turned.iter().chain(&shifted).zip(halves).enumerate() {
             inside += usize::from(off.abs() <= half);
             judged += 1;
+            let unit = if at < 3 { 1.0_f64.to_degrees() } else { 1.0 };
+            each[at].push([unit * off, unit * half]);
+        }
+        if options.poses_only {
+            continue;
         }
         let sound: Calibration = calibration(&Misplaced { at: at.clone(), ..as_it_is }, &|_| ())?;
         consistent += usize::from(!sound.is_off());
@@ -176,7 +195,16 @@ fn row(scene: &dyn Scene, options: &Options) -> Result<Vec<String>, Failure> {
             delays.push(1000.0 * (delay.value - delay_s).abs());
         }
     }
-    Ok(vec![
+    let freedom = |of: &Vec<[f64; 2]>| {
+        let (errors, halves): (Vec<f64>, Vec<f64>) =
+            of.iter().map(|[off, half]| (*off, *half)).unzip();
+        let bias = mean(errors.iter().copied());
+        let spread = mean(errors.iter().map(|error| (error - bias).powi(2))).sqrt();
+        format!("{bias:.3} ± {spread:.3}, {:.3}", mean(halves))
+    };
+    let freedoms =
+        std::iter::once(scene.name().to_owned()).chain(each.iter().map(freedom)).collect();
+    let row = vec![
         scene.name().to_owned(),
         quantiles(&turns, 2),
         quantiles(&shifts, 3),
@@ -186,5 +214,6 @@ fn row(scene: &dyn Scene, options: &Options) -> Result<Vec<String>, Failure> {
         format!("{consistent} of {}", options.draws),
         quantiles(&focal_lengths, 2),
         quantiles(&delays, 1),
-    ])
+    ];
+    Ok((row, freedoms))
 }

@@ -121,12 +121,13 @@ fn go_through(page: &str) {
 }
 
 /// The pages with commands of ours. Those with many have a test of their own, so that they run side by side.
-const PAGES: [&str; 14] = [
+const PAGES: [&str; 15] = [
     "README.md",
     "calibration.md",
     "ci.md",
     "compute.md",
     "diagnosis.md",
+    "doctor.md",
     "lessons.md",
     "methods.md",
     "other-systems.md",
@@ -198,9 +199,15 @@ fn the_page_on_scenes_can_be_followed() {
 #[test]
 #[ignore = "runs every command of a page; .ci/nightly runs it"]
 fn the_pages_with_a_command_or_two_can_be_followed() {
-    for page in
-        ["calibration.md", "methods.md", "paper.md", "recordings.md", "results.md", "street.md"]
-    {
+    for page in [
+        "calibration.md",
+        "doctor.md",
+        "methods.md",
+        "paper.md",
+        "recordings.md",
+        "results.md",
+        "street.md",
+    ] {
         go_through(page);
     }
 }

@@ -232,7 +232,7 @@ impl Scene for Planted<'_> {
 
     fn cloud(&self, frame: usize) -> Result<Cloud, SceneError> {
         let of = match self.fault {
-            Fault::CloudOneFrameOff => self.at[frame] + 1,
+            Fault::CloudOneFrameOff => self.at[(frame + 1).min(self.at.len() - 1)],
             _ => self.at[frame],
         };
         let cloud = self.scene.cloud(of)?;

@@ -205,6 +205,11 @@ impl TrueMatches {
         all.filter_map(|(at, is_true)| is_true.then_some(at)).collect()
     }
 
+    /// The correspondences that the truth explains and the estimate does not.
+    pub(super) fn of_truth_alone(&self) -> Vec<usize> {
+        self.true_ones().into_iter().filter(|&at| !self.is_inlier[at]).collect()
+    }
+
     /// Whether so many unique matches lie on their epipolar lines without the right depth that they cannot
     /// all be false. Streets look alike, and false matches of a drive lie near epipolar lines too.
     pub(super) fn many_without_depth(&self) -> bool {

@@ -1,5 +1,7 @@
 //! Numbers in sentences.
 
+use crate::geometry::PoseError;
+
 /// Two numbers to compare: three significant digits, and more where those are equal and the numbers are not.
 pub(super) fn pair(a: f64, b: f64) -> (String, String) {
     let texts = |digits| (with_digits(a, digits), with_digits(b, digits));
@@ -10,6 +12,17 @@ pub(super) fn pair(a: f64, b: f64) -> (String, String) {
 pub(super) fn metres(value: f64) -> String {
     let decimals = if value.abs() < 9.995 { 2 } else { 1 };
     format!("{value:.decimals$} m")
+}
+
+/// How far a pose is off: in metres, and in degrees where it is turned by more than most tolerances allow.
+pub(super) fn distance(error: &PoseError) -> String {
+    const TURNED_DEG: f64 = 5.0;
+    let off = metres(error.translation_m);
+    if error.rotation_deg > TURNED_DEG {
+        format!("{off} and {:.1}°", error.rotation_deg)
+    } else {
+        off
+    }
 }
 
 /// A place in a ranking: 1st, 2nd, 3rd, 4th, 11th.

@@ -15,7 +15,7 @@ use super::ask::{Ask, Change, Remedy};
 use super::case::{Case, FusionCase, Member, RankingCase};
 use super::free_search::FreeSearch;
 use super::matches::Funnel;
-use super::numbers::{metres, ordinal, pair};
+use super::numbers::{distance, metres, ordinal, pair};
 use super::search::FinishedSearch;
 use super::{Diagnosis, MapOverlay, Proof};
 use crate::estimator::Failure;

@@ -4,6 +4,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
+use nalgebra::{UnitQuaternion, Vector3};
 use posescope_core::camera::Intrinsics;
 use posescope_core::diagnosis::Code;
 use posescope_core::diagnosis::{Diagnosis, Evidence, Subject, Tolerance, diagnose};
@@ -91,6 +92,21 @@ fn a_truth_that_the_photos_contradict_is_suspect() {
     let found = verdicts(&problem, Method::FB, &Params::default(), Some(&wrong));
     assert_eq!(primary(&found), Some(Code::X1), "{found:?}");
     assert!(found[0].evidence["inliers"].as_u64() > found[0].evidence["supports_truth"].as_u64());
+}
+
+/// About the axis of a turn, many matches agree with both poses.
+#[test]
+fn a_truth_that_is_rolled_against_the_photo_is_suspect_whatever_the_method() {
+    let problem = solvable();
+    let roll = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), 12_f64.to_radians());
+    let rolled = truth(&problem) * roll;
+    for method in Method::PAPER.into_iter().chain(BESIDE_THE_PAPER) {
+        let found = verdicts(&problem, method, &Params::default(), Some(&rolled));
+        assert_eq!(primary(&found), Some(Code::X1), "{method}: {found:?}");
+        let words = ["The ground truth is suspect", "° from it"];
+        let has = |found: &Diagnosis| words.iter().all(|words| found.text.contains(words));
+        assert!(has(&found[0]), "{method}: {found:?}");
+    }
 }
 
 #[test]

@@ -38,7 +38,7 @@ fn kept_by_hybrid(case: &Case<'_>) -> Option<Diagnosis> {
 evidence!(Kept { hybrid: Method, kept: Method, not_asked: Method, error: PoseError } =>
     "{} kept the wrong pose of {kept}, {} off, because that method accepted it. Its fallback \
      {not_asked} was not asked.",
-    hybrid.label(), metres(error.translation_m)
+    hybrid.label(), distance(error)
 );
 
 /// A method had a right candidate, and that of another one was taken. Where both are of one method, its search or its cost

@@ -44,7 +44,7 @@ evidence!(Accepted {
     wrong_depth: u64,
     true_matches: Funnel,
 } => {
-    let off = metres(error.translation_m);
+    let off = distance(error);
     // A pose on true matches points at their depths or their spread, one on false matches at the photos.
     let why = if depths_are_wrong([*inliers, *true_inliers], *wrong_depth, *supports_truth) {
         format!("Of the true matches, {wrong_depth} have a wrong depth, {supports_truth} the right one.")

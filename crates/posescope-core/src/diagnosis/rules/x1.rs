@@ -2,16 +2,23 @@
 
 mod camera;
 mod resized;
+mod truth;
+
+use std::cell::OnceCell;
 
 use nalgebra::{Quaternion, Translation3, UnitQuaternion};
 
-use self::camera::{camera_by_fb, camera_by_matches, camera_of_both};
+use self::camera::{camera_by_matches, camera_of_both};
 use self::resized::resized;
+use self::truth::{truth_by_cost, truth_by_free_search, truth_by_matches};
 use super::*;
 use crate::camera::Intrinsics;
 use crate::diagnosis::axes::other_axes;
 use crate::diagnosis::matches::TrueMatches;
+use crate::diagnosis::{Evidence, Subject};
+use crate::estimator::{Estimator, FeatureBased};
 use crate::stats::median;
+use crate::trace::Trace;
 
 pub(super) const RULE: Rule = Rule {
     title: "a calibration, a pose convention or the ground truth is suspect",
@@ -65,12 +72,55 @@ fn test(case: &Case<'_>) -> Option<Diagnosis> {
             }
             let search = case.search?;
             search.result_cost?;
+            let by_fb = OnceCell::new();
+            let by_fb = || by_fb.get_or_init(|| SaidByFb::of(case));
             poses(case)
-                .or_else(|| camera_by_fb(case, true))
+                .or_else(|| by_fb().as_ref()?.certain.clone())
                 .or_else(|| truth_by_cost(case, search))
-                .or_else(|| camera_by_fb(case, false))
+                .or_else(|| by_fb().as_ref()?.hint.clone())
         }
-        Family::MultiStart | Family::Descent => poses(case),
+        Family::MultiStart => poses(case)
+            .or_else(|| truth_by_free_search(case))
+            .or_else(|| SaidByFb::of(case)?.certain),
+        Family::Descent => poses(case),
+    }
+}
+
+/// What a method without matches learns from those of FB.
+struct SaidByFb {
+    /// Another camera, or a truth that is wrong.
+    certain: Option<Diagnosis>,
+    /// A camera that may be another one.
+    hint: Option<Diagnosis>,
+}
+
+impl SaidByFb {
+    fn of(case: &Case<'_>) -> Option<Self> {
+        // Where the truth is not searched, that alone explains the result.
+        let is_searched = match case.search {
+            Some(search) => search.near_truth().is_some(),
+            None => case.free_search()?.near.is_some(),
+        };
+        if !is_searched {
+            return None;
+        }
+        let subject = case.subject;
+        let mut evidence = Evidence::default();
+        let fb = FeatureBased::new(subject.params);
+        let outcome = fb.estimate(subject.problem, &mut Trace::to(&mut evidence)).ok()?;
+        let (problem, params) = (subject.problem, subject.params);
+        let of_fb = Subject::new(problem, Method::FB, params, &outcome, &evidence)
+            .against(subject.truth, subject.tolerance);
+        let case = Case::new(&of_fb, Family::Features, None);
+        let matches = case.matches()?;
+        let of_query = camera_by_matches(&case, matches);
+        let of_both = if of_query.is_some() { None } else { camera_of_both(&case, matches) };
+        let (of_both, hint) = match of_both {
+            Some(one) if one.certain => (Some(one.found), None),
+            other => (None, other.map(|one| one.found)),
+        };
+        let certain = of_query.or(of_both).or_else(|| truth_by_matches(&case, matches));
+        Some(Self { certain, hint })
     }
 }
 
@@ -203,6 +253,7 @@ fn readings(pose: &Pose) -> Vec<(String, Pose)> {
     let mut readings = vec![
         ("camera_from_world (inverted)".to_owned(), pose.inverse()),
         ("millimetres".to_owned(), scaled(1e-3)),
+        ("centimetres".to_owned(), scaled(1e-2)),
         ("kilometres".to_owned(), scaled(1e3)),
         ("quaternions with w first".to_owned(), reordered([x, y, z, w])),
         ("quaternions with w last".to_owned(), reordered([z, w, x, y])),
@@ -244,59 +295,6 @@ evidence!(Cloud { wrong_depth: usize, right_depth: usize, certain: bool } => {
          right one."
     )
 });
-
-/// The photos agree on a pose as well as photos ever do, and it is not the stated truth.
-fn truth_by_matches(case: &Case<'_>, matches: &TrueMatches) -> Option<Diagnosis> {
-    const NEARLY_CERTAIN: f64 = -15.0;
-    let error = case.subject.error().or_else(|| case.consensus_error())?;
-    let judged = case.subject.evidence.judged.as_ref()?;
-    let (inliers, total) = (matches.inliers(), matches.correspondences.len());
-    let is_fixed =
-        || case.deviation_m(matches).is_some_and(|m| m < case.length(super::r5::FIXED_M));
-    let is_certain =
-        judged.acceptance.log10_nfa <= NEARLY_CERTAIN && 2 * inliers >= total && is_fixed();
-    let supports_truth = matches.funnel.lifted;
-    // What the truth explains beyond chance is there: then both are, and the truth is not suspect.
-    let is_supported = || case.would_accept(matches, &matches.true_ones());
-    (is_certain && 5 * supports_truth < inliers && !is_supported()).then(|| {
-        RULE.found(&TruthByMatches { inliers, correspondences: total, supports_truth, error })
-    })
-}
-
-evidence!(TruthByMatches {
-    inliers: usize,
-    correspondences: usize,
-    supports_truth: usize,
-    error: PoseError,
-} =>
-    "The ground truth is suspect: {inliers} of {correspondences} matches agree on a pose {} from \
-     it. The truth explains {supports_truth}.",
-    metres(error.translation_m)
-);
-
-/// The result is as certain as results ever are, and it is not the stated truth. Where the images agree at
-/// the truth too, though less, both are there, and the truth is not suspect.
-fn truth_by_cost(case: &Case<'_>, search: &FinishedSearch<'_>) -> Option<Diagnosis> {
-    const NEARLY_CERTAIN: f64 = 0.97;
-    const SUPPORTED: f64 = 0.5;
-    let probability = case.subject.confidence.as_ref()?.probability;
-    // Few wrong poses are so certain, and shuffling takes its time.
-    if probability < NEARLY_CERTAIN {
-        return None;
-    }
-    let error = case.subject.error()?;
-    let near = search.near_truth();
-    let gain = near.and_then(|near| search.gain(&near.offset));
-    if gain.unwrap_or(0.0) > SUPPORTED * search.gain(&search.result)? {
-        return None;
-    }
-    Some(RULE.found(&TruthByCost { probability, error }))
-}
-
-evidence!(TruthByCost { probability: f64, error: PoseError } =>
-    "The ground truth is suspect: the pose is {:.0} % likely right, but {} from it.",
-    100.0 * probability, metres(error.translation_m)
-);
 
 #[cfg(test)]
 mod tests {

@@ -4,32 +4,11 @@ use nalgebra::Vector2;
 
 use super::*;
 use crate::diagnosis::matches::Pairs;
-use crate::diagnosis::{Evidence, Subject};
-use crate::estimator::{Estimator, FeatureBased};
 use crate::solver::Correspondence;
-use crate::trace::Trace;
 
 /// Cameras of one focal length, and of one centre, differ by less \[share, px\].
 const SAME_FOCAL_LENGTH: f64 = 0.02;
 const SAME_CENTRE_PX: f64 = 8.0;
-/// A method without matches learns of another camera from those of FB: of one that is `certain`, or not.
-pub(super) fn camera_by_fb(case: &Case<'_>, certain: bool) -> Option<Diagnosis> {
-    // Where the truth is not searched, that alone explains the result.
-    case.search?.near_truth()?;
-    let subject = case.subject;
-    let mut evidence = Evidence::default();
-    let fb = FeatureBased::new(subject.params);
-    let outcome = fb.estimate(subject.problem, &mut Trace::to(&mut evidence)).ok()?;
-    let (outcome, evidence) = (&outcome, &evidence);
-    let subject = Subject { method: Method::FB, outcome, evidence, ..subject.clone() };
-    let case = Case::new(&subject, Family::Features, None);
-    let matches = case.matches()?;
-    camera_by_matches(&case, matches).filter(|_| certain).or_else(|| {
-        let camera = camera_of_both(&case, matches)?;
-        (camera.certain == certain).then_some(camera.found)
-    })
-}
-
 /// With another focal length or centre of one camera for both photos, the cloud gives more true matches their depths.
 ///
 /// A camera of photos of another size has its centre scaled too. What one query says is certain if there are far more,
