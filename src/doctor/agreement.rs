@@ -22,45 +22,65 @@ pub(super) fn edge_map(photo: &GrayImage) -> EdgeMap {
     const FADING: f32 = 0.80;
     /// The weight of the unfaded edge, which keeps the ridge sharp.
     const SHARP: f32 = 1.0 / 3.0;
+    let (width, height) = photo.dimensions();
+    let mut map = vec![0.0_f32; width as usize * height as usize];
+    each_edge(photo, &mut map, |_, edge| edge);
+    for _ in 0..2 {
+        fade(&mut map, width as usize, FADING);
+        map.reverse();
+    }
+    // Photos may have 67 million pixels, so the edges are found again, and not kept beside the map.
+    map.iter_mut().for_each(|strength| *strength *= 1.0 - SHARP);
+    each_edge(photo, &mut map, |faded, edge| SHARP * edge + faded);
+    EdgeMap::from_raw(width, height, map).unwrap_or_default()
+}
+
+/// Changes the value of each pixel, but of those on the border, by the strength of the edge there.
+fn each_edge(photo: &GrayImage, map: &mut [f32], change: impl Fn(f32, f32) -> f32) {
     /// Stronger edges count as this much [grey values].
     const STRONGEST: f32 = 60.0;
-    /// The neighbours that a pass in row order visits before a pixel.
-    const BEFORE: [(isize, isize); 4] = [(-1, 0), (-1, -1), (0, -1), (1, -1)];
     let (width, height) = (photo.width() as usize, photo.height() as usize);
-    let values = photo.as_raw();
-    let at = |x: usize, y: usize| f32::from(values[y * width + x]);
-    let mut edges = vec![0.0_f32; width * height];
+    let inside = width.saturating_sub(2);
     for y in 1..height.saturating_sub(1) {
-        for x in 1..width.saturating_sub(1) {
-            let horizontal = at(x + 1, y - 1) + 2.0 * at(x + 1, y) + at(x + 1, y + 1)
-                - at(x - 1, y - 1)
-                - 2.0 * at(x - 1, y)
-                - at(x - 1, y + 1);
-            let vertical = at(x - 1, y + 1) + 2.0 * at(x, y + 1) + at(x + 1, y + 1)
-                - at(x - 1, y - 1)
-                - 2.0 * at(x, y - 1)
-                - at(x + 1, y - 1);
-            edges[y * width + x] = (horizontal.hypot(vertical) / 4.0).min(STRONGEST);
+        // The pixels of the row inside of the border, and those beside them.
+        let [a, b, c, d, e, f, g, h] =
+            [(0, 0), (1, 0), (2, 0), (0, 1), (2, 1), (0, 2), (1, 2), (2, 2)]
+                .map(|(dx, dy)| &photo.as_raw()[(y - 1 + dy) * width..][dx.min(width)..][..inside]);
+        let here = &mut map[y * width..][1.min(width)..][..inside];
+        for x in 0..inside {
+            let at = |pixels: &[u8]| i32::from(pixels[x]);
+            let horizontal = at(c) + 2 * at(e) + at(h) - at(a) - 2 * at(d) - at(f);
+            let vertical = at(f) + 2 * at(g) + at(h) - at(a) - 2 * at(b) - at(c);
+            let length = ((horizontal * horizontal + vertical * vertical) as f32).sqrt();
+            here[x] = change(here[x], (length / 4.0).min(STRONGEST));
         }
     }
-    let mut faded = edges.clone();
-    let there = (0..width * height).map(|index| (index, 1));
-    let back = there.clone().rev().map(|(index, _)| (index, -1));
-    for (index, side) in there.chain(back) {
-        let (x, y) = (index % width, index / width);
-        for (dx, dy) in BEFORE {
-            let beside = (x.checked_add_signed(side * dx), y.checked_add_signed(side * dy));
-            if let (Some(nx), Some(ny)) = beside
-                && nx < width
-                && ny < height
-            {
-                faded[index] = faded[index].max(FADING * faded[ny * width + nx]);
+}
+
+/// Carries the strength of each pixel to the next ones in row order, and to those below.
+fn fade(strengths: &mut [f32], width: usize, fading: f32) {
+    for start in (0..strengths.len()).step_by(width.max(1)) {
+        let (before, from_here) = strengths.split_at_mut(start);
+        let row = &mut from_here[..width];
+        let above = &before[start.saturating_sub(width)..];
+        // From above on the right, in the middle and on the left.
+        for (skipped_above, skipped) in [(1, 0), (0, 0), (0, 1)] {
+            let from = above.iter().skip(skipped_above);
+            for (strength, one) in row.iter_mut().skip(skipped).zip(from) {
+                *strength = larger(*strength, fading * one);
             }
         }
+        let mut left = 0.0;
+        for strength in row {
+            left = larger(*strength, fading * left);
+            *strength = left;
+        }
     }
-    let strength = edges.iter().zip(&faded);
-    let strength = strength.map(|(edge, faded)| SHARP * edge + (1.0 - SHARP) * faded);
-    EdgeMap::from_raw(photo.width(), photo.height(), strength.collect()).unwrap_or_default()
+}
+
+/// The larger of two strengths: `f32::max` asks for numbers that there are none of.
+fn larger(one: f32, other: f32) -> f32 {
+    if one < other { other } else { one }
 }
 
 /// The bilinearly interpolated value of an image.
@@ -196,4 +216,30 @@ pub(super) fn project(camera: &Intrinsics, k1: f64, point: &Point3<f64>) -> Opti
         pixel: Point2::new(camera.fx * x * bent + camera.cx, camera.fy * y * bent + camera.cy),
         depth: point.z,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_edge_fades_alike_in_all_directions() {
+        let mut photo = GrayImage::new(9, 7);
+        photo.put_pixel(4, 3, Luma([200]));
+        let map = edge_map(&photo);
+        let at = |x: u32, y: u32| map.get_pixel(x, y).0[0];
+        // The pixels around the bright one are edges as strong as any.
+        assert!((at(3, 3) - 60.0).abs() < 1e-3);
+        for (steps, places) in [
+            (1, [(2, 3), (6, 3), (4, 1), (4, 5)]),
+            (2, [(1, 3), (7, 3), (4, 0), (4, 6)]),
+            (3, [(0, 3), (8, 3), (0, 0), (8, 6)]),
+        ] {
+            let faded = 60.0 * 0.8_f32.powi(steps) * 2.0 / 3.0;
+            for (x, y) in places {
+                assert!((at(x, y) - faded).abs() < 1e-3, "{x} {y}: {} for {faded}", at(x, y));
+            }
+        }
+        assert_eq!(edge_map(&GrayImage::new(3, 1)).as_raw(), &[0.0; 3]);
+    }
 }

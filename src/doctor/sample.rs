@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
+use std::sync::Arc;
 
 use image::GrayImage;
 use nalgebra::Point3;
@@ -27,14 +28,21 @@ const PARTNERS: [isize; 4] = [1, 3, -1, -3];
 const PARTNERS_OF_EACH: usize = 2;
 /// The most points of a cloud; edges need a dense one.
 const MAX_POINTS: usize = 40_000;
+/// About what photos may take \[bytes\]. So photos of more than 28 million pixels have fewer anchors.
+const BYTES: u64 = 1_900_000_000;
+/// What an anchor and its partners take per pixel, and their edges with it \[bytes\].
+const BYTES_OF_ANCHOR: u64 = 7;
+/// What it takes to find the features and the edges of two photos at once, per pixel \[bytes\].
+const BYTES_OF_READING: u64 = 10;
 /// Every how many points one is carried to other frames.
 const CARRIED: usize = 4;
 
 /// A photo with its edges, its features and its camera.
 #[derive(Clone)]
 pub(super) struct Sight {
-    gray: GrayImage,
-    edges: EdgeMap,
+    gray: Arc<GrayImage>,
+    /// Of anchors.
+    edges: Option<Arc<EdgeMap>>,
     features: Features,
     pub(super) camera: Intrinsics,
 }
@@ -120,6 +128,19 @@ pub(super) fn partners(anchor: usize, count: usize) -> impl Iterator<Item = usiz
     frames.filter(move |&frame| frame < count).take(PARTNERS_OF_EACH)
 }
 
+/// The pixels of the largest photo of a scene, as its cameras say.
+fn pixels_of_largest(scene: &dyn Scene) -> u64 {
+    let cameras = (0..scene.frames().len()).map(|frame| scene.intrinsics(frame));
+    let pixels = cameras.map(|camera| u64::from(camera.width) * u64::from(camera.height));
+    pixels.max().unwrap_or(0).max(1)
+}
+
+/// How many anchors photos of so many pixels may have.
+fn anchors_of(pixels: u64) -> usize {
+    let per_pixel = (BYTES / pixels).saturating_sub(BYTES_OF_READING);
+    (per_pixel / BYTES_OF_ANCHOR).clamp(1, ANCHORS as u64) as usize
+}
+
 impl<'a> Sample<'a> {
     /// Reads frames with pose and cloud, spread over the scene.
     pub(super) fn read(scene: &'a dyn Scene) -> Self {
@@ -127,7 +148,8 @@ impl<'a> Sample<'a> {
         let poses: Vec<Option<Pose>> = (0..count).map(|frame| scene.pose(frame)).collect();
         let references: Vec<usize> =
             (0..count).filter(|&frame| poses[frame].is_some() && scene.has_cloud(frame)).collect();
-        let many = ANCHORS.min(references.len());
+        let largest = pixels_of_largest(scene);
+        let many = anchors_of(largest).min(references.len());
         let anchors: Vec<usize> =
             (0..many).map(|at| references[at * references.len() / many]).collect();
         let mut seen: Vec<usize> = anchors
@@ -137,16 +159,19 @@ impl<'a> Sample<'a> {
         seen.sort_unstable();
         seen.dedup();
         let sight = |&frame: &usize| {
-            let photo = scene.photo(frame)?;
+            let gray = scene.photo(frame)?.gray;
             let sight = Sight {
-                edges: edge_map(&photo.gray),
-                features: features(&photo.gray),
-                gray: photo.gray,
+                features: features(&gray),
+                edges: anchors.contains(&frame).then(|| Arc::new(edge_map(&gray))),
+                gray: Arc::new(gray),
                 camera: scene.intrinsics(frame),
             };
             Ok((frame, sight))
         };
-        let read: Vec<Result<_, SceneError>> = seen.par_iter().map(sight).collect();
+        let at_once = (BYTES / largest / BYTES_OF_READING).max(1);
+        let at_once = seen.chunks(usize::try_from(at_once).unwrap_or(usize::MAX));
+        let read = at_once.flat_map(|some| some.par_iter().map(sight).collect::<Vec<_>>());
+        let read: Vec<Result<_, SceneError>> = read.collect();
         let (mut sights, mut clouds) = (BTreeMap::new(), BTreeMap::new());
         let mut unreadable = Vec::new();
         for one in read {
@@ -282,7 +307,7 @@ impl<'a> Sample<'a> {
         let cells = DepthCells::new(&camera, &in_front);
         let partners = self.partners.get(&anchor).into_iter().flatten();
         Some(Seeing {
-            edges: edge_agreement(&sight.edges, &in_front),
+            edges: sight.edges.as_ref().and_then(|edges| edge_agreement(edges, &in_front)),
             carried: points.into_iter().zip(seen).step_by(CARRIED).collect(),
             least: in_view / CARRIED / 20,
             lifted: partners.map(|one| cells.lifted(&camera, &one.shared)).collect(),
@@ -387,3 +412,16 @@ impl<'a> Sample<'a> {
 
 /// The reading as stated.
 pub(super) const AS_STATED: Change = Change::None;
+
+#[cfg(test)]
+mod tests {
+    use super::anchors_of;
+
+    #[test]
+    fn only_large_photos_have_fewer_anchors() {
+        for (megapixels, anchors) in [(1, 8), (24, 8), (28, 8), (40, 5), (67, 2), (1000, 1)] {
+            assert_eq!(anchors_of(megapixels * 1_000_000), anchors, "{megapixels}");
+        }
+        assert_eq!(anchors_of(1), 8);
+    }
+}
