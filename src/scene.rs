@@ -45,6 +45,7 @@ pub use posescope_core::scene::{
 pub use posescope_street as street;
 
 use posescope_core::image::MAX_PIXELS;
+use posescope_core::text::expect_name;
 
 use crate::camera::Intrinsics;
 use crate::geometry::Pose;
@@ -142,13 +143,11 @@ pub fn why_no_cloud(scene: &dyn Scene) -> Option<String> {
 fn sound(argument: &str, scene: &dyn Scene) -> Result<(), SceneError> {
     /// Half of the photo's width or height in focal lengths; 60 is a view of 178°.
     const HALF_VIEW: std::ops::Range<f64> = 1e-4..60.0;
+    /// How many photos the centre may be away: parts of larger photos have it outside.
+    const FARTHEST_CENTRE: f64 = 100.0;
     let frames = scene.frames();
     let mut names = std::iter::once(scene.name()).chain(frames.iter().map(String::as_str));
-    if let Some(name) = names.find(|name| name.contains(char::is_control)) {
-        let name = name.escape_default();
-        let expected = format!("names without control characters expected, `{name}` found");
-        return Err(SceneError::expected(argument, expected));
-    }
+    names.try_for_each(expect_name).map_err(|why| SceneError::expected(argument, why))?;
     let mut is_warned = false;
     for (frame, name) in frames.iter().enumerate() {
         let Intrinsics { fx, fy, cx, cy, width, height } = scene.intrinsics(frame);
@@ -180,6 +179,13 @@ fn sound(argument: &str, scene: &dyn Scene) -> Result<(), SceneError> {
                 let expected = format!(
                     "a focal length that suits {side} px expected, frame {name} has {focal:?} px"
                 );
+                return Err(SceneError::expected(argument, expected));
+            }
+        }
+        for (centre, side) in [(cx, width), (cy, height)] {
+            if centre.abs() > FARTHEST_CENTRE * f64::from(side) {
+                let expected =
+                    format!("a centre that suits {side} px expected, frame {name} has {centre:?}");
                 return Err(SceneError::expected(argument, expected));
             }
         }

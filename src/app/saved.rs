@@ -57,7 +57,7 @@ impl SavedSession {
             schema: String,
         }
         let said = |error: &dyn std::fmt::Display| format!("{}: {error}", path.display());
-        let text = std::fs::read_to_string(path).map_err(|error| said(&error))?;
+        let text = files::read_text(path, files::DESCRIPTION).map_err(|error| said(&error))?;
         let Head { schema } = parsed(path, &text)?;
         if schema != SCHEMA {
             return Err(said(&format!("{SCHEMA} expected, {schema} found")));
@@ -123,4 +123,17 @@ fn parsed<T: DeserializeOwned>(path: &Path, text: &str) -> Result<T, String> {
         let message = json_message(&error).replace('\n', " ");
         format!("{}:{}: {message}", path.display(), error.line())
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_no_file_is_no_session() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let refused = SavedSession::read(folder.path()).map(drop);
+        let expected = format!("{}: a file expected, a folder found", folder.path().display());
+        assert_eq!(refused, Err(expected));
+    }
 }

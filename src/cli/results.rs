@@ -10,6 +10,7 @@ use posescope::measure::{
 use posescope::report::{PICTURES, write_html};
 use posescope::run::{FolderError, RunFile, read_run, result_lines};
 use posescope::table::Table;
+use posescope_core::files::write_whole;
 
 use super::args::{Form, ResultsArgs};
 use super::failure::CliError;
@@ -167,7 +168,9 @@ fn poses(
         (files, Some(folder)) => {
             std::fs::create_dir_all(folder).map_err(FolderError::io(folder))?;
             for (name, text) in files {
-                write(text, Some(&folder.join(name)))?;
+                // A link in the folder is replaced, not followed.
+                let path = folder.join(name);
+                write_whole(&path, text.as_bytes()).map_err(FolderError::io(path))?;
             }
         }
     }

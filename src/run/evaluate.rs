@@ -78,8 +78,21 @@ impl<'a> Evaluation<'a> {
     /// results. A query that panics, or whose files cannot be read, gets failed results, and the evaluation continues.
     ///
     /// # Errors
-    /// [`RunError`]. Finished queries are in the folder.
+    /// [`RunError`]. Finished queries are in the folder. A new run that fails before its first result, as by the file of
+    /// another system's poses, leaves no folder.
     pub fn run(
+        plan: &'a Plan,
+        folder: &mut RunFolder,
+        observer: &mut dyn RunObserver,
+    ) -> Result<(), RunError> {
+        let ran = Self::run_remaining(plan, folder, observer);
+        if matches!(&ran, Err(error) if !matches!(error, RunError::Cancelled(_))) {
+            folder.discard();
+        }
+        ran
+    }
+
+    fn run_remaining(
         plan: &'a Plan,
         folder: &mut RunFolder,
         observer: &mut dyn RunObserver,

@@ -4,6 +4,7 @@ use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use posescope_core::text::expect_name;
 use serde::{Deserialize, Serialize};
 use toml::de::{DeTable, DeValue};
 
@@ -119,9 +120,7 @@ fn invalid(run: &RunFile) -> Option<(String, String)> {
     for (at, pair) in run.pairs.iter().enumerate() {
         let names = [&pair.scene, &pair.query_scene].into_iter().chain(&pair.queries);
         let mut names = names.chain(&pair.drawn);
-        if let Some(name) = names.find(|name| name.contains(char::is_control)) {
-            let name: String = name.escape_default().take(100).collect();
-            let message = format!("names without control characters expected, `{name}` found");
+        if let Err(message) = names.try_for_each(|name| expect_name(name)) {
             return Some((format!("pair.{at}"), message));
         }
     }

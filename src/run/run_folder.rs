@@ -21,7 +21,7 @@ use crate::fusion::Fusion;
 use crate::localize::{QueryResult, Setting, StageTimes};
 use crate::method::Method;
 use posescope_core::files::{
-    self, expect_no_link, is_temporary, next_line, replaced_with, write_whole,
+    self, expect_own, is_temporary, next_line, replaced_with, write_whole,
 };
 use posescope_core::text::json_message;
 
@@ -117,6 +117,18 @@ pub struct RunFolder {
     timings: File,
     done: usize,
     unread: Vec<usize>,
+    /// What the run made before its first query.
+    made: Made,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Made {
+    /// Nothing: the run was there.
+    Nothing,
+    /// Its files, in an empty folder.
+    Files,
+    /// The folder too.
+    Folder,
 }
 
 /// A line of `timings.jsonl`.
@@ -140,8 +152,9 @@ impl RunFolder {
                 is_run: path.join(RUN).exists(),
             });
         }
+        let made = if path.exists() { Made::Files } else { Made::Folder };
         fs::create_dir_all(path).map_err(FolderError::io(path))?;
-        let folder = Self::open(path)?;
+        let folder = Self { made, ..Self::open(path)? };
         let file = path.join(RUN);
         // Another process may have run in the meantime.
         if file.is_symlink() || file.exists() {
@@ -192,7 +205,7 @@ impl RunFolder {
     fn open(path: &Path) -> Result<Self, FolderError> {
         let open = |name: &str| {
             let file = path.join(name);
-            expect_no_link(&file).map_err(FolderError::io(&file))?;
+            expect_own(&file).map_err(FolderError::io(&file))?;
             let options = OpenOptions::new().create(true).read(true).append(true).open(&file);
             options.map_err(FolderError::io(file))
         };
@@ -207,7 +220,23 @@ impl RunFolder {
             timings: open(TIMINGS)?,
             done: 0,
             unread: Vec::new(),
+            made: Made::Nothing,
         })
+    }
+
+    /// Removes what a run has made that failed before its first result, so that its folder is as it was.
+    pub(super) fn discard(&self) {
+        if self.done > 0 || self.made == Made::Nothing {
+            return;
+        }
+        for name in [RUN, TIMINGS, RESULTS] {
+            fs::remove_file(self.path.join(name)).ok();
+        }
+        // Only empty folders can be removed.
+        fs::remove_dir(self.path.join(FAILURES)).ok();
+        if self.made == Made::Folder {
+            fs::remove_dir(&self.path).ok();
+        }
     }
 
     /// The path of the folder.
@@ -446,11 +475,12 @@ mod tests {
 
     #[test]
     fn names_that_files_cannot_tell_apart_get_numbers() {
-        let queries = ["cam0/3", "cam0-3", "cam0:3", "cam1/3", "70"];
+        let queries = ["cam0/3", "cam0-3", "cam0:3", "cam1/3", "70", "a", "A"];
         let names = RecordingNames::of(&run(&queries));
         let files = queries.map(|query| names.file(["map", "map"], query, Method::FB));
         let files = files.map(|file| file.expect("is of the run"));
-        let expected = ["cam0-3-2-fb", "cam0-3-fb", "cam0-3-3-fb", "cam1-3-fb", "70-fb"];
+        let expected =
+            ["cam0-3-2-fb", "cam0-3-fb", "cam0-3-3-fb", "cam1-3-fb", "70-fb", "a-fb", "A-2-fb"];
         assert_eq!(files, expected.map(|name| format!("{name}.rrd")));
         assert_eq!(names.file(["map", "map"], "71", Method::FB), None);
     }

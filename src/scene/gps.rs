@@ -12,7 +12,7 @@ use std::sync::Arc;
 use nalgebra::{Matrix3, Point3, Similarity3, Translation3, UnitQuaternion, Vector3};
 
 use super::frame_names::FrameNames;
-use super::lines::{Line, NAMES, TextFile};
+use super::lines::{FARTHEST, Line, NAMES, TextFile, is_near};
 use super::{Scene, SceneError};
 
 /// The radius of the earth at the equator \[m\], as in KITTI's devkit.
@@ -116,8 +116,12 @@ fn read_rows(file: &TextFile) -> Result<(bool, Vec<Row<'_>>), SceneError> {
         let [latitude, longitude, _] = place;
         if is_geographic && (latitude.abs() > 89.0 || longitude.abs() > 360.0) {
             return Err(line.error(format!(
-                "a latitude and a longitude in degrees expected, {latitude} {longitude} found"
+                "a latitude and a longitude in degrees expected, {latitude:?} {longitude:?} found"
             )));
+        }
+        if !place.iter().all(is_near) {
+            return Err(line
+                .error(format!("a position within {FARTHEST:e} of 0 expected, {place:?} found")));
         }
         let name = found[name];
         rows.push(Row { line, name, place });

@@ -90,6 +90,27 @@ fn no_link_leads_a_run_out_of_its_folder() {
         fs::remove_file(run.join(name)).expect("ours");
         fs::rename(&kept, run.join(name)).expect("ours");
     }
+    // A second name of a file is one outside, too, and what only reads it may.
+    for name in ["results.jsonl", "timings.jsonl"] {
+        let other = outside.join(name);
+        fs::hard_link(run.join(name), &other).expect("writable");
+        let lines = text(&other);
+        let last = lines.trim_end().rfind('\n').expect("several lines");
+        write(run.join(name), &lines[..=last]);
+        let said = sequence.run(&format!("{EVAL} run --resume"));
+        said.fails_in_one_line(3, &format!("run/{name}: ~ 2 names (hard links) found"));
+        assert_eq!(text(&other), &lines[..=last]);
+        sequence.run("results run").ok();
+        fs::remove_file(run.join(name)).expect("ours");
+        fs::remove_file(other).expect("ours");
+        write(run.join(name), lines);
+    }
+    // So is a link in the folder of an export.
+    fs::create_dir(sequence.path().join("model")).expect("writable");
+    symlink(&precious, sequence.path().join("model/images.txt")).expect("writable");
+    sequence.run("results run --where 'method = mi' --as colmap --out model").ok();
+    assert_eq!(text(&precious), "precious\n");
+    has(&sequence.text("model/images.txt"), "# IMAGE_ID");
     // A recording that is a link is none of the part's.
     let recording = fs::read_dir(run.join("failures")).expect("ours").flatten().next();
     let recording = recording.expect("a failure").path();
@@ -116,7 +137,7 @@ fn what_is_no_file_of_a_run_is_not_waited_for() {
         let kept = path("kept");
         fs::rename(path(name), &kept).expect("is there");
         pipe(&path(name));
-        let words = format!("{name}: a file expected, a named pipe found");
+        let words = format!("{name}: a file expected, a pipe found");
         run(sequence.path(), command).fails_in_one_line(3, &words);
         fs::remove_file(path(name)).expect("ours");
         symlink("/dev/zero", path(name)).expect("writable");
@@ -151,8 +172,15 @@ fn a_position_of_no_place_is_refused_where_it_enters() {
         ),
     ] {
         write(&estimates, content);
-        sequence.run(&line.replace("--out run", "--out refused")).fails_in_one_line(3, words);
-        fs::remove_dir_all(sequence.path().join("refused")).ok();
+        // What was there stays, and nothing is left besides.
+        let refused = sequence.path().join("refused");
+        let line = line.replace("--out run", "--out refused");
+        sequence.run(&line).fails_in_one_line(3, words);
+        assert!(!refused.exists());
+        fs::create_dir(&refused).expect("writable");
+        sequence.run(&line).fails_in_one_line(3, words);
+        assert_eq!(fs::read_dir(&refused).expect("still there").count(), 0);
+        fs::remove_dir(&refused).expect("ours");
     }
     write(&estimates, "name x y z qx qy qz qw\n000004 1e6 0 0 0 0 0 1\n000005 0 0 5 0 0 0 1\n");
     sequence.run(&line).ok();
@@ -160,18 +188,26 @@ fn a_position_of_no_place_is_refused_where_it_enters() {
     // A result that was edited: one line, and no axis of a million numbers.
     let results = sequence.text("run/results.jsonl");
     let whole: Vec<serde_json::Value> = objects(&results);
-    for (error, is_read) in [(1e308, false), (1e120, true)] {
+    for (key, number, refusal) in [
+        ("/error/translation_m", 1e308, "lengths up to 1e150 expected"),
+        ("/error/translation_m", 1e120, ""),
+        ("/error/translation_m", -5.0, "an error from 0 on"),
+        ("/error/rotation_deg", 1e308, "angles up to 180° expected"),
+        ("/initial_error/max_euler_deg", -1.0, "angles up to 180° expected"),
+        ("/confidence/probability", 1e308, "a probability from 0 to 1 expected, 1e308 found"),
+        ("/confidence/probability", -0.5, "a probability from 0 to 1 expected"),
+    ] {
         let mut lines = whole.clone();
-        let measured = lines.iter_mut().find(|line| line["error"].is_object()).expect("measured");
-        measured["error"]["translation_m"] = error.into();
+        let mut places = lines.iter_mut().filter_map(|line| line.pointer_mut(key));
+        *places.next().expect("there") = number.into();
         let text: String = lines.iter().map(|line| format!("{line}\n")).collect();
         write(sequence.path().join("run/results.jsonl"), text);
         for command in ["results run --as html --out x.html", "results run --table summary"] {
             let said = sequence.run(command);
-            if is_read {
+            if refusal.is_empty() {
                 said.ok();
             } else {
-                said.fails(3, "lengths up to 1e150 expected");
+                said.fails(3, refusal);
             }
         }
     }

@@ -1,6 +1,7 @@
 //! Folders that others sent: nothing outside of the output folder changes or is shown, and no file takes the machine.
 
 use std::fs;
+use std::io::Write as _;
 use std::os::unix::fs::symlink;
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -46,7 +47,7 @@ fn what_is_no_file_is_not_waited_for() {
     let path = |name: &str| sequence.path().join(name);
     // Files that may be missing are missing where they are pipes.
     for (name, command, words) in [
-        ("sequences/42/image_0/000004.png", "doctor sequences/42", "a named pipe found"),
+        ("sequences/42/image_0/000004.png", "doctor sequences/42", "a pipe found"),
         ("sequences/42/calib.txt", "doctor sequences/42", "sequences/42"),
         ("poses/42.txt", "doctor sequences/42", "no pose file"),
     ] {
@@ -73,6 +74,75 @@ fn what_is_no_file_is_not_waited_for() {
         let said = run(sequence.path(), &format!("{asked} {given}"));
         assert!(matches!(said.code, Some(2 | 3)), "{given}: {}", said.err);
     }
+}
+
+/// Runs the binary with a pipe that has this text.
+fn run_with_pipe(folder: &Path, line: &str, text: &str) -> Said {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_posescope"));
+    command.env("POSESCOPE_CACHE", crate::binary::CACHE).current_dir(folder);
+    command.args(shlex::split(line).expect("words"));
+    command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut child = command.spawn().expect("it starts");
+    // It ends without reading where it refuses the pipe.
+    child.stdin.take().expect("a pipe").write_all(text.as_bytes()).ok();
+    Said::of(&child.wait_with_output().expect("it ended"))
+}
+
+#[test]
+fn an_option_reads_a_pipe_that_the_shell_opened_and_no_file_names_one() {
+    let sequence = SmallSequence::write();
+    let piped = |line: &str, text: &str| run_with_pipe(sequence.path(), line, text);
+    let asked = "run sequences/42 --query 5 --reference 4";
+    let poses = "name x y z qx qy qz qw\n000004 0 0 4 0 0 0 1\n000005 0 0 5 0 0 0 1\n";
+    for path in ["/dev/stdin", "/dev/fd/0"] {
+        let line = format!("{asked} --method other --estimates other={path}");
+        has(&piped(&line, poses).ok().out, "other");
+    }
+    let gps = "--reference nearest:1 --gps /dev/stdin";
+    let line = format!("run sequences/42 --query 5 --method fb {gps}");
+    piped(&line, "name x y z\n000005 0 0 5\n").ok();
+    // It is read once for several photos.
+    for name in ["a.png", "b.png"] {
+        fs::copy(sequence.image("000005"), sequence.path().join(name)).expect("writable");
+    }
+    let line = "run sequences/42 --query a.png --query b.png --method fb --camera /dev/stdin";
+    piped(line, "1 PINHOLE 160 64 100 100 80.5 32.5\n").ok();
+    // A run that shall be repeated has files.
+    let line = "eval sequences/42 --method other --reference nearest:1 -q --out run";
+    let line = format!("{line} --estimates other=/dev/stdin");
+    piped(&line, poses).fails_in_one_line(3, "/dev/stdin: a file expected, a pipe found");
+    assert!(!sequence.path().join("run").exists());
+    // A run that names a pipe does not read it.
+    let line = "eval sequences/42 --method fb --reference nearest:1 -q --out run";
+    run(sequence.path(), line).ok();
+    let with_gps = "[protocol]\ngps = \"/dev/stdin\"\n";
+    let described = sequence.text("run/run.toml").replacen("[protocol]\n", with_gps, 1);
+    write(sequence.path().join("run/run.toml"), described);
+    piped("results run --as html --out x.html", "name x y z\n000005 0 0 5\n").ok();
+    has(&sequence.text("x.html"), "/dev/stdin: a file expected, a pipe found");
+}
+
+#[test]
+fn what_no_scene_has_is_refused_where_it_enters() {
+    let root = TempDir::new().expect("a folder");
+    scene_toml::write(root.path());
+    let sound = text(root.path().join("scene.toml"));
+    let long = format!("name = \"{}\"\nimages", "n".repeat(5000));
+    for (part, other, words) in [
+        ("images", long.as_str(), "names of at most 4096 bytes expected"),
+        ("images", "unit = 1e300\nimages", "scene.toml:1: a unit of length expected"),
+        ("images", "unit.clouds = 1e-300\nimages", "scene.toml:1: a unit of length expected"),
+        ("cx = 79.5", "cx = 1e300", "a centre that suits 160 px expected ~ 1e300"),
+        ("cy = 31.5", "cy = -1e9", "a centre that suits 64 px expected ~ -1000000000"),
+    ] {
+        write(root.path().join("scene.toml"), sound.replacen(part, other, 1));
+        let said = run_in(root.path(), "doctor .").fails(3, words);
+        assert!(said.out.len() + said.err.len() < 1000, "{}", said.err);
+    }
+    write(root.path().join("scene.toml"), sound);
+    write(root.path().join("gps.txt"), "name x y z\nimg1 1e308 0 0\n");
+    let line = "run . --query img1 --reference nearest:1 --method fb --gps gps.txt";
+    run_in(root.path(), line).fails_in_one_line(3, "gps.txt:2: a position within 1e12 of 0");
 }
 
 /// A scene that `write` changes so that one of its files is a link to a secret.

@@ -2,10 +2,12 @@
 //!
 //! Reading files that have an end, and writing files that are whole or not there.
 
+use std::collections::BTreeMap;
 use std::ffi::OsStr;
 use std::fs::{self, File, FileType};
 use std::io::{self, BufRead as _, BufReader, Read as _, Write as _};
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 
 /// The most of a description that a person or a program of ours wrote \[bytes\]: `run.toml`, a list, parameters.
 pub const DESCRIPTION: u64 = 64 << 20;
@@ -36,7 +38,7 @@ fn kind(found: FileType) -> &'static str {
     {
         use std::os::unix::fs::FileTypeExt as _;
         if found.is_fifo() {
-            return "a named pipe";
+            return "a pipe";
         }
         if found.is_char_device() || found.is_block_device() {
             return "a device";
@@ -70,21 +72,74 @@ pub fn expect_no_link(path: &Path) -> io::Result<()> {
     }
 }
 
-/// Reads a file of at most so many bytes.
+/// Refuses a file that is to be changed in its place and that other folders have too, as a link of any kind.
+///
+/// # Errors
+/// Those of [`expect_no_link`], or that the file has several names.
+pub fn expect_own(path: &Path) -> io::Result<()> {
+    expect_no_link(path)?;
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::MetadataExt as _;
+        let names = fs::symlink_metadata(path).map_or(1, |found| found.nlink());
+        if names > 1 {
+            return Err(io::Error::other(format!(
+                "a file of its own expected, one with {names} names (hard links) found; copy it"
+            )));
+        }
+    }
+    Ok(())
+}
+
+/// Reads a file of at most so many bytes, or what a pipe of the command line has.
 ///
 /// # Errors
 /// The error of the system, or that the path is no file, or that it is larger.
 pub fn read(path: &Path, most: u64) -> io::Result<Vec<u8>> {
-    let file = open(path)?;
-    let too_large = || io::Error::other(format!("a file of at most {most} bytes expected"));
-    let size = file.metadata()?.len();
-    if size > most {
-        return Err(too_large());
+    if is_argument_pipe(path) {
+        return read_pipe(path, most);
     }
+    let file = open(path)?;
+    let size = file.metadata()?.len();
+    if size > most { Err(too_large(most)) } else { read_all(file, size, most) }
+}
+
+fn too_large(most: u64) -> io::Error {
+    io::Error::other(format!("a file of at most {most} bytes expected"))
+}
+
+/// Reads to the end: the size that is announced may be wrong.
+fn read_all(file: File, size: u64, most: u64) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::with_capacity(size as usize + 1);
-    // The size that is announced may be wrong.
     file.take(most + 1).read_to_end(&mut bytes)?;
-    if bytes.len() as u64 > most { Err(too_large()) } else { Ok(bytes) }
+    if bytes.len() as u64 > most { Err(too_large(most)) } else { Ok(bytes) }
+}
+
+/// Whether a path is a pipe that the shell opened for an argument of this process, as `--gps <(…)` and
+/// `--gps /dev/stdin`. No file can name one: what is read must be an argument.
+pub fn is_argument_pipe(path: &Path) -> bool {
+    let is_opened = path.starts_with("/dev/fd") || path == Path::new("/dev/stdin");
+    let is_pipe = || fs::metadata(path).is_ok_and(|found| kind(found.file_type()) == "a pipe");
+    let is_given = || {
+        std::env::args_os().any(|argument| {
+            let value =
+                argument.as_encoded_bytes().strip_suffix(path.as_os_str().as_encoded_bytes());
+            value.is_some_and(|before| before.is_empty() || before.ends_with(b"="))
+        })
+    };
+    is_opened && is_pipe() && is_given()
+}
+
+/// What a pipe has, which can be read once, and is kept for those who ask again.
+fn read_pipe(path: &Path, most: u64) -> io::Result<Vec<u8>> {
+    static READ: Mutex<BTreeMap<PathBuf, Vec<u8>>> = Mutex::new(BTreeMap::new());
+    let mut read = READ.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some(bytes) = read.get(path) {
+        return Ok(bytes.clone());
+    }
+    let bytes = read_all(File::open(path)?, 0, most)?;
+    read.insert(path.to_owned(), bytes.clone());
+    Ok(bytes)
 }
 
 /// Reads a text of at most so many bytes.
@@ -230,6 +285,9 @@ mod tests {
         assert_eq!(lines, ["one", "two", "", "three"]);
         assert!(expect_no_link(&path).is_ok() && expect_no_link(&folder.path().join("b")).is_ok());
         assert!(expect_no_link(folder.path()).is_err());
+        assert!(expect_own(&path).is_ok() && expect_own(&folder.path().join("b")).is_ok());
+        fs::hard_link(&path, folder.path().join("b")).expect("writable");
+        assert_eq!(expect_own(&path).is_err(), cfg!(unix));
     }
 
     #[test]

@@ -37,6 +37,23 @@ impl UnknownWord {
     }
 }
 
+/// Refuses a name of a scene, a photo or a query that no line has room for, or that controls a terminal.
+///
+/// # Errors
+/// What is expected of names.
+pub fn expect_name(name: &str) -> Result<(), String> {
+    /// Longer than any path that a photo has below its scene \[bytes\].
+    const LONGEST: usize = 4096;
+    let shown = || name.escape_default().take(100).collect::<String>();
+    if name.contains(char::is_control) {
+        Err(format!("names without control characters expected, `{}` found", shown()))
+    } else if name.len() > LONGEST {
+        Err(format!("names of at most {LONGEST} bytes expected, `{}…` found", shown()))
+    } else {
+        Ok(())
+    }
+}
+
 /// An enum each of whose values is one word, on the command line, in files and in tables.
 macro_rules! words {
     ($type:ident, $kind:literal: $($variant:ident = $word:literal),+ $(,)?) => {

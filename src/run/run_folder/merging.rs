@@ -1,6 +1,5 @@
 //! Putting the parts of a run together.
 
-use std::fs;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
@@ -46,14 +45,11 @@ pub fn merge(shards: &[PathBuf], target: &Path) -> Result<RunFile, FolderError> 
         }
     };
     let owners = whole.plan().map(|item| owner(&item)).collect::<Result<Vec<usize>, _>>()?;
-    let folder = RunFolder::create(target, &whole)?;
+    let mut folder = RunFolder::create(target, &whole)?;
     let parts: Vec<&Path> = runs.iter().map(|(path, _)| path.as_path()).collect();
-    let copied = copy(&parts, &owners, whole.results_per_item(), folder);
+    let copied = copy(&parts, &owners, whole.results_per_item(), &mut folder);
     if copied.is_err() {
-        // All of them are new: the folder was empty.
-        for name in [RUN, TIMINGS, RESULTS] {
-            fs::remove_file(target.join(name)).ok();
-        }
+        folder.discard();
     }
     copied.map(|()| whole)
 }
@@ -63,7 +59,7 @@ fn copy(
     parts: &[&Path],
     owners: &[usize],
     per_item: usize,
-    mut folder: RunFolder,
+    folder: &mut RunFolder,
 ) -> Result<(), FolderError> {
     for (name, file) in [(TIMINGS, &mut folder.timings), (RESULTS, &mut folder.results)] {
         let sources = parts.iter().map(|part| lines_of(part, name));

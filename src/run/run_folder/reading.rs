@@ -71,9 +71,24 @@ fn expect_numbers(result: &QueryResult) -> Result<(), String> {
     /// The square of a number is one, too.
     const LARGEST: f64 = 1e150;
     let all = std::iter::once(result).chain(result.per_reference.iter().flatten());
-    for QueryResult { pose, error, initial_error, .. } in all {
-        let errors = [error, initial_error].into_iter().flatten();
-        let mut lengths = errors.map(|error| error.translation_m).collect::<Vec<f64>>();
+    for QueryResult { pose, error, initial_error, confidence, .. } in all {
+        let mut lengths = Vec::new();
+        for error in [error, initial_error].into_iter().flatten() {
+            lengths.push(error.translation_m);
+            let angles = [error.rotation_deg, error.max_euler_deg];
+            // Rounding may exceed a half turn.
+            if error.translation_m < 0.0 || !angles.iter().all(|angle| (0.0..181.0).contains(angle))
+            {
+                return Err(format!(
+                    "an error from 0 on, with angles up to 180° expected, {:e} and {angles:?} found",
+                    error.translation_m
+                ));
+            }
+        }
+        let probability = confidence.as_ref().map_or(0.0, |confidence| confidence.probability);
+        if !(0.0..=1.0).contains(&probability) {
+            return Err(format!("a probability from 0 to 1 expected, {probability:e} found"));
+        }
         if let Some(pose) = pose {
             lengths.extend(pose.position_m);
             let length = pose.quaternion_xyzw.map(|part| part * part).iter().sum::<f64>().sqrt();

@@ -31,6 +31,8 @@ impl RecordingNames {
             let plain = file_name(&name);
             let numbered = (2..).map(|number| format!("{plain}-{number}"));
             let free = [plain.clone()].into_iter().chain(numbered).find(|name| {
+                // Some file systems do not tell `A` from `a`.
+                let name = name.to_lowercase();
                 let files: Vec<String> =
                     methods.iter().map(|method| format!("{name}-{method}")).collect();
                 let is_free = !files.iter().any(|file| used.contains(file));

@@ -70,6 +70,11 @@ impl fmt::Display for Note {
 impl Collector {
     /// Adds a point \[m\].
     pub fn add(&mut self, point: [f64; 3]) -> Result<(), String> {
+        if self.zeros + self.without_return + self.without_number > MAX_POINTS {
+            return Err(format!(
+                "at most {MAX_POINTS} points to leave out expected; thin the cloud"
+            ));
+        }
         if !point.iter().all(is_near) {
             self.without_number += 1;
             return Ok(());

@@ -55,7 +55,7 @@ impl Length {
                 other => return Err(format!("{LENGTH}; `{other}` found")),
             },
         };
-        if metres.is_finite() && metres > 0.0 {
+        if (1e-9..=1e9).contains(&metres) {
             Ok(metres)
         } else {
             Err(format!("{LENGTH}; {metres} found"))

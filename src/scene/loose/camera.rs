@@ -6,6 +6,7 @@ use std::str::FromStr;
 
 use super::super::SceneError;
 use super::super::colmap::{CAMERA_COLUMNS, ModelCamera, camera_of_line};
+use posescope_core::files;
 use posescope_core::scene::{stem, without_extension};
 
 use super::super::frame_names::agree;
@@ -159,7 +160,8 @@ impl FromStr for CameraArgument {
             line_camera(text)?;
             return Ok(Self::Line(text.trim().to_owned()));
         }
-        if Path::new(text).is_file() {
+        let path = Path::new(text);
+        if path.is_file() || files::is_argument_pipe(path) {
             return Ok(Self::File(text.into()));
         }
         let expected = "fx,fy,cx,cy [px], these with OpenCV's k1,k2,p1,p2 (also k3, or k3,k4,k5,k6), a camera \

@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::SystemTime;
 use std::{fs, io};
 
-use posescope_core::files::write_whole;
+use posescope_core::files::{self, write_whole};
 use xxhash_rust::xxh3::{xxh3_64, xxh3_64_with_seed};
 
 use super::user_folder::user_cache_folder;
@@ -42,7 +42,7 @@ impl DiskCache {
 
     /// The bytes of a key, if they are there and undamaged.
     pub(crate) fn read(&self, key: &str) -> Option<Vec<u8>> {
-        let mut bytes = fs::read(self.path(key)).ok()?;
+        let mut bytes = files::read(&self.path(key), self.limit).ok()?;
         let (magic, rest) = bytes.split_first_chunk()?;
         let (sum, payload) = rest.split_first_chunk()?;
         if *magic != MAGIC || u64::from_le_bytes(*sum) != checksum(key, payload) {
