@@ -22,6 +22,8 @@ pub(super) struct View {
     pub(super) camera: Intrinsics,
     /// Edges across columns and across rows, as shares of the mean around them.
     maps: Vec<[Map; 2]>,
+    /// The width and the height of the photo \[px\].
+    size: [f64; 2],
     /// Pixels of the photo along a pixel of the first map.
     pub(super) reduced: f64,
 }
@@ -41,20 +43,22 @@ impl View {
             let halves = maps[maps.len() - 1].each_ref().map(|map| resized(map, 2));
             maps.push(halves);
         }
-        Self { camera, maps, reduced: f64::from(times) }
+        let size = [f64::from(photo.width()), f64::from(photo.height())];
+        Self { camera, maps, size, reduced: f64::from(times) }
     }
 
     /// How much stronger the edge at a pixel of the photo is than those around it, as a share: about 0 on average. The
     /// higher the level, the more blurred.
     pub(super) fn strength(&self, level: usize, across: Across, pixel: &Point2<f64>) -> f64 {
-        let scale = self.reduced * f64::from(1 << level);
         let [columns, rows] = &self.maps[level];
         let map = match across {
             Across::Columns => columns,
             Across::Rows => rows,
         };
-        let (x, y) = ((pixel.x + 0.5) / scale - 0.5, (pixel.y + 0.5) / scale - 0.5);
         let (width, height) = (map.width() as usize, map.height() as usize);
+        // A map of half of an odd width has a little more than two pixels of the photo in each of its own.
+        let x = (pixel.x + 0.5) * width as f64 / self.size[0] - 0.5;
+        let y = (pixel.y + 0.5) * height as f64 / self.size[1] - 0.5;
         if !(x >= 0.0 && y >= 0.0 && x < width as f64 - 1.0 && y < height as f64 - 1.0) {
             return 0.0;
         }
@@ -96,4 +100,33 @@ fn strengths(gray: &Map) -> [Map; 2] {
             Luma([((edge + NOISE) / (mean + NOISE) / STRONGEST).min(1.0)])
         })
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_edge_is_where_it_is_in_a_photo_of_odd_size() {
+        let (width, height) = (1241, 375);
+        let camera = Intrinsics { fx: 700.0, fy: 700.0, cx: 620.0, cy: 187.0, width, height };
+        for edge in [201, 620, 1101] {
+            let photo =
+                GrayImage::from_fn(width, height, |x, _| Luma([if x < edge { 40 } else { 200 }]));
+            let view = View::new(&photo, camera);
+            for level in 0..LEVELS {
+                let strength =
+                    |x: f64| view.strength(level, Across::Columns, &Point2::new(x, 187.0));
+                let around =
+                    (-400..=400).map(|step| f64::from(edge) - 0.5 + f64::from(step) / 20.0);
+                let (sum, moment) = around.fold((0.0, 0.0), |(sum, moment), x| {
+                    let strength = (strength(x) + 1.0).max(0.0);
+                    (sum + strength, moment + strength * x)
+                });
+                let off = moment / sum - (f64::from(edge) - 0.5);
+                let pixel = view.reduced * f64::from(1 << level);
+                assert!(off.abs() < 0.1 * pixel, "{edge}, level {level}: {off}");
+            }
+        }
+    }
 }
