@@ -75,7 +75,8 @@ impl Sample<'_> {
         let by_motions = by_motions.and_then(|(finding, change)| {
             let (fit, rest) = self.clone().read_as(&change).chained();
             // A second reading of the same kind takes the first one back.
-            let is_kept = rest.as_ref().is_none_or(|rest| rest.mistake != finding.mistake);
+            let mut of_rest = std::iter::successors(rest.as_ref(), |found| found.then.as_deref());
+            let is_kept = of_rest.all(|found| found.mistake != finding.mistake);
             (fit == Fit::Fits && is_kept)
                 .then(|| (fit, Finding { then: rest.map(Box::new), ..finding }))
         });

@@ -195,7 +195,9 @@ fn planted(options: &Options) -> Result<(), Failure> {
             let found = examine(&part.of(fault));
             let first = found.finding.as_ref();
             let chain = std::iter::successors(first, |finding| finding.then.as_deref());
-            let named: Vec<_> = chain.map(|finding| finding.mistake).collect();
+            let mut named: Vec<_> = chain.map(|finding| finding.mistake).collect();
+            // A second reading of the same kind makes the numbers of the first one exact.
+            named.dedup();
             let beside = first
                 .is_some_and(|one| one.or.iter().any(|(mistake, _)| Some(*mistake) == expected));
             let at = match (expected, first) {

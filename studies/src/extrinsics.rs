@@ -1,5 +1,3 @@
-use std::ops::Range;
-
 use nalgebra::{Translation3, UnitQuaternion, Vector3};
 use posescope::camera::Intrinsics;
 use posescope::cloud::Cloud;
@@ -27,6 +25,9 @@ pub struct Options {
     /// Frames of a part; parts begin at random frames.
     #[arg(long, default_value_t = 20)]
     frames: usize,
+    /// A part has every frame of so many.
+    #[arg(long, default_value_t = 1)]
+    step: usize,
     #[arg(long, default_value_t = 0)]
     seed: u64,
     /// Plant turns and shifts alone.
@@ -35,9 +36,11 @@ pub struct Options {
 }
 
 /// Frames of a scene with another calibration than stated.
+#[derive(Clone, Copy)]
 struct Misplaced<'a> {
     scene: &'a dyn Scene,
-    at: Range<usize>,
+    at: &'a [usize],
+    names: &'a [String],
     /// Where the camera is, in the frame that is stated.
     change: Pose,
     focal_length: f64,
@@ -51,11 +54,11 @@ impl Scene for Misplaced<'_> {
     }
 
     fn frames(&self) -> &[String] {
-        &self.scene.frames()[self.at.clone()]
+        self.names
     }
 
     fn intrinsics(&self, frame: usize) -> Intrinsics {
-        let camera = self.scene.intrinsics(self.at.start + frame);
+        let camera = self.scene.intrinsics(self.at[frame]);
         Intrinsics {
             fx: camera.fx * self.focal_length,
             fy: camera.fy * self.focal_length,
@@ -64,23 +67,23 @@ impl Scene for Misplaced<'_> {
     }
 
     fn pose(&self, frame: usize) -> Option<Pose> {
-        self.scene.pose(self.at.start + frame)
+        self.scene.pose(self.at[frame])
     }
 
     fn time_s(&self, frame: usize) -> Option<f64> {
-        self.scene.time_s(self.at.start + frame)
+        self.scene.time_s(self.at[frame])
     }
 
     fn has_cloud(&self, frame: usize) -> bool {
-        self.scene.has_cloud(self.at.start + frame)
+        self.scene.has_cloud(self.at[frame])
     }
 
     fn photo(&self, frame: usize) -> Result<posescope::image::Photo, SceneError> {
-        self.scene.photo(self.at.start + frame)
+        self.scene.photo(self.at[frame])
     }
 
     fn cloud(&self, frame: usize) -> Result<Cloud, SceneError> {
-        let at = self.at.start + frame;
+        let at = self.at[frame];
         let cloud = self.scene.cloud(at)?;
         let earlier = self.earlier(at).unwrap_or_else(Pose::identity);
         let change = (self.change * earlier).cast::<f32>();
@@ -141,11 +144,14 @@ pub fn run(options: &Options) -> Result<(), Failure> {
 /// The row of a scene, and its row of freedoms.
 fn row(scene: &dyn Scene, options: &Options) -> Result<(Vec<String>, Vec<String>), Failure> {
     let count = scene.frames().len();
-    let part = options.frames.min(count);
+    let part = options.frames.min(count.div_ceil(options.step));
+    let names = |at: &[usize]| at.iter().map(|&at| scene.frames()[at].clone()).collect::<Vec<_>>();
+    let all: Vec<usize> = (0..count).collect();
     let mut random = Pcg64::seed_from_u64(options.seed);
     let as_it_is = Misplaced {
         scene,
-        at: 0..count,
+        at: &all,
+        names: scene.frames(),
         change: Pose::identity(),
         focal_length: 1.0,
         delay_s: 0.0,
@@ -156,15 +162,16 @@ fn row(scene: &dyn Scene, options: &Options) -> Result<(Vec<String>, Vec<String>
     let mut each: [Vec<[f64; 2]>; 6] = Default::default();
     let (mut consistent, mut focal_lengths, mut delays) = (0, vec![], vec![]);
     for _ in 0..options.draws {
-        let start = random.random_range(0..=count - part);
-        let at = start..start + part;
+        let start = random.random_range(0..=count - 1 - (part - 1) * options.step);
+        let at: Vec<usize> = (0..part).map(|frame| start + frame * options.step).collect();
+        let as_it_is = Misplaced { at: &at, names: &names(&at), ..as_it_is };
         let mut along = || Vector3::from_fn(|_, _| random.random_range(-1.0..1.0_f64)).normalize();
         let (axis, way) = (along(), along());
         let turn = axis * random.random_range(0.1..3.0_f64).to_radians();
         let shift = way * random.random_range(0.02..0.3_f64);
         let change =
             Pose::from_parts(Translation3::from(shift), UnitQuaternion::from_scaled_axis(turn));
-        let found = calibration(&Misplaced { at: at.clone(), change, ..as_it_is }, &|_| ())?;
+        let found = calibration(&Misplaced { change, ..as_it_is }, &|_| ())?;
         let rest = found.camera_from_stated() * change;
         let [turn_deg, shift_m] = size(&rest);
         turns.push(turn_deg);
@@ -183,15 +190,15 @@ fn row(scene: &dyn Scene, options: &Options) -> Result<(Vec<String>, Vec<String>
         if options.poses_only {
             continue;
         }
-        let sound: Calibration = calibration(&Misplaced { at: at.clone(), ..as_it_is }, &|_| ())?;
+        let sound: Calibration = calibration(&as_it_is, &|_| ())?;
         consistent += usize::from(!sound.is_off());
         let sign = if random.random_bool(0.5) { 1.0 } else { -1.0 };
         let by = sign * random.random_range(0.02..0.08);
-        let wrong = Misplaced { at: at.clone(), focal_length: 1.0 + by, ..as_it_is };
+        let wrong = Misplaced { focal_length: 1.0 + by, ..as_it_is };
         let found = calibration(&wrong, &|_| ())?.focal_length.value;
         focal_lengths.push(100.0 * ((1.0 + found) * (1.0 + by) - 1.0).abs());
         let delay_s = sign * random.random_range(0.02..0.1);
-        if let Some(delay) = calibration(&Misplaced { at, delay_s, ..as_it_is }, &|_| ())?.delay {
+        if let Some(delay) = calibration(&Misplaced { delay_s, ..as_it_is }, &|_| ())?.delay {
             delays.push(1000.0 * (delay.value - delay_s).abs());
         }
     }

@@ -1,9 +1,9 @@
 //! The turn, the shift and more that put depth edges on image edges.
 
-use nalgebra::{Point3, SMatrix, SVector, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Point2, Point3, SMatrix, SVector, Translation3, UnitQuaternion, Vector3};
 use rayon::prelude::*;
 
-use super::depth_edges::{DepthEdge, depth_edges};
+use super::depth_edges::{Across, DepthEdge, depth_edges};
 use super::view::{LEVELS, View};
 use crate::camera::Intrinsics;
 use crate::geometry::Pose;
@@ -89,6 +89,29 @@ impl Frame {
             Some(edge.weight * self.view.strength(level, edge.across, &pixel))
         };
         self.edges.iter().filter_map(strength).sum()
+    }
+
+    /// Where the depth edges are in the photo \[px\].
+    fn pixels(&self, values: &Values) -> Vec<Option<Point2<f64>>> {
+        let (change, camera) = (self.change(values), self.camera(values));
+        let (rotation, shift) = (change.rotation.to_rotation_matrix(), change.translation.vector);
+        let pixel = |edge: &DepthEdge| camera.project(&(rotation * edge.point + shift));
+        self.edges.iter().map(pixel).collect()
+    }
+
+    /// The strength of the photo's edges on the finest map, where depth edges move across themselves alone, from these
+    /// pixels. Along itself, an outline looks alike but for its ends, and these would draw it.
+    fn score_across(&self, from: &[Option<Point2<f64>>], values: &Values) -> f64 {
+        let moved = self.pixels(values);
+        let strength =
+            |((edge, from), to): ((&DepthEdge, &Option<Point2<f64>>), Option<Point2<f64>>)| {
+                let pixel = match (edge.across, (*from)?, to?) {
+                    (Across::Columns, from, to) => Point2::new(to.x, from.y),
+                    (Across::Rows, from, to) => Point2::new(from.x, to.y),
+                };
+                Some(edge.weight * self.view.strength(0, edge.across, &pixel))
+            };
+        self.edges.iter().zip(from).zip(moved).filter_map(strength).sum()
     }
 }
 
@@ -288,12 +311,13 @@ fn derivatives(frames: &[&Frame], free: &[usize], unit: &Values, at: &Values) ->
     /// \[px\]
     const STEP: f64 = 0.75;
     let each = |frame: &&Frame| {
+        let from = frame.pixels(at);
         let of = |changes: &[(usize, f64)]| {
             let mut values = *at;
             for &(freedom, by) in changes {
                 values[freedom] += by * STEP * unit[freedom];
             }
-            frame.score(0, &values)
+            frame.score_across(&from, &values)
         };
         let here = of(&[]);
         let (mut slope, mut bend) = (Values::zeros(), Squares::zeros());
