@@ -166,7 +166,10 @@ pub fn report(
                 "does not fit as stated, and what is named above does not explain all of it",
             );
         }
-        (Some(_), Some(_)) => line("answer", "does not fit as stated"),
+        (Some(_), Some(Fit::Fits)) => {
+            line("answer", "does not fit as stated, and fits if corrected as above");
+        }
+        (Some(_), Some(Fit::NoSharedView)) => line("answer", "does not fit as stated"),
         (None, Some(Fit::Fits)) => {
             line(
                 "answer",

@@ -26,7 +26,7 @@ const FRAMES: usize = 25;
 const MIN_FRAMES: usize = 3;
 const MIN_EDGES: usize = 800;
 /// No edge is located better than this on average, however many frames there are \[px of the finest map\].
-const FLOOR_PX: f64 = 0.5;
+const FLOOR_PX: f64 = 0.35;
 /// A value that is more standard deviations from 0 is off. One of seven sound ones is by chance in about 50 scenes.
 const OFF: f64 = 3.0;
 /// Standard deviations of a normal distribution that hold 90 %.

@@ -78,7 +78,7 @@ fn write_better(
     Ok(())
 }
 
-const DELAY: &str = "delay of the photos, alone";
+const DELAY: &str = "delay, if nothing else is off";
 
 /// A freedom: its name, its unit, what a unit is in radians, metres, seconds or shares, and its decimals.
 type Row<'a> = (&'a str, &'a str, f64, usize, Estimate);
