@@ -75,7 +75,7 @@ pub const ALL: &[Fault] = &[
         let other = street.drives.day.image(street.frame_at(street.query, 6));
         photo(case, |photo| paste(photo, &other, photo.width() * 35 / 100..photo.width()))
     }),
-    ("strict_ratio", |_, case| params(case, |p| p.fb.ratio = 0.05)),
+    ("strict_ratio", |_, case| params(case, |p| p.fb.ratio = 0.1)),
     ("few_trials", |_, case| {
         params(case, |params| {
             (params.fb.ratio, params.fb.unique) = (1.0, false);

@@ -1,9 +1,12 @@
 //! The camera.
 
+use std::hash::{DefaultHasher, Hash as _, Hasher as _};
+
 use posescope_core::Intrinsics;
 use pyo3::prelude::*;
 
 use crate::errors;
+use crate::travel::{self, Reduced};
 
 /// A rectified pinhole camera.
 ///
@@ -105,6 +108,21 @@ impl Camera {
         self.pixel_center
     }
 
+    fn __hash__(&self) -> u64 {
+        let Intrinsics { fx, fy, cx, cy, width, height } = self.intrinsics;
+        let mut hasher = DefaultHasher::new();
+        // Zero and minus zero are equal.
+        let bits = [fx, fy, cx, cy, self.pixel_center].map(|number| (number + 0.0).to_bits());
+        (bits, width, height).hash(&mut hasher);
+        hasher.finish()
+    }
+
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Reduced<'py>> {
+        let Intrinsics { fx, fy, cx, cy, width, height } = self.intrinsics;
+        let numbers = (fx, fy, cx, cy, width, height, self.pixel_center);
+        travel::by(py, "camera", numbers)
+    }
+
     fn __repr__(&self) -> String {
         let Intrinsics { fx, fy, width, height, .. } = self.intrinsics;
         let (cx, cy, center) = (self.cx(), self.cy(), self.pixel_center);
@@ -112,4 +130,20 @@ impl Camera {
             "Camera(fx={fx}, fy={fy}, cx={cx}, cy={cy}, width={width}, height={height}, pixel_center={center})"
         )
     }
+}
+
+/// A camera that travelled: its principal point is where the centre of the top-left pixel is at (0, 0).
+#[pyfunction]
+pub fn restored_camera(
+    fx: f64,
+    fy: f64,
+    cx: f64,
+    cy: f64,
+    width: u32,
+    height: u32,
+    pixel_center: f64,
+) -> PyResult<Camera> {
+    let mut camera = Camera::new(fx, fy, cx, cy, width, height, 0.0)?;
+    camera.pixel_center = pixel_center;
+    Ok(camera)
 }

@@ -5,7 +5,8 @@ use std::sync::Arc;
 use posescope_core::{Pose, ReferenceTuple};
 use pyo3::prelude::*;
 
-use crate::scene::Opened;
+use crate::scene::{Opened, Scene};
+use crate::travel::{self, Parts, Reduced};
 use crate::{arrays, camera::Camera, errors};
 
 /// The frame of a scene that a query or a reference is.
@@ -15,6 +16,14 @@ pub struct Origin {
     pub opened: Arc<Opened>,
     /// The frame's position in it.
     pub frame: usize,
+}
+
+impl Origin {
+    /// The scene and the frame's name in it.
+    fn named(&self) -> (Scene, String) {
+        let name = self.opened.scene.frames()[self.frame].clone();
+        (Scene { opened: Arc::clone(&self.opened) }, name)
+    }
 }
 
 /// The photo whose pose is sought.
@@ -78,6 +87,17 @@ impl Query {
     #[getter]
     fn truth<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
         self.truth.as_ref().map(|truth| arrays::of_pose(py, truth)).transpose()
+    }
+
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Reduced<'py>> {
+        match &self.origin {
+            Some(origin) => travel::by(py, "query_of", origin.named()),
+            None => {
+                let truth = self.truth.as_ref().map(travel::parts);
+                let numbers = (self.photo(py)?, self.camera(), self.name(), truth);
+                travel::by(py, "query", numbers)
+            }
+        }
     }
 
     fn __repr__(&self) -> String {
@@ -164,6 +184,17 @@ impl Reference {
         arrays::of_cloud(py, self.reference.cloud())
     }
 
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Reduced<'py>> {
+        match &self.origin {
+            Some(origin) => travel::by(py, "reference_of", origin.named()),
+            None => {
+                let pose = travel::parts(self.reference.world_from_camera());
+                let (photo, cloud) = (self.photo(py)?, self.cloud(py)?);
+                travel::by(py, "reference", (photo, self.camera(), pose, cloud, self.name()))
+            }
+        }
+    }
+
     fn __repr__(&self) -> String {
         let (name, cloud) = (self.reference.name(), self.reference.cloud());
         let (width, height) = self.reference.photo().dimensions();
@@ -176,4 +207,31 @@ impl Reference {
             at.z
         )
     }
+}
+
+/// A query of arrays that travelled.
+#[pyfunction]
+pub fn restored_query(
+    photo: &Bound<'_, PyAny>,
+    camera: &Camera,
+    name: &str,
+    truth: Option<Parts>,
+) -> PyResult<Query> {
+    let query = Query::new(photo, camera, name, None)?;
+    Ok(Query { truth: truth.map(travel::pose), ..query })
+}
+
+/// A reference of arrays that travelled.
+#[pyfunction]
+pub fn restored_reference(
+    photo: &Bound<'_, PyAny>,
+    camera: &Camera,
+    pose: Parts,
+    cloud: &Bound<'_, PyAny>,
+    name: &str,
+) -> PyResult<Reference> {
+    let (photo, cloud) = (arrays::photo("photo", photo)?, arrays::cloud("cloud", cloud, None)?);
+    let reference = ReferenceTuple::new(name, photo, camera.intrinsics, travel::pose(pose), cloud);
+    let reference = reference.map_err(|error| errors::array(&error))?;
+    Ok(Reference { reference: Arc::new(reference), origin: None })
 }

@@ -16,6 +16,7 @@ mod job;
 mod live;
 mod localize;
 mod scene;
+mod travel;
 
 use pyo3::prelude::*;
 
@@ -30,6 +31,10 @@ fn extension(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<frames::Reference>()?;
     module.add_class::<scene::Scene>()?;
     module.add_class::<localize::Answer>()?;
+    module.add_function(wrap_pyfunction!(camera::restored_camera, module)?)?;
+    module.add_function(wrap_pyfunction!(frames::restored_query, module)?)?;
+    module.add_function(wrap_pyfunction!(frames::restored_reference, module)?)?;
+    module.add_function(wrap_pyfunction!(scene::restored_scene, module)?)?;
     module.add_function(wrap_pyfunction!(localize::localize, module)?)?;
     module.add_function(wrap_pyfunction!(localize::diagnose, module)?)?;
     module.add_function(wrap_pyfunction!(localize::methods, module)?)?;

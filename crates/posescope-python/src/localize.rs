@@ -27,6 +27,9 @@ use crate::{arrays, errors};
 /// Query points, reference points and perhaps scores.
 pub type GivenMatches<'py> = (Bound<'py, PyAny>, Bound<'py, PyAny>, Option<Bound<'py, PyAny>>);
 
+/// A line of `results.jsonl`, and how long the work took \[s\].
+type Before = (String, f64);
+
 /// The fusion of several references, as of `posescope eval`.
 const FUSION: &str = "r-wavg";
 
@@ -35,12 +38,27 @@ const FUSION: &str = "r-wavg";
 pub struct Answer {
     job: Job,
     result: QueryResult,
+    /// The result as a line of `results.jsonl`. Read and written again, a pose may differ in its last digit.
+    line: String,
     threads: Option<NonZeroUsize>,
     took: Duration,
 }
 
 impl Answer {
-    fn of(py: Python<'_>, asked: &Asked<'_>, threads: Option<NonZeroUsize>) -> PyResult<Self> {
+    /// The answer, computed or, as one that travelled.
+    fn of(
+        py: Python<'_>,
+        asked: &Asked<'_>,
+        threads: Option<NonZeroUsize>,
+        before: Option<Before>,
+    ) -> PyResult<Self> {
+        if let Some((line, seconds)) = before {
+            let result =
+                serde_json::from_str(&line).map_err(|error| errors::value(error.to_string()))?;
+            let took = Duration::try_from_secs_f64(seconds).unwrap_or_default();
+            let job = detached(py, threads, |_| asked.job())??;
+            return Ok(Self { job, result, line, threads, took });
+        }
         let answered = detached(py, threads, |stop| -> PyResult<_> {
             let start = Instant::now();
             let job = asked.job()?;
@@ -49,15 +67,17 @@ impl Answer {
             Ok((job, result, start.elapsed()))
         })?;
         let (job, result, took) = answered?;
-        Ok(Self { job, result, threads, took })
+        let line = serde_json::to_string(&result);
+        let line = line.map_err(|error| errors::internal(&error.to_string()))?;
+        Ok(Self { job, result, line, threads, took })
     }
 }
 
 #[pymethods]
 impl Answer {
     /// The result as a line of `results.jsonl`.
-    fn json(&self) -> PyResult<String> {
-        serde_json::to_string(&self.result).map_err(|error| errors::internal(&error.to_string()))
+    fn json(&self) -> &str {
+        &self.line
     }
 
     /// How long the work took \[s\], without Python's part.
@@ -245,8 +265,9 @@ fn threads_of(threads: Option<usize>) -> PyResult<Option<NonZeroUsize>> {
     }
 }
 
-/// Localises a query.
+/// Localises a query, unless the result came from another process.
 #[pyfunction]
+#[pyo3(signature = (query, references, method, params, radius, matches, fusion, seed, threads, before = None))]
 #[expect(clippy::too_many_arguments, reason = "Python names them")]
 pub fn localize(
     py: Python<'_>,
@@ -259,6 +280,7 @@ pub fn localize(
     fusion: Option<&str>,
     seed: u64,
     threads: Option<usize>,
+    before: Option<Before>,
 ) -> PyResult<Answer> {
     let threads = threads_of(threads)?;
     let method: Method = method.parse().map_err(errors::value)?;
@@ -275,11 +297,12 @@ pub fn localize(
         fusion,
         seed,
     };
-    Answer::of(py, &asked, threads)
+    Answer::of(py, &asked, threads, before)
 }
 
-/// What the verdicts say of a pose.
+/// What the verdicts say of a pose, unless the result came from another process.
 #[pyfunction]
+#[pyo3(signature = (query, references, world_from_camera, truth, params, name, threads, before = None))]
 #[expect(clippy::too_many_arguments, reason = "Python names them")]
 pub fn diagnose(
     py: Python<'_>,
@@ -290,6 +313,7 @@ pub fn diagnose(
     params: Vec<(String, String)>,
     name: &str,
     threads: Option<usize>,
+    before: Option<Before>,
 ) -> PyResult<Answer> {
     let threads = threads_of(threads)?;
     let method = Method::called(name).map_err(errors::value)?;
@@ -308,7 +332,7 @@ pub fn diagnose(
         fusion: None,
         seed: 0,
     };
-    Answer::of(py, &asked, threads)
+    Answer::of(py, &asked, threads, before)
 }
 
 /// The names of all methods.

@@ -1,6 +1,7 @@
 //! Scenes.
 
-use std::sync::{Arc, OnceLock};
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, OnceLock, PoisonError, Weak};
 
 use posescope::scene::{FrameStore, Scene as _, SceneError, SceneSize};
 use pyo3::prelude::*;
@@ -8,11 +9,20 @@ use pyo3::prelude::*;
 use crate::detached::detached;
 use crate::errors;
 use crate::frames::{Origin, Query, Reference};
+use crate::travel::{self, Reduced};
+
+/// The path of a scene, and its format where that is not recognised.
+type Key = (String, Option<String>);
+
+/// The scenes in use: frames that travel together come back as frames of one scene.
+static IN_USE: Mutex<BTreeMap<Key, Weak<Opened>>> = Mutex::new(BTreeMap::new());
 
 /// An opened scene with the frames used last.
 pub struct Opened {
     /// The scene argument.
     pub argument: String,
+    /// The format, where it was named.
+    format: Option<String>,
     /// The scene.
     pub scene: Arc<dyn posescope::scene::Scene>,
     /// Its frames, with what was computed of them.
@@ -40,14 +50,18 @@ impl Scene {
     fn of(py: Python<'_>, argument: &str, format: Option<&str>) -> PyResult<Self> {
         let opened = detached(py, None, |_| posescope::scene::open(argument, format))?;
         let opened = opened.map_err(|error| errors::scene(&error))?;
-        Ok(Self {
-            opened: Arc::new(Opened {
-                argument: argument.to_owned(),
-                scene: Arc::from(opened),
-                store: Arc::default(),
-                size: OnceLock::new(),
-            }),
-        })
+        let opened = Arc::new(Opened {
+            argument: argument.to_owned(),
+            format: format.map(str::to_owned),
+            scene: Arc::from(opened),
+            store: Arc::default(),
+            size: OnceLock::new(),
+        });
+        let mut in_use = IN_USE.lock().unwrap_or_else(PoisonError::into_inner);
+        in_use.retain(|_, known| known.strong_count() > 0);
+        let key = (opened.argument.clone(), opened.format.clone());
+        in_use.insert(key, Arc::downgrade(&opened));
+        Ok(Self { opened })
     }
 
     /// The frame of this name.
@@ -140,6 +154,10 @@ impl Scene {
         Ok(Reference { reference, origin: Some(origin) })
     }
 
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Reduced<'py>> {
+        travel::by(py, "scene", (&self.opened.argument, &self.opened.format))
+    }
+
     fn __len__(&self) -> usize {
         self.opened.scene.frames().len()
     }
@@ -147,5 +165,17 @@ impl Scene {
     fn __repr__(&self) -> String {
         let scene = &self.opened.scene;
         format!("<Scene {}: {} frames>", scene.name(), scene.frames().len())
+    }
+}
+
+/// A scene that travelled: the one of its path that is in use, or else the path is opened.
+#[pyfunction]
+pub fn restored_scene(py: Python<'_>, argument: String, format: Option<String>) -> PyResult<Scene> {
+    let key = (argument, format);
+    let in_use =
+        IN_USE.lock().unwrap_or_else(PoisonError::into_inner).get(&key).and_then(Weak::upgrade);
+    match in_use {
+        Some(opened) => Ok(Scene { opened }),
+        None => Scene::of(py, &key.0, key.1.as_deref()),
     }
 }

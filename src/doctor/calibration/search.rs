@@ -102,16 +102,16 @@ impl Frame {
     /// The strength of the photo's edges on the finest map, where depth edges move across themselves alone, from these
     /// pixels. Along itself, an outline looks alike but for its ends, and these would draw it.
     fn score_across(&self, from: &[Option<Point2<f64>>], values: &Values) -> f64 {
-        let moved = self.pixels(values);
-        let strength =
-            |((edge, from), to): ((&DepthEdge, &Option<Point2<f64>>), Option<Point2<f64>>)| {
-                let pixel = match (edge.across, (*from)?, to?) {
-                    (Across::Columns, from, to) => Point2::new(to.x, from.y),
-                    (Across::Rows, from, to) => Point2::new(from.x, to.y),
-                };
-                Some(edge.weight * self.view.strength(0, edge.across, &pixel))
+        let mut sum = 0.0;
+        for ((edge, from), to) in self.edges.iter().zip(from).zip(self.pixels(values)) {
+            let (Some(from), Some(to)) = (from, to) else { continue };
+            let pixel = match edge.across {
+                Across::Columns => Point2::new(to.x, from.y),
+                Across::Rows => Point2::new(from.x, to.y),
             };
-        self.edges.iter().zip(from).zip(moved).filter_map(strength).sum()
+            sum += edge.weight * self.view.strength(0, edge.across, &pixel);
+        }
+        sum
     }
 }
 

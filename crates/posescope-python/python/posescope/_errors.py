@@ -39,5 +39,9 @@ class GateError(Exception):
     """
 
     def __init__(self, message: str, run: "Run") -> None:
-        super().__init__(message)
+        # With both, the error can be pickled: a pool of processes passes it on.
+        super().__init__(message, run)
         self.run = run
+
+    def __str__(self) -> str:
+        return str(self.args[0])

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Callable, List, Mapping, Optional, Sequence, Tuple, Union
 
+import numpy as np
+
 from . import _posescope
 from ._posescope import Query, Reference
 from ._result import Result
@@ -73,18 +75,8 @@ def localize(
         raise TypeError(f"method: a name expected, {type(method).__name__} given")
     if matches is not None and method not in _USES_MATCHES:
         raise ValueError(f"matches: the methods that use them are fb and hy, `{method}` given")
-    answer = _posescope.localize(
-        query,
-        references,
-        method,
-        _texts(params),
-        radius,
-        _matches_of(query, references, matches),
-        fusion,
-        seed,
-        threads,
-    )
-    return Result(answer)
+    given = _matches_of(query, references, matches)
+    return _asked("localize", query, references, method, _texts(params), radius, given, fusion, seed, threads)
 
 
 def diagnose(
@@ -119,13 +111,28 @@ def diagnose(
         InternalError: A bug of posescope.
     """
     all_references, texts = _list_of(references), _texts(params)
-    answer = _posescope.diagnose(query, all_references, world_from_camera, truth, texts, name, threads)
+    asked = (query, all_references, world_from_camera, truth, texts, name, threads)
     if matches is None:
-        return Result(answer)
+        return _asked("diagnose", *asked)
     judged = query if truth is None else Query(query.photo, query.camera, query.name, truth)
     given = _matches_of(query, all_references, matches)
-    found = _posescope.localize(judged, all_references, "fb", texts, None, given, None, 0, threads)
-    return Result(answer, Result(found))
+    found = _asked("localize", judged, all_references, "fb", texts, None, given, None, 0, threads)
+    return _asked("diagnose", *asked, from_matches=found)
+
+
+def _asked(function: str, *arguments: Any, from_matches: Optional[Result] = None) -> Result:
+    """What a function of the extension answers, with what it was asked."""
+    answer = getattr(_posescope, function)(*arguments)
+    return Result(answer, (function, _kept(arguments)), from_matches)
+
+
+def _kept(value: Any) -> Any:
+    """A copy of all arrays in it: their owners may change them before the result travels."""
+    if isinstance(value, np.ndarray):
+        return value.copy()
+    if isinstance(value, (list, tuple)):
+        return type(value)(_kept(one) for one in value)
+    return value
 
 
 def _list_of(reference: "Reference | Sequence[Reference]") -> List[Reference]:

@@ -96,6 +96,16 @@ class Answer:
 _OneMatches = Tuple[Any, Any, Any]
 _Matches = Sequence[_OneMatches]
 
+def restored_camera(
+    fx: float, fy: float, cx: float, cy: float, width: int, height: int, pixel_center: float
+) -> Camera: ...
+def restored_query(
+    photo: ArrayLike, camera: Camera, name: str, truth: Optional[Sequence[float]]
+) -> Query: ...
+def restored_reference(
+    photo: ArrayLike, camera: Camera, pose: Sequence[float], cloud: ArrayLike, name: str
+) -> Reference: ...
+def restored_scene(argument: str, format: Optional[str]) -> Scene: ...
 def localize(
     query: Query,
     references: Sequence[Reference],
@@ -106,6 +116,7 @@ def localize(
     fusion: Optional[str],
     seed: int,
     threads: Optional[int],
+    before: Optional[Tuple[str, float]] = None,
 ) -> Answer: ...
 def diagnose(
     query: Query,
@@ -115,6 +126,7 @@ def diagnose(
     params: Sequence[Tuple[str, str]],
     name: str,
     threads: Optional[int],
+    before: Optional[Tuple[str, float]] = None,
 ) -> Answer: ...
 def panic() -> None: ...
 def methods() -> List[str]: ...

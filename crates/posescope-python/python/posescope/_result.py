@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import html
+import importlib
 import json
 import math
 import os
@@ -84,8 +85,12 @@ class Result:
     In a notebook it shows itself: the sentence, and the picture that proves it.
     """
 
-    def __init__(self, answer: "Answer", from_matches: "Optional[Result]" = None) -> None:
+    def __init__(
+        self, answer: "Answer", asked: Tuple[str, Tuple[Any, ...]], from_matches: "Optional[Result]" = None
+    ) -> None:
         self._answer = answer
+        # The function of the extension that was asked, and its arguments.
+        self._asked = asked
         self._from_matches = from_matches
         self._json = answer.json()
         self._row: Dict[str, Any] = json.loads(self._json)
@@ -232,6 +237,10 @@ class Result:
             self._proof = self._answer.proof()
             self._has_proof = True
         return self._proof
+
+    def __reduce__(self) -> Tuple[Any, ...]:
+        travel = importlib.import_module("posescope._travel")
+        return travel.result, (self._asked, self._json, self.seconds, self._from_matches)
 
     def __repr__(self) -> str:
         return f"<Result {self.headline}>"
