@@ -19,8 +19,7 @@ pub(super) fn truth_by_matches(case: &Case<'_>, matches: &TrueMatches) -> Option
     }
     let judged = case.subject.evidence.judged.as_ref()?;
     let (inliers, total) = (matches.inliers(), matches.correspondences.len());
-    let is_by_chance =
-        judged.acceptance.log10_nfa > NEVER_BY_CHANCE || 2 * inliers < total;
+    let is_by_chance = judged.acceptance.log10_nfa > NEVER_BY_CHANCE || 2 * inliers < total;
     if is_by_chance && !is_nearly_certain(case) {
         return None;
     }
