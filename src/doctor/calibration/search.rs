@@ -221,6 +221,8 @@ pub(super) fn delay(frames: &mut [Frame]) -> Values {
 fn turns(frames: &[&Frame], count: usize) -> Vec<Values> {
     const LEVEL: usize = LEVELS - 1;
     const REACH: [f64; 3] = [0.07, 0.07, 0.06];
+    /// Starts that are closer in steps lead to the same end.
+    const BESIDE: f64 = 1.5;
     let unit = units(frames) * f64::from(1 << LEVEL);
     let steps = |axis: usize| {
         let most = if unit[axis] > 0.0 { (REACH[axis] / unit[axis]).ceil() as i32 } else { 0 };
@@ -237,7 +239,16 @@ fn turns(frames: &[&Frame], count: usize) -> Vec<Values> {
     });
     let mut scored: Vec<(f64, Values)> = scored.collect();
     scored.sort_by(|one, other| other.0.total_cmp(&one.0));
-    scored.into_iter().take(count).map(|(_, values)| values).collect()
+    let mut found: Vec<Values> = Vec::new();
+    for (_, values) in scored {
+        let is_beside = |known: &Values| {
+            (0..3).all(|axis| (values[axis] - known[axis]).abs() < BESIDE * unit[axis])
+        };
+        if found.len() < count && !found.iter().any(is_beside) {
+            found.push(values);
+        }
+    }
+    found
 }
 
 /// Climbs along single freedoms, and along the way of the last round as long as that helps: on the most blurred of so
