@@ -189,6 +189,13 @@ fn no_link_shows_a_file_outside_of_a_scene() {
     fs::rename(root.path().join("photos/img1.png"), root.path().join("one.png")).expect("ours");
     symlink("../one.png", root.path().join("photos/img1.png")).expect("writable");
     run_in(root.path(), "run . --query img1 --reference img0 --method fb").ok();
+    // So are those to photos anywhere, by the real file's name.
+    let elsewhere = TempDir::new().expect("a folder");
+    let photo = elsewhere.path().join("one.png");
+    fs::rename(root.path().join("one.png"), &photo).expect("ours");
+    fs::remove_file(root.path().join("photos/img1.png")).expect("is there");
+    symlink(&photo, root.path().join("photos/img1.png")).expect("writable");
+    run_in(root.path(), "run . --query img1 --reference img0 --method fb").ok();
     // So is a folder of a data set that lies on another disk.
     let sequence = SmallSequence::write();
     fs::rename(sequence.folder().join("velodyne"), sequence.path().join("disk")).expect("ours");
