@@ -45,7 +45,7 @@ pub struct Answer {
 }
 
 impl Answer {
-    /// The answer, computed or, as one that travelled.
+    /// Computes the answer. If `before` holds one that travelled, that one is taken.
     fn of(
         py: Python<'_>,
         asked: &Asked<'_>,

@@ -6,7 +6,7 @@ use posescope_core::Pose;
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 
-/// What pickle and copy are told: what makes the value again, and of what.
+/// What `__reduce__` returns: the function that makes the value again, and its arguments.
 pub type Reduced<'py> = (Bound<'py, PyAny>, Bound<'py, PyTuple>);
 
 /// A position and the quaternion x y z w. A matrix would be rounded.

@@ -395,3 +395,69 @@ pub(super) fn spread(frames: &[&Frame], free: &[usize], at: &Values) -> Values {
     let squares: Values = found.iter().map(|one| (one - mean).component_mul(&(one - mean))).sum();
     (squares * (blocks as f64 - 1.0) / blocks as f64).map(f64::sqrt)
 }
+
+#[cfg(test)]
+mod tests {
+    use image::{GrayImage, Luma};
+
+    use super::*;
+
+    /// An outline on an edge of a photo, down to where the edge ends.
+    fn frame() -> Frame {
+        let (width, height) = (400, 200);
+        let camera = Intrinsics { fx: 300.0, fy: 300.0, cx: 199.5, cy: 99.5, width, height };
+        let photo = GrayImage::from_fn(width, height, |x, y| {
+            Luma([if x < 200 || y >= 100 { 40 } else { 200 }])
+        });
+        let outline = |row: i32| DepthEdge {
+            point: camera.unproject(&Point2::new(199.5, f64::from(row)), 10.0),
+            across: Across::Columns,
+            weight: 1.0,
+        };
+        Frame {
+            #[cfg(feature = "rerun")]
+            at: 0,
+            view: View::new(&photo, camera),
+            points: Vec::new(),
+            edges: (40..98).map(outline).collect(),
+            motion: None,
+        }
+    }
+
+    fn turned(axis: usize) -> Values {
+        let mut values = Values::zeros();
+        values[axis] = -0.01;
+        values
+    }
+
+    #[test]
+    fn an_outline_is_not_drawn_along_itself() {
+        let frame = frame();
+        let from = frame.pixels(&Values::zeros());
+        let change = |values: &Values| {
+            let across =
+                frame.score_across(&from, values) - frame.score_across(&from, &Values::zeros());
+            [across, frame.score(0, values) - frame.score(0, &Values::zeros())]
+        };
+        let [across, all] = change(&turned(0));
+        assert!(across.abs() < 1e-6 && all.abs() > 0.1, "down: {across} of {all}");
+        let [across, all] = change(&turned(1));
+        assert!(across < -10.0 && (across - all).abs() < 0.1, "aside: {across} of {all}");
+    }
+
+    #[test]
+    fn the_search_begins_at_turns_that_lie_apart() {
+        let frame = frame();
+        let all = [&frame];
+        let step = units(&all) * f64::from(1 << (LEVELS - 1));
+        let starts = turns(&all, 6);
+        assert_eq!(starts.len(), 6);
+        for (place, one) in starts.iter().enumerate() {
+            for other in &starts[..place] {
+                let is_apart =
+                    (0..3).any(|axis| (one[axis] - other[axis]).abs() > 1.4 * step[axis]);
+                assert!(is_apart, "{one} and {other}");
+            }
+        }
+    }
+}
