@@ -5,7 +5,8 @@
 //! that photos share, whether points keep their grey values from photo to photo, and whether depth edges lie on image
 //! edges. A mistake is tested by reading the scene as if the mistake had been made. It is reported if it then fits as
 //! well as scenes without a mistake, and better than as stated by more than the variation between frames can explain.
-//! Where a reading has numbers of its own, half of the frames choose them and the others test them.
+//! Where a reading has numbers of its own, half of the frames choose them and the others test them; where clouds show
+//! outlines of things, these must fall on edges of the photos.
 
 mod agreement;
 mod calibration;
@@ -31,6 +32,7 @@ pub use sample::Agreement;
 pub use trial::{Finding, Fit};
 
 use sample::Sample;
+use trial::SURFACES;
 
 /// The findings on a scene.
 pub struct Examination {
@@ -98,6 +100,15 @@ pub fn examine(scene: &dyn Scene) -> Examination {
         if !examination.remarks.iter().any(is_known) {
             examination.remarks.push(Remark::Odd(why.clone()));
         }
+    }
+    let smooth = sample.smooth_share();
+    if smooth < SURFACES {
+        let why = format!(
+            "clouds: {:.0} % of neighbouring points have like depths; it is about 90 % of scans, so these depths are noise \
+             or are read in a wrong order",
+            100.0 * smooth
+        );
+        examination.remarks.push(Remark::Odd(why));
     }
     let Some(&first) = sample.anchors.first() else {
         return examination;

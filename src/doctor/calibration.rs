@@ -3,6 +3,7 @@
 //! Lasers*, RSS 2013).
 
 mod depth_edges;
+mod gross;
 #[cfg(feature = "rerun")]
 mod picture;
 mod search;
@@ -11,6 +12,7 @@ mod view;
 use nalgebra::{Point3, Translation3, UnitQuaternion, Vector3};
 use rayon::prelude::*;
 
+pub(super) use self::gross::Outlines;
 use self::search::{
     DELAY, FOCAL_LENGTH, Frame, POSE, Values, WITH_FOCAL_LENGTH, best, delay, spread, units,
 };
@@ -146,7 +148,7 @@ pub const CALIBRATION_STEPS: [&str; 4] = [
 /// [`NotJudged`] if too little can be compared.
 pub fn calibration(scene: &dyn Scene, begins: &dyn Fn(usize)) -> Result<Calibration, NotJudged> {
     begins(0);
-    let mut frames = read(scene);
+    let mut frames = read(scene, FRAMES);
     if frames.len() < MIN_FRAMES {
         return Err(NotJudged::FewFrames { found: frames.len() });
     }
@@ -244,16 +246,15 @@ fn delayed(frames: &mut [Frame]) -> Option<(Estimate, f64)> {
     Some((Estimate { value: values[DELAY], std_dev }, search::gain(&all, &values)))
 }
 
-/// Reads frames that are spread over the scene; those that cannot be read are left out.
-fn read(scene: &dyn Scene) -> Vec<Frame> {
+/// Reads so many frames that are spread over the scene; those that cannot be read are left out.
+fn read(scene: &dyn Scene, most: usize) -> Vec<Frame> {
     let all: Vec<usize> = (0..scene.frames().len()).filter(|&at| scene.has_cloud(at)).collect();
-    let count = FRAMES.min(all.len());
+    let count = most.min(all.len());
     let chosen: Vec<usize> = (0..count).map(|at| all[at * all.len() / count]).collect();
     let frame = |&at: &usize| {
         let (photo, cloud) = (scene.photo(at).ok()?, scene.cloud(at).ok()?);
         let points: Vec<Point3<f64>> = cloud.points.iter().map(|point| point.cast()).collect();
         let mut frame = Frame {
-            #[cfg(feature = "rerun")]
             at,
             view: View::new(&photo.gray, scene.intrinsics(at)),
             points,

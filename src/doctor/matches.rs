@@ -91,6 +91,19 @@ impl DepthCells {
         cells
     }
 
+    /// The share of cells with a point whose depth is like that of the next cell with one, in their row; `None` without
+    /// neighbours.
+    pub(super) fn smooth_share(&self) -> Option<f64> {
+        let rows = self.nearest.chunks(self.columns.max(1));
+        let depths = rows.map(|row| row.iter().flatten().map(|one| one.depth).collect::<Vec<_>>());
+        let pairs = depths.flat_map(|row| {
+            row.windows(2).map(|two| (two[0] / two[1]).ln().abs() <= SMOOTH).collect::<Vec<_>>()
+        });
+        let pairs: Vec<bool> = pairs.collect();
+        let smooth = pairs.iter().filter(|smooth| **smooth).count();
+        (!pairs.is_empty()).then(|| smooth as f64 / pairs.len() as f64)
+    }
+
     fn cell(&self, pixel: &Point2<f64>) -> Option<usize> {
         let at = |of: f64, count: usize| {
             let cell = ((of + 0.5) / self.side).floor();
@@ -134,6 +147,9 @@ impl DepthCells {
         shared.iter().filter_map(lift).collect()
     }
 }
+
+/// Depths of neighbouring points of one surface differ by less, as the logarithm of their ratio.
+const SMOOTH: f64 = 0.15;
 
 /// How many correspondences a pose `there_from_here` explains. One that is off by [`HALF_PX`] counts half.
 fn explained(lifted: &[Correspondence], camera: &Intrinsics, there_from_here: &Pose) -> f64 {

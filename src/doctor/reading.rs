@@ -197,6 +197,12 @@ pub(super) enum Change {
     Move([f64; 6]),
 }
 
+/// Turns [°] about the y, x and z axes, then shifts along x, y and z.
+pub(super) fn pose_of_moves(&[yaw, pitch, roll, x, y, z]: &[f64; 6]) -> Pose {
+    let turn = from_angles([yaw, pitch, roll].map(f64::to_radians));
+    Pose::from_parts(Translation3::new(x, y, z), turn)
+}
+
 impl Change {
     /// Whether it changes where clouds are in their photos, grossly and without a free number.
     pub(super) fn is_of_views(&self) -> bool {
@@ -245,9 +251,8 @@ impl Change {
             Self::Calibration { camera_from_stated, .. } => {
                 each(&|point| camera_from_stated * point)
             }
-            Self::Move([yaw, pitch, roll, x, y, z]) => {
-                let turn = from_angles([yaw, pitch, roll].map(f64::to_radians));
-                let moved = Pose::from_parts(Translation3::new(x, y, z), turn);
+            Self::Move(moves) => {
+                let moved = pose_of_moves(&moves);
                 each(&|point| moved * point)
             }
             _ => points.to_vec(),

@@ -2,6 +2,7 @@
 
 use super::reading::{Change, Mistake, Reading};
 use super::sample::{Agreement, Sample, partners};
+use crate::camera::Intrinsics;
 
 /// Smaller shifts of a camera are ignored \[m\].
 const MIN_ASIDE_M: f64 = 0.12;
@@ -9,6 +10,34 @@ const MIN_ASIDE_M: f64 = 0.12;
 const MIN_PX: f64 = 8.0;
 /// What another step of a search must gain.
 const STEP_GAIN: f64 = 0.04;
+
+/// Poses and clouds of a camera beside this one.
+pub(super) fn aside_reading(right_m: f64) -> Reading {
+    let remedy = format!("shift poses and clouds by {right_m:.2} m along the camera's x axis");
+    Reading::new(Mistake::OtherStereoCamera, &remedy, Change::Aside(right_m))
+}
+
+/// Another focal length and another centre.
+pub(super) fn camera_reading(stated: &Intrinsics, change: Change) -> Reading {
+    let (fits, _) = change.camera(stated);
+    let remedy = format!(
+        "use a focal length of {:.0} px instead of {:.0} and a centre at ({:.0}, {:.0}) instead of ({:.0}, {:.0}), \
+         which fit the photos better",
+        fits.fx, stated.fx, fits.cx, fits.cy, stated.cx, stated.cy
+    );
+    Reading::new(Mistake::WrongCamera, &remedy, change)
+}
+
+/// Turns of clouds [°] about y, x and z and shifts along x, y and z, those that are told; `None` where none is.
+pub(super) fn moves_in_words(moves: &[f64; 6], is_told: impl Fn(usize) -> bool) -> Option<String> {
+    const NAMES: [&str; 6] = ["about y", "about x", "about z", "along x", "along y", "along z"];
+    let words = (0..6).filter(|axis| is_told(*axis)).map(|axis| match axis {
+        0..=2 => format!("turn the clouds by {:.1}° {}", moves[axis], NAMES[axis]),
+        _ => format!("shift the clouds by {:.2} {}", moves[axis], NAMES[axis]),
+    });
+    let words: Vec<String> = words.collect();
+    (!words.is_empty()).then(|| words.join(" and "))
+}
 
 impl Sample<'_> {
     /// The readings with a free number, each with the number that fits best.
@@ -18,10 +47,7 @@ impl Sample<'_> {
         if let Some(right_m) = self.best_of(choosing, &aside, &|right_m| Change::Aside(right_m))
             && right_m.abs() > MIN_ASIDE_M
         {
-            let remedy =
-                format!("shift poses and clouds by {right_m:.2} m along the camera's x axis");
-            let change = Change::Aside(right_m);
-            found.push(Reading::new(Mistake::OtherStereoCamera, &remedy, change));
+            found.push(aside_reading(right_m));
         }
         found.extend(self.best_camera(choosing));
         found.extend(self.best_move(choosing));
@@ -66,18 +92,7 @@ impl Sample<'_> {
         let moved_px =
             f64::hypot(right, down).max((times - 1.0_f64).abs() * f64::from(first.width) / 2.0);
         (moved_px > MIN_PX).then(|| {
-            let remedy = format!(
-                "use a focal length of {:.0} px instead of {:.0} and a centre at ({:.0}, {:.0}) instead of \
-                 ({:.0}, {:.0}), which fit the photos better",
-                first.fx * times,
-                first.fx,
-                first.cx + right,
-                first.cy + down,
-                first.cx,
-                first.cy
-            );
-            let change = Change::Camera { times, right, down };
-            self.with_camera(Reading::new(Mistake::WrongCamera, &remedy, change))
+            self.with_camera(camera_reading(&first, Change::Camera { times, right, down }))
         })
     }
 
@@ -120,7 +135,6 @@ impl Sample<'_> {
         /// Fine steps are this share of a step.
         const FINE: f64 = 0.2;
         const AXES: usize = 2;
-        const NAMES: [&str; 6] = ["about y", "about x", "about z", "along x", "along y", "along z"];
         let camera = self.sights.values().next()?.camera;
         let depth_m = self.median_depth_m()?;
         let step = |axis: usize| if axis < 3 { TURN_DEG } else { SHIFT * depth_m };
@@ -150,13 +164,8 @@ impl Sample<'_> {
             0 | 1 => moved[axis].to_radians() * camera.fx,
             _ => moved[axis] / depth_m * camera.fx,
         };
-        let words = (0..6).filter(|axis| px_of(*axis).abs() > MIN_PX).map(|axis| match axis {
-            0..=2 => format!("turn the clouds by {:.1}° {}", moved[axis], NAMES[axis]),
-            _ => format!("shift the clouds by {:.2} {}", moved[axis], NAMES[axis]),
-        });
-        let words: Vec<String> = words.collect();
-        (!words.is_empty())
-            .then(|| Reading::new(Mistake::MovedCloud, &words.join(" and "), Change::Move(moved)))
+        let words = moves_in_words(&moved, |axis| px_of(axis).abs() > MIN_PX)?;
+        Some(Reading::new(Mistake::MovedCloud, &words, Change::Move(moved)))
     }
 
     /// Whether the stated lengths are such as a wrong unit would leave. At one place all photos agree, so a unit that

@@ -2,9 +2,11 @@
 
 use std::collections::BTreeMap;
 
+use super::calibration::Outlines;
 use super::correction::Correction;
+use super::matches::DepthCells;
 use super::reading::{Change, FOOT_M, Mistake, READ_WITH_5000, Reading, readings};
-use super::sample::{AS_STATED, Agreement, Sample};
+use super::sample::{AS_STATED, Agreement, Sample, mean};
 
 /// The least mean gain of another reading over the frames.
 const TELLING_GAIN: f64 = 0.04;
@@ -27,6 +29,9 @@ const FITTING_MOTIONS: f64 = 0.4;
 const FITTING_MOTIONS_IN_ROOMS: f64 = 0.25;
 const FITTING_CARRIED: f64 = 0.35;
 const FITTING_EDGES: f64 = 0.1;
+
+/// The least share of neighbouring points with like depths: 0.9 in scans, 0.2 where depths are noise.
+pub(super) const SURFACES: f64 = 0.4;
 
 /// A reading that fits better than the scene as stated.
 #[derive(Clone, Debug)]
@@ -69,6 +74,11 @@ impl Sample<'_> {
     /// The agreement of the scene as stated, whether it fits, and the mistake that explains it if it does not.
     pub(super) fn diagnose(self) -> (Agreement, Fit, Option<Finding>) {
         let stated = self.agreement();
+        // Of depths that are noise, something fits by chance.
+        if self.smooth_share() < SURFACES {
+            let is_seen = self.fit() != Fit::NoSharedView;
+            return (stated, if is_seen { Fit::Unexplained } else { Fit::NoSharedView }, None);
+        }
         // It does not count on the poses, so it may be chance: where the scene fits as stated, and unless it fits in the
         // end.
         let by_motions = if self.fit() == Fit::Fits { None } else { self.cloud_by_motions() };
@@ -92,9 +102,11 @@ impl Sample<'_> {
         /// How many mistakes are found one after the other.
         const MISTAKES: usize = 2;
         let (mut sample, mut found, mut fit) = (self, Vec::new(), None);
-        while found.len() < MISTAKES
-            && let Some((finding, change)) = sample.best()
-        {
+        while found.len() < MISTAKES {
+            let best = sample.best();
+            // The outlines are those of the scene as stated.
+            let best = if found.is_empty() { sample.or_by_outlines(best) } else { best };
+            let Some((finding, change)) = best else { break };
             found.push(finding);
             // No scene can be read with another lens, so nothing further is found.
             if matches!(change, Change::Lens(_)) {
@@ -109,6 +121,15 @@ impl Sample<'_> {
 
     fn agreement(&self) -> Agreement {
         Agreement::mean(&self.scores(&self.anchors, &AS_STATED))
+    }
+
+    /// The share of neighbouring points that have like depths.
+    pub(super) fn smooth_share(&self) -> f64 {
+        let of = |anchor: &usize| {
+            let (sight, seen) = (self.sights.get(anchor)?, self.seen(*anchor)?.1);
+            DepthCells::new(&sight.camera, &seen).smooth_share()
+        };
+        mean(self.anchors.iter().filter_map(of)).unwrap_or(1.0)
     }
 
     /// How well the scene fits as stated.
@@ -221,6 +242,61 @@ impl Sample<'_> {
             stated: Agreement::mean(&stated),
             otherwise,
             or: as_good.map(|one| (one.reading.mistake, one.reading.remedy)).collect(),
+            then: None,
+        };
+        Some((finding, reading.change))
+    }
+
+    /// What the outlines of things say, where no mistake is found although they may show one, and where numbers of the
+    /// camera or of the clouds were chosen: outlines locate these more closely.
+    fn or_by_outlines(&self, best: Option<(Finding, Change)>) -> Option<(Finding, Change)> {
+        /// What shared features and grey values vary by.
+        const LOST: f64 = 0.03;
+        /// How exactly a centre says of which size the photos are, as a share.
+        const OF_SIZE: f64 = 0.1;
+        let is_asked = match &best {
+            None => self.fit() == Fit::Fits,
+            Some((_, change)) => {
+                matches!(
+                    change,
+                    Change::Aside(_) | Change::Camera { .. } | Change::Move(_) | Change::Resized(_)
+                )
+            }
+        };
+        if !is_asked {
+            return best;
+        }
+        let stated = self.agreement();
+        let shared =
+            |one: &Agreement| one.carried.map_or(0.0, f64::tanh) + one.motions.unwrap_or(0.0);
+        let of = |change: &Change| Agreement::mean(&self.scores(&self.anchors, change));
+        let is_possible = |change: &Change| shared(&of(change)) >= shared(&stated) - LOST;
+        let Some(outlines) = Outlines::of(self.scene) else { return best };
+        // Numbers that were chosen by other measures must put depth edges on edges.
+        let best = best.filter(|(_, change)| outlines.confirm(change) != Some(false));
+        let found = outlines.gross(self.scene, &is_possible);
+        // The centre of a camera says of which size its photos are, if not exactly.
+        let of_size = match best {
+            Some((_, Change::Resized(times))) => Some(times),
+            _ => None,
+        };
+        let found = found.filter(|one| match (of_size, one.change) {
+            (None, _) => true,
+            (Some(size), Change::Camera { times, .. }) => (times / size).ln().abs() < OF_SIZE,
+            _ => false,
+        });
+        let Some(reading) = found else { return best };
+        let reading = match reading.change {
+            Change::Camera { .. } => self.with_camera(reading),
+            _ => reading,
+        };
+        let finding = Finding {
+            mistake: reading.mistake,
+            remedy: reading.remedy,
+            correction: reading.correction,
+            stated,
+            otherwise: of(&reading.change),
+            or: Vec::new(),
             then: None,
         };
         Some((finding, reading.change))

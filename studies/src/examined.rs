@@ -27,6 +27,9 @@ pub struct Options {
     /// Plant these alone, such as `WrongCamera`.
     #[arg(long, value_delimiter = ',')]
     faults: Vec<String>,
+    /// Take only scenes whose description has this in it, such as `night`.
+    #[arg(long, default_value = "")]
+    matching: String,
     /// The distances of a sound drive's frames in frames of the drive, about a metre each.
     #[arg(long, value_delimiter = ',', default_values_t = [1, 3, 8, 15, 30, 50])]
     spacings: Vec<usize>,
@@ -101,7 +104,8 @@ fn real(options: &Options) -> Result<Vec<Part>, Failure> {
 /// What sound scenes reach, and what is said of them.
 fn sound(options: &Options) -> Result<(), Failure> {
     let mut rows: Vec<(String, Vec<Part>)> = Vec::new();
-    for part in towns(options)?.into_iter().chain(real(options)?) {
+    let parts = towns(options)?.into_iter().chain(real(options)?);
+    for part in parts.filter(|part| part.what.contains(&options.matching)) {
         match rows.iter_mut().find(|(what, _)| *what == part.what) {
             Some((_, parts)) => parts.push(part),
             None => rows.push((part.what.clone(), vec![part])),
@@ -181,6 +185,7 @@ fn planted(options: &Options) -> Result<(), Failure> {
         }
     }
     parts.extend(real(options)?.into_iter().filter(|part| part.step == 1));
+    parts.retain(|part| part.what.contains(&options.matching));
     let mut table = Vec::new();
     let mut otherwise = Vec::new();
     let mut sums = [0; 5];

@@ -219,6 +219,21 @@ fn depths_of_noise_are_a_misfit_that_nothing_explains() {
     assert!(found.is_broken());
 }
 
+/// In a dark street, edges on the photos are few, and grey values agree wherever clouds are.
+#[test]
+fn outlines_name_what_is_off_at_night() {
+    let street = scene::open("street:night", None).unwrap();
+    for (fault, mistake) in [
+        (Fault::LeftForRight, Mistake::OtherStereoCamera),
+        (Fault::TurnedCloud, Mistake::MovedCloud),
+        (Fault::CloudOneFrameOff, Mistake::CloudOfNeighbour),
+    ] {
+        let found = examine(&Planted::every(street.as_ref(), fault, 300..340, 1)).finding;
+        let found = found.map(|one| (one.mistake, one.then.is_some()));
+        assert_eq!(found, Some((mistake, false)), "{fault:?}");
+    }
+}
+
 /// Nothing is wrong with it.
 fn healthy(scene: &dyn Scene) {
     let found = examine(scene);

@@ -6,6 +6,7 @@ use rayon::prelude::*;
 use super::depth_edges::{Across, DepthEdge, depth_edges};
 use super::view::{LEVELS, View};
 use crate::camera::Intrinsics;
+use crate::cloud::Cloud;
 use crate::geometry::Pose;
 
 /// A turn about x, y and z \[rad\], a shift along them \[m\], the logarithm of the focal length, and a delay \[s\].
@@ -21,7 +22,6 @@ pub(super) const DELAY: usize = 7;
 /// A view with its cloud and its depth edges, and how its camera moves.
 pub(super) struct Frame {
     /// Its place in the scene.
-    #[cfg(feature = "rerun")]
     pub(super) at: usize,
     pub(super) view: View,
     /// In the camera's frame as stated \[m\].
@@ -67,6 +67,12 @@ impl Frame {
         }
     }
 
+    /// The depth edges of another cloud as stated.
+    pub(super) fn edges_of(&self, cloud: &Cloud) -> Vec<DepthEdge> {
+        let points: Vec<Point3<f64>> = cloud.points.iter().map(|point| point.cast()).collect();
+        depth_edges(&self.view.camera, &points)
+    }
+
     /// Where the photo shows the depth edges, with their depths \[m\].
     #[cfg(feature = "rerun")]
     pub(super) fn seen(
@@ -82,13 +88,18 @@ impl Frame {
 
     /// The strength of the photo's edges at the depth edges, summed.
     fn score(&self, level: usize, values: &Values) -> f64 {
+        self.score_of(&self.edges, level, values)
+    }
+
+    /// The same at other depth edges.
+    fn score_of(&self, edges: &[DepthEdge], level: usize, values: &Values) -> f64 {
         let (change, camera) = (self.change(values), self.camera(values));
         let (rotation, shift) = (change.rotation.to_rotation_matrix(), change.translation.vector);
         let strength = |edge: &DepthEdge| {
             let pixel = camera.project(&(rotation * edge.point + shift))?;
             Some(edge.weight * self.view.strength(level, edge.across, &pixel))
         };
-        self.edges.iter().filter_map(strength).sum()
+        edges.iter().filter_map(strength).sum()
     }
 
     /// Where the depth edges are in the photo \[px\].
@@ -119,6 +130,12 @@ impl Frame {
 pub(super) fn total(frames: &[&Frame], level: usize, values: &Values) -> f64 {
     let scores: Vec<f64> = frames.par_iter().map(|frame| frame.score(level, values)).collect();
     scores.iter().sum()
+}
+
+/// The mean strength of a frame's photo at these depth edges.
+pub(super) fn strength_in(frame: &Frame, edges: &[DepthEdge], values: &Values) -> f64 {
+    let weights: f64 = edges.iter().map(|edge| edge.weight).sum();
+    frame.score_of(edges, 0, values) / weights.max(f64::MIN_POSITIVE)
 }
 
 /// The mean strength at the depth edges.
@@ -218,7 +235,7 @@ pub(super) fn delay(frames: &mut [Frame]) -> Values {
 }
 
 /// The best turns of a coarse grid. A shift looks like a turn from afar.
-fn turns(frames: &[&Frame], count: usize) -> Vec<Values> {
+pub(super) fn turns(frames: &[&Frame], count: usize) -> Vec<Values> {
     const LEVEL: usize = LEVELS - 1;
     const REACH: [f64; 3] = [0.07, 0.07, 0.06];
     /// Starts that are closer in steps lead to the same end.
@@ -253,7 +270,7 @@ fn turns(frames: &[&Frame], count: usize) -> Vec<Values> {
 
 /// Climbs along single freedoms, and along the way of the last round as long as that helps: on the most blurred of so
 /// many levels first.
-fn climbed(frames: &[&Frame], free: &[usize], start: Values, levels: usize) -> Values {
+pub(super) fn climbed(frames: &[&Frame], free: &[usize], start: Values, levels: usize) -> Values {
     /// In pixels of the level's map.
     const FIRST_STEP: f64 = 2.0;
     const LAST_STEP: f64 = 0.5;
@@ -415,7 +432,6 @@ mod tests {
             weight: 1.0,
         };
         Frame {
-            #[cfg(feature = "rerun")]
             at: 0,
             view: View::new(&photo, camera),
             points: Vec::new(),
