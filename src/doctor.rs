@@ -19,6 +19,7 @@ mod route;
 mod sample;
 mod search;
 mod trial;
+mod two;
 
 use crate::geometry::Pose;
 use crate::image::RgbImage;

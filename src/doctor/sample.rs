@@ -71,7 +71,9 @@ struct Seeing {
 pub(super) struct Sample<'a> {
     pub(super) scene: &'a dyn Scene,
     /// Whether the poses decide what of the clouds is seen.
-    has_map: bool,
+    pub(super) has_map: bool,
+    /// Whether clouds and cameras are as the scene states them.
+    pub(super) has_stated_clouds: bool,
     pub(super) poses: Vec<Option<Pose>>,
     pub(super) sights: BTreeMap<usize, Sight>,
     pub(super) clouds: BTreeMap<usize, Vec<Point3<f64>>>,
@@ -206,6 +208,7 @@ impl<'a> Sample<'a> {
         let mut sample = Self {
             scene,
             has_map,
+            has_stated_clouds: true,
             poses,
             sights,
             clouds,
@@ -261,6 +264,7 @@ impl<'a> Sample<'a> {
         let clouds = clouds.filter_map(|&anchor| Some((anchor, self.cloud(anchor, change)?)));
         self.clouds = clouds.collect();
         self.poses = poses;
+        self.has_stated_clouds &= change.is_of_poses() && !self.has_map;
         self.has_map &= change.is_of_poses();
         for sight in self.sights.values_mut() {
             sight.camera = change.camera(&sight.camera).0;
@@ -381,17 +385,38 @@ impl<'a> Sample<'a> {
         [shared().count(), shared().filter(|shared| *shared).count(), motions]
     }
 
-    /// How much larger the motions by the features are than the stated ones, and the standard error of its logarithm;
-    /// `None` where they do not agree on it.
-    pub(super) fn scale(&self) -> Option<(f64, f64)> {
+    /// The share of shared features that a reading of the poses explains, with their lengths multiplied by a factor.
+    pub(super) fn explained(&self, change: &Change, times: f64) -> f64 {
+        let of = |anchor: &usize| {
+            let seeing = self.stated.get(anchor);
+            let lifted = seeing.into_iter().flat_map(|seeing| &seeing.lifted);
+            let partners = self.partners.get(anchor).into_iter().flatten();
+            let motions = self.motions.get(anchor).into_iter().flatten();
+            let shares =
+                partners.zip(lifted).zip(motions).filter_map(|((partner, lifted), motion)| {
+                    let camera = self.sights.get(&partner.frame)?.camera;
+                    let here = change.pose(*anchor, &self.poses)?;
+                    let there = change.pose(partner.frame, &self.poses)?;
+                    let mut there_from_here = there.inverse() * here;
+                    there_from_here.translation.vector *= times;
+                    share_explained(lifted, &camera, &there_from_here, motion.as_ref())
+                });
+            shares.collect::<Vec<_>>()
+        };
+        mean(self.anchors.iter().flat_map(of)).unwrap_or(0.0)
+    }
+
+    /// How much larger the motions by the features are than those of a reading of the poses, and the standard error of its
+    /// logarithm; `None` where they do not agree on it.
+    pub(super) fn scale_of(&self, change: &Change) -> Option<(f64, f64)> {
         const LARGEST_ERROR: f64 = 0.08;
         const MIN_RATIOS: usize = 4;
         let ratios = self.anchors.iter().flat_map(|anchor| {
             let partners = self.partners.get(anchor).into_iter().flatten();
             let motions = self.motions.get(anchor).into_iter().flatten();
             partners.zip(motions).filter_map(|(partner, motion)| {
-                let here = self.poses.get(*anchor).copied().flatten()?;
-                let there = self.poses.get(partner.frame).copied().flatten()?;
+                let here = change.pose(*anchor, &self.poses)?;
+                let there = change.pose(partner.frame, &self.poses)?;
                 let stated_m = (there.inverse() * here).translation.vector.norm();
                 let real_m = motion.as_ref()?.there_from_here.translation.vector.norm();
                 (stated_m > 0.0 && real_m > 0.0).then(|| (real_m / stated_m).ln())

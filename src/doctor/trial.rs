@@ -25,13 +25,16 @@ const AS_GOOD_WITH_NUMBERS: f64 = 0.7;
 
 /// What sound scenes reach at least where photos share a view: the share of the shared features that the poses explain,
 /// the correlation of grey values, as Fisher's z, and the log ratio of edges.
-const FITTING_MOTIONS: f64 = 0.4;
+pub(super) const FITTING_MOTIONS: f64 = 0.4;
 const FITTING_MOTIONS_IN_ROOMS: f64 = 0.25;
 const FITTING_CARRIED: f64 = 0.35;
 const FITTING_EDGES: f64 = 0.1;
 
 /// The least share of neighbouring points with like depths: 0.9 in scans, 0.2 where depths are noise.
 pub(super) const SURFACES: f64 = 0.4;
+
+/// Factors between usual units of length, and between 1000 and 5000 for one metre in depth images.
+pub(super) const UNITS: [f64; 8] = [1e3, 1e2, 1e-3, 1e-2, FOOT_M, 1.0 / FOOT_M, 5.0, 0.2];
 
 /// A reading that fits better than the scene as stated.
 #[derive(Clone, Debug)]
@@ -79,22 +82,42 @@ impl Sample<'_> {
             let is_seen = self.fit() != Fit::NoSharedView;
             return (stated, if is_seen { Fit::Unexplained } else { Fit::NoSharedView }, None);
         }
-        // It does not count on the poses, so it may be chance: where the scene fits as stated, and unless it fits in the
-        // end.
-        let by_motions = if self.fit() == Fit::Fits { None } else { self.cloud_by_motions() };
-        let by_motions = by_motions.and_then(|(finding, change)| {
-            let (fit, rest) = self.clone().read_as(&change).chained();
-            // A second reading of the same kind takes the first one back.
-            let mut of_rest = std::iter::successors(rest.as_ref(), |found| found.then.as_deref());
-            let is_kept = of_rest.all(|found| found.mistake != finding.mistake);
-            (fit == Fit::Fits && is_kept)
-                .then(|| (fit, Finding { then: rest.map(Box::new), ..finding }))
-        });
-        let (fit, found) = match by_motions {
+        let two = self.two();
+        let (fit, found) = match two {
             Some((fit, finding)) => (fit, Some(finding)),
             None => self.chained(),
         };
         (stated, fit, found)
+    }
+
+    /// A first mistake that is found by the motions of features, whatever the poses are, with what explains the rest. It
+    /// may be chance, so the scene must fit in the end.
+    fn two(&self) -> Option<(Fit, Finding)> {
+        let usual: Vec<Reading> = self.usual().collect();
+        let first = self.first_of_two(&usual).map(|one| self.finding_of(one));
+        let first =
+            first.or_else(|| if self.fit() == Fit::Fits { None } else { self.cloud_by_motions() });
+        let (finding, change) = first?;
+        let (fit, rest) = self.clone().read_as(&change).chained();
+        // A second reading of the same kind takes the first one back.
+        let mut of_rest = std::iter::successors(rest.as_ref(), |found| found.then.as_deref());
+        let is_kept = of_rest.all(|found| found.mistake != finding.mistake);
+        (fit == Fit::Fits && is_kept)
+            .then(|| (fit, Finding { then: rest.map(Box::new), ..finding }))
+    }
+
+    /// A reading as a finding, with nothing beside it.
+    fn finding_of(&self, reading: Reading) -> (Finding, Change) {
+        let finding = Finding {
+            mistake: reading.mistake,
+            remedy: reading.remedy,
+            correction: reading.correction,
+            stated: self.agreement(),
+            otherwise: Agreement::mean(&self.scores(&self.anchors, &reading.change)),
+            or: Vec::new(),
+            then: None,
+        };
+        (finding, reading.change)
     }
 
     /// The best reading, and what explains the rest; with whether the scene fits in the end.
@@ -103,10 +126,7 @@ impl Sample<'_> {
         const MISTAKES: usize = 2;
         let (mut sample, mut found, mut fit) = (self, Vec::new(), None);
         while found.len() < MISTAKES {
-            let best = sample.best();
-            // The outlines are those of the scene as stated.
-            let best = if found.is_empty() { sample.or_by_outlines(best) } else { best };
-            let Some((finding, change)) = best else { break };
+            let Some((finding, change)) = sample.or_by_outlines(sample.best()) else { break };
             found.push(finding);
             // No scene can be read with another lens, so nothing further is found.
             if matches!(change, Change::Lens(_)) {
@@ -181,16 +201,7 @@ impl Sample<'_> {
         let best = counted.reduce(|best, next| if next.0 > best.0 { next } else { best });
         let (_, reading) =
             best.filter(|(count, _)| 2 * count >= shared && *count >= TIMES * as_stated.max(1))?;
-        let finding = Finding {
-            mistake: reading.mistake,
-            remedy: reading.remedy,
-            correction: reading.correction,
-            stated: self.agreement(),
-            otherwise: Agreement::mean(&self.scores(&self.anchors, &reading.change)),
-            or: Vec::new(),
-            then: None,
-        };
-        Some((finding, reading.change))
+        Some(self.finding_of(reading))
     }
 
     /// The reading that fits better than the scene as stated, if any.
@@ -263,7 +274,8 @@ impl Sample<'_> {
                 )
             }
         };
-        if !is_asked {
+        // The outlines are those of the clouds as stated.
+        if !is_asked || !self.has_stated_clouds {
             return best;
         }
         let stated = self.agreement();
@@ -290,16 +302,7 @@ impl Sample<'_> {
             Change::Camera { .. } => self.with_camera(reading),
             _ => reading,
         };
-        let finding = Finding {
-            mistake: reading.mistake,
-            remedy: reading.remedy,
-            correction: reading.correction,
-            stated,
-            otherwise: of(&reading.change),
-            or: Vec::new(),
-            then: None,
-        };
-        Some((finding, reading.change))
+        Some(self.finding_of(reading))
     }
 
     /// Whether something that does not rest on the poses speaks for a reading: depth edges fall on edges of the photos, or
@@ -327,14 +330,17 @@ impl Sample<'_> {
         const SAME: f64 = 0.08;
         /// The factor of a unit is met as closely.
         const OF_UNIT: f64 = 0.03;
-        let (measured, error) = self.scale()?;
+        let (measured, error) = self.scale_of(&AS_STATED)?;
         if measured.ln().abs() <= SAME.max(3.0 * error) {
             return None;
         }
-        let units = [1e3, 1e2, 1e-3, 1e-2, FOOT_M, 1.0 / FOOT_M, 5.0, 0.2];
         let off = OF_UNIT.max(2.0 * error);
-        let unit = units.into_iter().find(|unit| (measured / unit).ln().abs() < off);
-        let times = unit.unwrap_or(measured);
+        let unit = UNITS.into_iter().find(|unit| (measured / unit).ln().abs() < off);
+        Some(self.of_scale(unit.unwrap_or(measured), unit))
+    }
+
+    /// Poses whose lengths are to be multiplied by a factor, which may be that of a unit.
+    pub(super) fn of_scale(&self, times: f64, unit: Option<f64>) -> Reading {
         let remedy = match unit {
             Some(1e3 | 1e2) if self.has_far_clouds() => {
                 format!("divide the coordinates of clouds by {times:.0}")
@@ -348,13 +354,13 @@ impl Sample<'_> {
             _ => format!("divide the coordinates of clouds, or multiply the positions of poses, by {times:.3}"),
         };
         let reading = Reading::new(Mistake::Units, &remedy, Change::Size(1.0 / times));
-        Some(match unit {
+        match unit {
             Some(1e3) if self.has_far_clouds() => reading.with_unit("clouds", "\"mm\""),
             Some(1e2) if self.has_far_clouds() => reading.with_unit("clouds", "\"cm\""),
             Some(0.2) => reading.with_depth_per_metre("1000"),
             Some(5.0) => reading.with_depth_per_metre("5000"),
             _ => reading.with_unit("poses", &format!("{times:.4}")),
-        })
+        }
     }
 }
 

@@ -1,4 +1,4 @@
-use posescope::doctor::{Fit, Mistake, examine};
+use posescope::doctor::{Examination, Fit, Mistake, examine};
 use posescope::scene::street::{Size, Street, WORLD_SEED};
 use posescope::scene::{self, Scene};
 
@@ -18,6 +18,9 @@ pub struct Options {
     /// Plant mistakes, too.
     #[arg(long)]
     planted: bool,
+    /// Plant two mistakes at once, and nothing else.
+    #[arg(long)]
+    two: bool,
     /// Leave out the sound scenes.
     #[arg(long)]
     planted_only: bool,
@@ -54,7 +57,28 @@ impl Part {
     }
 }
 
+/// Mistakes that one scene may have at once: what both are to be called.
+const TWO: [[(Fault, Mistake); 2]; 8] = [
+    [(Fault::CloudAxes, Mistake::CloudAxes), (Fault::OpenGlAxes, Mistake::PoseAxes)],
+    [(Fault::MillimetreClouds, Mistake::Units), (Fault::InversePose, Mistake::InversePose)],
+    [(Fault::ResizedPhotos, Mistake::WrongCamera), (Fault::OpenGlAxes, Mistake::PoseAxes)],
+    [
+        (Fault::MirroredCloud, Mistake::MirroredCloud),
+        (Fault::ReversedPoses, Mistake::ReversedPoses),
+    ],
+    [(Fault::WrongCamera, Mistake::WrongCamera), (Fault::InversePose, Mistake::InversePose)],
+    [
+        (Fault::UpsideDown, Mistake::TurnedPhotos),
+        (Fault::QuaternionOrder, Mistake::QuaternionOrder),
+    ],
+    [(Fault::FiveTimesTheDepth, Mistake::Units), (Fault::OpenGlAxes, Mistake::PoseAxes)],
+    [(Fault::TurnedCloud, Mistake::MovedCloud), (Fault::PoseAxes, Mistake::PoseAxes)],
+];
+
 pub fn run(options: &Options) -> Result<(), Failure> {
+    if options.two {
+        return two(options);
+    }
     if !options.planted_only {
         sound(options)?;
     }
@@ -166,8 +190,8 @@ fn sound(options: &Options) -> Result<(), Failure> {
     Ok(())
 }
 
-/// What planted mistakes are called.
-fn planted(options: &Options) -> Result<(), Failure> {
+/// The scenes that mistakes are planted in.
+fn parts_to_plant_in(options: &Options) -> Result<Vec<Part>, Failure> {
     let mut parts = Vec::new();
     for &town in &options.towns {
         for (condition, size) in
@@ -186,6 +210,61 @@ fn planted(options: &Options) -> Result<(), Failure> {
     }
     parts.extend(real(options)?.into_iter().filter(|part| part.step == 1));
     parts.retain(|part| part.what.contains(&options.matching));
+    Ok(parts)
+}
+
+/// The mistakes that are named, one after the other.
+fn named(found: &Examination) -> Vec<Mistake> {
+    let first = found.finding.as_ref();
+    let chain = std::iter::successors(first, |finding| finding.then.as_deref());
+    let mut named: Vec<_> = chain.map(|finding| finding.mistake).collect();
+    // A second reading of the same kind makes the numbers of the first one exact.
+    named.dedup();
+    named
+}
+
+/// What two mistakes at once are called.
+fn two(options: &Options) -> Result<(), Failure> {
+    let parts = parts_to_plant_in(options)?;
+    let (mut table, mut otherwise) = (Vec::new(), Vec::new());
+    for [(fault, mistake), (other_fault, other)] in TWO {
+        let mut counts = [0; 4];
+        for part in &parts {
+            let one = part.of(fault);
+            let both = Planted::every(&one, other_fault, 0..one.frames().len(), 1);
+            let found = examine(&both);
+            let named = named(&found);
+            let right = named.iter().filter(|one| [mistake, other].contains(one)).count();
+            let at = match (right, named.len()) {
+                (2, 2) => 0,
+                (1, 1) => 1,
+                (_, 0) => 3,
+                _ => 2,
+            };
+            counts[at] += 1;
+            if at > 0 {
+                let remedy = found.finding.as_ref().map(|one| &one.remedy);
+                otherwise.push(format!(
+                    "{fault:?} and {other_fault:?}, {}: {:?}, {named:?}, {remedy:?}",
+                    part.what, found.fit
+                ));
+            }
+        }
+        eprintln!("{fault:?} and {other_fault:?}: {counts:?}");
+        let mut cells = vec![format!("{fault:?} and {other_fault:?}")];
+        cells.extend(counts.map(|count| count.to_string()));
+        table.push(cells);
+    }
+    print_table("planted,both named,one named,another is named,none is named", &table);
+    for one in otherwise {
+        println!("- {one}");
+    }
+    Ok(())
+}
+
+/// What planted mistakes are called.
+fn planted(options: &Options) -> Result<(), Failure> {
+    let parts = parts_to_plant_in(options)?;
     let mut table = Vec::new();
     let mut otherwise = Vec::new();
     let mut sums = [0; 5];
@@ -199,10 +278,7 @@ fn planted(options: &Options) -> Result<(), Failure> {
         for part in &parts {
             let found = examine(&part.of(fault));
             let first = found.finding.as_ref();
-            let chain = std::iter::successors(first, |finding| finding.then.as_deref());
-            let mut named: Vec<_> = chain.map(|finding| finding.mistake).collect();
-            // A second reading of the same kind makes the numbers of the first one exact.
-            named.dedup();
+            let named = named(&found);
             let beside = first
                 .is_some_and(|one| one.or.iter().any(|(mistake, _)| Some(*mistake) == expected));
             let at = match (expected, first) {

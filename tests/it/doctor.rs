@@ -184,6 +184,24 @@ fn two_mistakes_are_found_one_after_the_other() {
 }
 
 /// Where no two photos share a view, numbers that are chosen fit by chance.
+/// Of clouds in millimetres and inverted poses, neither shows alone.
+#[test]
+fn two_mistakes_that_hide_each_other_are_found_together() {
+    let street = Street::new("overcast", Size::Half).expect("is built in");
+    for (fault, mistake, of_poses, other) in [
+        (Fault::MillimetreClouds, Mistake::Units, Fault::InversePose, Mistake::InversePose),
+        (Fault::UpsideDown, Mistake::TurnedPhotos, Fault::OpenGlAxes, Mistake::PoseAxes),
+    ] {
+        let one = Planted::every(&street, fault, 0..40, 1);
+        let both = Planted::every(&one, of_poses, 0..40, 1);
+        let found = examine(&both);
+        let first = found.finding.as_ref();
+        let chain = std::iter::successors(first, |finding| finding.then.as_deref());
+        let named: Vec<Mistake> = chain.map(|finding| finding.mistake).collect();
+        assert_eq!((found.fit, named), (Some(Fit::Fits), vec![mistake, other]), "{fault:?}");
+    }
+}
+
 #[test]
 fn frames_far_apart_are_not_accused() {
     for condition in ["overcast", "snow"] {
