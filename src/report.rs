@@ -192,8 +192,8 @@ fn compared_with(
     rows: &[QueryResult],
     results: &mut [ReportedResult],
 ) -> Result<Baseline, FolderError> {
-    let run_before = read_run(before)?;
-    let measured = RunResults::read(before)?;
+    let run = read_run(before)?;
+    let measured = RunResults::of(read_results(before, &run)?, run.failure_radius_m());
     let comparison = RunComparison::of(&measured.results, rows, &RunComparison::TOLERANCE);
     let changes: HashMap<String, Change> = comparison
         .differences
@@ -207,7 +207,7 @@ fn compared_with(
     Ok(Baseline {
         name: before.display().to_string(),
         comparison,
-        tables: tables(&measured, run_before.protocol.preset.map(|one| one.name())),
+        tables: tables(&measured, run.protocol.preset.map(|one| one.name())),
     })
 }
 

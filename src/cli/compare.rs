@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use posescope::measure::{Change, RunComparison, read_rows};
+use posescope::measure::{Change, RunComparison};
 use posescope::report::{PICTURES, write_html};
-use posescope::run::read_run;
+use posescope::run::{read_results, read_run};
 use posescope::sink::rerun::{Targets, record_comparison};
 use posescope::table::wrapped;
 
@@ -15,11 +15,9 @@ use super::table::figures;
 use super::terminal::Terminal;
 
 pub fn compare(args: &CompareArgs, terminal: &Terminal) -> Result<(), CliError> {
-    for run in [&args.before, &args.after] {
-        read_run(run)?;
-    }
-    let comparison =
-        RunComparison::of(&read_rows(&args.before)?, &read_rows(&args.after)?, &args.tolerance);
+    let (before, after) = (read_run(&args.before)?, read_run(&args.after)?);
+    let results = [read_results(&args.before, &before)?, read_results(&args.after, &after)?];
+    let comparison = RunComparison::of(&results[0], &results[1], &args.tolerance);
     if comparison.common == 0 {
         return Err(CliError::Usage(format!(
             "{} and {} have no result in common; compare runs of the same scenes, queries, methods and settings",
@@ -37,7 +35,6 @@ pub fn compare(args: &CompareArgs, terminal: &Terminal) -> Result<(), CliError> 
             let name = run.file_name().unwrap_or_default();
             name.to_string_lossy().into_owned()
         };
-        let results = [read_rows(&args.before)?, read_rows(&args.after)?];
         let names = [name(&args.before), name(&args.after)];
         record_comparison(&Targets::file(path), names, &results, &shown(&comparison, None))?;
         terminal.say(|| format!("Recording: {0} (open it with `rerun {0}`)", path.display()));

@@ -4,11 +4,10 @@ use std::path::{Path, PathBuf};
 
 use posescope::localize::QueryResult;
 use posescope::measure::{
-    Export, ExportError, Field, Format, Plot, RunResults, TableName, export, read_rows, rows,
-    select,
+    Export, ExportError, Field, Format, Plot, RunResults, TableName, export, rows, select,
 };
 use posescope::report::{PICTURES, write_html};
-use posescope::run::{FolderError, RunFile, read_run, result_lines};
+use posescope::run::{FolderError, RunFile, read_results, read_run, result_lines};
 use posescope::table::Table;
 use posescope_core::files::write_whole;
 
@@ -31,20 +30,20 @@ const COLUMNS: [&Field; 8] = [
 
 pub fn results(args: &ResultsArgs, terminal: &Terminal) -> Result<(), CliError> {
     args.refuse_unused()?;
-    let run = read_run(&args.run)?;
-    if let Some(plot) = args.plot {
-        return draw(args, &run, plot, terminal);
-    }
     let form = args.form;
-    if form == Form::Html {
+    if form == Form::Html && args.plot.is_none() {
         let path = write_html(&args.run, None, PICTURES, args.out.as_deref())?;
         terminal.say(|| format!("Report: {}", path.display()));
         return Ok(());
     }
+    let run = read_run(&args.run)?;
+    if let Some(plot) = args.plot {
+        return draw(args, &run, plot, terminal);
+    }
     if let Some(format) = form.poses() {
         return poses(args, &run, format, terminal);
     }
-    let results = graded(args)?;
+    let results = graded(args, &run)?;
     let all: Vec<&QueryResult> = results.iter().collect();
     let chosen = select(&all, args.condition.as_ref(), args.sort);
     let shown = &chosen[..chosen.len().min(args.rows.unwrap_or(usize::MAX))];
@@ -94,8 +93,8 @@ pub fn results(args: &ResultsArgs, terminal: &Terminal) -> Result<(), CliError> 
 }
 
 /// The results of the run, graded by `--right` if it is given.
-fn graded(args: &ResultsArgs) -> Result<Vec<QueryResult>, CliError> {
-    let results = read_rows(&args.run)?;
+fn graded(args: &ResultsArgs, run: &RunFile) -> Result<Vec<QueryResult>, CliError> {
+    let results = read_results(&args.run, run)?;
     Ok(match args.right {
         Some(right) => results.into_iter().map(|result| result.graded(right)).collect(),
         None => results,
@@ -126,7 +125,7 @@ fn draw(
     terminal: &Terminal,
 ) -> Result<(), CliError> {
     let svg =
-        plot.svg(&RunResults::of(graded(args)?, run.failure_radius_m())).ok_or_else(|| {
+        plot.svg(&RunResults::of(graded(args, run)?, run.failure_radius_m())).ok_or_else(|| {
             CliError::Usage(format!(
                 "the run has too few results for this plot, which needs {}",
                 plot.needs()

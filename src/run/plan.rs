@@ -240,7 +240,6 @@ impl EvaluationRequest<'_> {
             return Err(Refusal::Gate { gate: gate.to_string(), method: gate.method() }.into());
         }
         if let Some(before) = &self.judging.before {
-            read_run(before)?;
             read_rows(before)?;
         }
         if let Some(path) = self.events {
