@@ -24,6 +24,7 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use image::metadata::Orientation;
 use nalgebra::{Matrix3x4, Point3, Translation3};
+use posescope_core::files;
 use serde::Deserialize;
 use toml::Spanned;
 
@@ -164,7 +165,7 @@ struct Source {
 impl Source {
     fn read(path: &Path) -> Result<Self, SceneError> {
         Bounds::Layout.check(path)?;
-        Ok(Self { path: path.to_owned(), text: lines::read_text(path)? })
+        Ok(Self { path: path.to_owned(), text: lines::read_text(path, files::DESCRIPTION)? })
     }
 
     fn description(&self) -> Result<Description, SceneError> {

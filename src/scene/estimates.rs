@@ -19,7 +19,8 @@ use crate::geometry::Pose;
 /// A file that cannot be read, has another format, has a frame twice, or has no frame of the scene.
 pub fn read_estimates(path: &Path, scene: &dyn Scene) -> Result<Estimates, SceneError> {
     let in_folder = path.join("images.txt");
-    let file = if path.is_dir() { TextFile::read(&in_folder)? } else { TextFile::named(path)? };
+    let file =
+        if path.is_dir() { TextFile::of_images(&in_folder)? } else { TextFile::named(path)? };
     let names = FrameNames::new(scene);
     let PoseFile { poses, is_of_body, .. } = PoseFile::read(&file, &names)?;
     if is_of_body {

@@ -4,6 +4,7 @@
 use std::path::{Path, PathBuf};
 
 use nalgebra::{Matrix3x4, Point3, Vector3};
+use posescope_core::files;
 
 use super::file_scene::{FileScene, Frame};
 use super::folder::{folder_name, numbered, warn_without_poses};
@@ -85,7 +86,7 @@ fn open(path: &Path) -> Result<Box<dyn Scene>, SceneError> {
 pub(super) fn recalibrated(argument: &str, change: &Pose) -> Result<Recalibrated, SceneError> {
     let camera = Camera::of_path(Path::new(argument), &CAMERAS);
     let (path, label) = (camera.folder.join(CALIBRATION), camera.name()?.replace("image_", "P"));
-    let text = lines::read_text(&path)?;
+    let text = lines::read_text(&path, files::DESCRIPTION)?;
     let file = TextFile::from_text(&path.display().to_string(), &text);
     // The size does not matter for where the camera is.
     let size = (u32::MAX, u32::MAX);

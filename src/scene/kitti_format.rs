@@ -132,7 +132,7 @@ fn read_scan(
     into_camera: impl Fn(Point3<f64>) -> Point3<f64>,
 ) -> Result<Cloud, SceneError> {
     const BYTES_PER_POINT: usize = 16;
-    let bytes = files::read(path, files::TEXT).map_err(SceneError::io(path))?;
+    let bytes = files::read(path, files::SCAN).map_err(SceneError::io(path))?;
     let content = |expected: String| SceneError::expected(path, expected);
     if bytes.is_empty() {
         return Err(content("points expected, the scan is empty".to_owned()));

@@ -15,6 +15,9 @@ pub(super) struct TextFile {
     text: String,
 }
 
+/// The most lines of a file with something of each frame. What is made of a line may take half a kilobyte.
+const MAX_LINES: usize = 2_000_000;
+
 /// A line of a [`TextFile`].
 #[derive(Clone, Copy)]
 pub(super) struct Line<'a> {
@@ -34,7 +37,28 @@ impl TextFile {
 
     /// Reads a file that the user named.
     pub fn named(path: &Path) -> Result<Self, SceneError> {
-        Ok(Self { path: path.to_owned(), text: read_text(path)? })
+        Self { path: path.to_owned(), text: read_text(path, files::TABLE)? }.with_few_lines()
+    }
+
+    /// Reads a file of a map with a line for each point.
+    pub fn of_points(path: &Path) -> Result<Self, SceneError> {
+        Bounds::Layout.check(path)?;
+        Ok(Self { path: path.to_owned(), text: read_text(path, files::TEXT)? })
+    }
+
+    /// Reads a file of a map with lines for each image, of which some list all features.
+    pub fn of_images(path: &Path) -> Result<Self, SceneError> {
+        Self::of_points(path)?.with_few_lines()
+    }
+
+    fn with_few_lines(self) -> Result<Self, SceneError> {
+        // No line has less than a byte.
+        if self.text.len() > MAX_LINES && self.text.lines().nth(MAX_LINES).is_some() {
+            return Err(
+                self.error(format!("at most {MAX_LINES} lines expected; leave out some frames"))
+            );
+        }
+        Ok(self)
     }
 
     /// A text that is not from a file; errors use `name` in place of the file.
@@ -230,9 +254,9 @@ pub(super) fn excerpt_of(text: &str, most: usize) -> String {
     if text.chars().nth(most).is_some() { short + "…" } else { short }
 }
 
-/// Reads a text, without a byte order mark.
-pub(super) fn read_text(path: &Path) -> Result<String, SceneError> {
-    let mut bytes = files::read(path, files::TEXT).map_err(SceneError::io(path))?;
+/// Reads a text of at most so many bytes, without a byte order mark.
+pub(super) fn read_text(path: &Path, most: u64) -> Result<String, SceneError> {
+    let mut bytes = files::read(path, most).map_err(SceneError::io(path))?;
     let start = text_start(&bytes).map_err(|expected| SceneError::expected(path, expected))?;
     bytes.drain(..start);
     String::from_utf8(bytes).map_err(|error| {
@@ -284,6 +308,22 @@ mod tests {
     }
 
     #[test]
+    fn more_lines_than_frames_are_refused_but_of_points() {
+        let folder = tempfile::TempDir::new().expect("a folder");
+        let path = folder.path().join("a.txt");
+        let read = |lines: usize| {
+            std::fs::write(&path, "1\n".repeat(lines)).expect("writable");
+            said(TextFile::named(&path)).map(|file| file.lines().count())
+        };
+        assert_eq!(read(MAX_LINES), Ok(MAX_LINES));
+        let refused = read(MAX_LINES + 1);
+        assert!(refused.is_err_and(|said| said.contains("at most 2000000 lines expected")));
+        assert!(TextFile::of_images(&path).is_err());
+        let points = said(TextFile::of_points(&path)).map(|file| file.lines().count());
+        assert_eq!(points, Ok(MAX_LINES + 1));
+    }
+
+    #[test]
     fn numbers_with_decimal_commas_are_no_others() {
         let read = |text: &str| said(file(text).rows::<1, 4>()).map(|[row]| row);
         for text in ["1.5 2 3.5 4", "1.5,2,3.5,4", "1.5; 2;3.5;4", " 1.5\t2\t3.5\t4 "] {
@@ -332,7 +372,7 @@ mod tests {
         let path = folder.path().join("a.txt");
         let read = |bytes: &[u8]| {
             std::fs::write(&path, bytes).expect("writable");
-            read_text(&path).map_err(|error| error.to_string())
+            read_text(&path, 99).map_err(|error| error.to_string())
         };
         assert_eq!(read(b"1 2\n").as_deref(), Ok("1 2\n"));
         assert_eq!(read(b"\xef\xbb\xbf1 2\n").as_deref(), Ok("1 2\n"));

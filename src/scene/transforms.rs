@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
 use nalgebra::{Matrix3x4, Point2, Point3, Translation3, UnitQuaternion, Vector3};
+use posescope_core::files;
 use serde::Deserialize;
 
 use super::file_scene::{Clouds, Develop, FileScene, Frame};
@@ -188,7 +189,7 @@ fn pose(rows: &[Vec<f64>]) -> Result<Pose, String> {
 
 fn open(path: &Path) -> Result<Box<dyn Scene>, SceneError> {
     Bounds::Layout.check(path)?;
-    let content: Content = serde_json::from_str(&lines::read_text(path)?)
+    let content: Content = serde_json::from_str(&lines::read_text(path, files::TABLE)?)
         .map_err(|error| SceneError::line(path, error.line().max(1), error.to_string()))?;
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
     let folder = folder.unwrap_or(Path::new("."));

@@ -224,6 +224,16 @@ fn a_small_file_of_a_huge_photo_is_refused_by_its_size() {
 }
 
 #[test]
+fn a_scan_that_no_laser_makes_is_refused_by_its_size() {
+    let sequence = SmallSequence::write();
+    let scan = fs::File::create(sequence.scan("000004")).expect("writable");
+    // It has no content, and takes no room on the disk.
+    scan.set_len((256 << 20) + 16).expect("room");
+    let said = sequence.run("run sequences/42 --query 5 --reference 4 --method fb");
+    said.fails_in_one_line(3, "000004.bin: a file of at most 268435456 bytes expected");
+}
+
+#[test]
 fn a_long_word_of_a_file_is_not_shown_whole() {
     let root = TempDir::new().expect("a folder");
     scene_toml::write(root.path());

@@ -9,10 +9,15 @@ use std::io::{self, BufRead as _, BufReader, Read as _, Write as _};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
-/// The most of a description that a person or a program of ours wrote \[bytes\]: `run.toml`, a list, parameters.
-pub const DESCRIPTION: u64 = 64 << 20;
-/// The most of a text with numbers of all frames \[bytes\].
+/// The most of a description that a person or a program of ours wrote \[bytes\]: `run.toml`, `scene.toml`, a list,
+/// parameters. What is made of it may take 70 times as much memory.
+pub const DESCRIPTION: u64 = 16 << 20;
+/// The most of a text with something of each frame \[bytes\], such as its pose.
+pub const TABLE: u64 = 256 << 20;
+/// The most of a text with something of each point of a map \[bytes\].
 pub const TEXT: u64 = 1 << 30;
+/// The most of a file with one scan of a laser, or one table per pixel \[bytes\]: 16 million points of KITTI.
+pub const SCAN: u64 = 256 << 20;
 /// The longest line of a file that is read line by line \[bytes\].
 pub const LINE: u64 = 16 << 20;
 

@@ -50,7 +50,7 @@ fn points(path: &Path) -> Result<Points, SceneError> {
     if !path.is_file() {
         return Ok(points);
     }
-    let file = TextFile::read(path)?;
+    let file = TextFile::of_points(path)?;
     file.expect_order(&["point3d_id", "x", "y", "z", "r"])?;
     for line in file.lines() {
         let words: Vec<&str> = line.text.split_ascii_whitespace().take(4).collect();
@@ -69,7 +69,7 @@ fn points(path: &Path) -> Result<Points, SceneError> {
 /// Two lines per image: `IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME`, then `X Y POINT3D_ID` of each feature. The
 /// second line may be empty or missing.
 fn images(path: &Path, points: &Points) -> Result<Vec<ModelImage>, SceneError> {
-    let file = TextFile::read(path)?;
+    let file = TextFile::of_images(path)?;
     file.expect_order(&[
         "image_id",
         "qw",
@@ -131,7 +131,7 @@ fn is_image(text: &str) -> bool {
 
 /// How many images a file lists.
 pub(super) fn count_images(path: &Path) -> Result<u64, SceneError> {
-    Ok(pairs_of_lines(&TextFile::read(path)?).count() as u64)
+    Ok(pairs_of_lines(&TextFile::of_images(path)?).count() as u64)
 }
 
 /// The lines of the images of a text, without those of their features.

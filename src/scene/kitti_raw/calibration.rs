@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use nalgebra::Matrix3x4;
+use posescope_core::files;
 
 use super::super::SceneError;
 use super::super::kitti_format::{in_camera0, labelled, split_projection, with_labelled};
@@ -61,7 +62,7 @@ pub(super) fn recalibrated(
     let better = in_camera0(change, &stated.camera_from_camera0) * stated.camera0_from_velodyne;
     let better = rectified_from_camera0.inverse() * better;
     let path = day.join(VELODYNE);
-    let text = lines::read_text(&path)?;
+    let text = lines::read_text(&path, files::DESCRIPTION)?;
     let rotation = better.rotation.to_rotation_matrix().transpose();
     let text = with_labelled(&text, "R", rotation.matrix().as_slice());
     let text = with_labelled(&text, "T", better.translation.vector.as_slice());

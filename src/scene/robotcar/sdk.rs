@@ -70,7 +70,7 @@ impl Sdk {
 /// The position in the original photo for each pixel of undistorted photos \[px\]. The file has all columns first, then
 /// all rows.
 fn read_table(path: &Path, (width, height): (u32, u32)) -> Result<Vec<[f32; 2]>, SceneError> {
-    let bytes = files::read(path, files::TEXT).map_err(SceneError::io(path))?;
+    let bytes = files::read(path, files::SCAN).map_err(SceneError::io(path))?;
     let pixels = width as usize * height as usize;
     if bytes.len() != pixels * 16 {
         return Err(SceneError::expected(
