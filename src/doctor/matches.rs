@@ -16,6 +16,8 @@ use crate::solver::Correspondence;
 
 /// The strongest features of a photo that are used.
 const FEATURES: usize = 1500;
+/// Larger photos are searched at every second pixel: they have more features than are used \[px\].
+const LARGE: u32 = 28_000_000;
 /// The greatest ratio of distances of a match. True matches agree on a motion, and false ones do not.
 const RATIO: f32 = 0.9;
 /// How far from where a pose says that it is a match counts half \[px\].
@@ -27,6 +29,9 @@ const MIN_LIFTED: usize = 30;
 pub(super) fn features(photo: &GrayImage) -> Features {
     let mut params = SurfParams::default();
     params.max_keypoints = FEATURES;
+    if photo.width() * photo.height() > LARGE {
+        params.initial_step = 2;
+    }
     surf(photo, &params)
 }
 
