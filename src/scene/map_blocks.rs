@@ -1,5 +1,6 @@
 //! A map in blocks: points are stored by cubes of the world, so a camera only visits cubes that may be in view.
 
+use std::cmp::Ordering;
 use std::ops::Range;
 
 use nalgebra::{Point3, Vector3};
@@ -41,12 +42,13 @@ impl MapBlocks {
         });
         let longest = lengths.fold(0.0, f32::max);
         let side = SIDE_M.min(longest / MIN_BLOCKS).max(f32::MIN_POSITIVE);
-        let key = |point: &Point3<f32>| [0, 1, 2].map(|axis| (point[axis] / side).floor() as i32);
+        let cube = |point: &Point3<f32>, axis: usize| floor(point[axis] / side);
+        let key = |point: &Point3<f32>| [0, 1, 2].map(|axis| cube(point, axis));
         // By all coordinates: the order must not depend on the number of threads.
         points.par_sort_unstable_by(|a, b| {
-            let coordinates = || (0..3).map(|axis| a[axis].total_cmp(&b[axis]));
-            let rest = coordinates().fold(std::cmp::Ordering::Equal, std::cmp::Ordering::then);
-            key(a).cmp(&key(b)).then(rest)
+            let cubes = (0..3).map(|axis| cube(a, axis).cmp(&cube(b, axis)));
+            let coordinates = (0..3).map(|axis| a[axis].total_cmp(&b[axis]));
+            cubes.chain(coordinates).find(|order| order.is_ne()).unwrap_or(Ordering::Equal)
         });
         let mut blocks = Vec::new();
         let mut start = 0;
@@ -93,6 +95,12 @@ impl MapBlocks {
     }
 }
 
+/// `number.floor() as i32`, without a call where the processor's baseline has no instruction for it.
+fn floor(number: f32) -> i32 {
+    let whole = number as i32;
+    if whole as f32 > number { whole.saturating_sub(1) } else { whole }
+}
+
 /// The inward normals of the planes that bound a camera's view, and the viewing direction.
 fn sides(camera: &Intrinsics) -> [Vector3<f64>; 5] {
     let (left, right) = (-0.5 - camera.cx, f64::from(camera.width) - 0.5 - camera.cx);
@@ -112,6 +120,13 @@ mod tests {
     use super::*;
     use rand::{RngExt as _, SeedableRng as _};
     use rand_pcg::Pcg64Mcg;
+
+    #[test]
+    fn numbers_are_rounded_down() {
+        for number in [0.0, -0.0, 1.0, -1.0, 0.5, -0.5, 1e-30, -1e-30, 7.99, -7.99, 3e9, -3e9] {
+            assert_eq!(floor(number), number.floor() as i32, "{number}");
+        }
+    }
 
     #[test]
     fn nothing_in_view_is_missed_and_what_is_behind_is_hardly_looked_at() {
