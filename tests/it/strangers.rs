@@ -234,6 +234,17 @@ fn a_scan_that_no_laser_makes_is_refused_by_its_size() {
 }
 
 #[test]
+fn times_of_points_that_switch_without_end_do_not_overflow_the_stack() {
+    let root = TempDir::new().expect("a folder");
+    scene_toml::write(root.path());
+    scene_toml::with(root.path(), "map.xyz", "map.laz");
+    let fixtures = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/laz");
+    fs::copy(fixtures.join("switching-times.laz"), root.path().join("map.laz")).expect("writable");
+    let said = run_in(root.path(), "run . --query img1 --reference img0 --method fb");
+    said.fails_in_one_line(3, "map.laz ~ times of points expected, the file is damaged");
+}
+
+#[test]
 fn a_long_word_of_a_file_is_not_shown_whole() {
     let root = TempDir::new().expect("a folder");
     scene_toml::write(root.path());

@@ -1,10 +1,12 @@
 //! LAS and LAZ.
 
-use std::io::{BufReader, Read, Seek, SeekFrom};
+use std::fs::File;
+use std::io::{self, BufReader, Read, Seek, SeekFrom};
 use std::path::Path;
+use std::thread;
 
 use las::{Header, Reader};
-use laz::{LazItem, LazItemType, LazVlr};
+use laz::{DecompressionSelection, LasZipDecompressor, LazItem, LazItemType, LazVlr};
 use posescope_core::files;
 
 use super::decoding::decoded;
@@ -15,9 +17,20 @@ const BATCH: u64 = 65_536;
 /// The smallest size of an uncompressed point \[bytes\].
 const MIN_RECORD: u64 = 20;
 
+/// The stack of a decoder \[bytes\].
+const STACK: usize = 32 << 20;
+/// How much of it the decoder may have in use when it reads on \[bytes\].
+const DEEPEST: usize = 1 << 20;
+
 /// Reads the points. The decoder panics on damaged data, which becomes an error.
 pub(super) fn read(path: &Path, size: u64) -> Result<MapCloud, String> {
-    decoded(|| points(path, size))
+    let decode = || decoded(|| points(path, size));
+    thread::scope(|scope| {
+        let decoder = thread::Builder::new().stack_size(STACK).spawn_scoped(scope, decode);
+        let read =
+            decoder.map(thread::ScopedJoinHandle::join).map_err(|error| error.to_string())?;
+        read.unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+    })
 }
 
 fn points(path: &Path, size: u64) -> Result<MapCloud, String> {
@@ -37,9 +50,10 @@ fn points(path: &Path, size: u64) -> Result<MapCloud, String> {
             ));
         }
         expect_chunks(&mut file, size, &layout)?;
-    } else {
-        expect_room(header.number_of_points(), record, size)?;
+        file.rewind().map_err(|error| error.to_string())?;
+        return compressed(file, layout);
     }
+    expect_room(header.number_of_points(), record, size)?;
     file.rewind().map_err(|error| error.to_string())?;
     let mut reader = Reader::new(file).map_err(text)?;
     let mut cloud = Collector::default();
@@ -52,6 +66,64 @@ fn points(path: &Path, size: u64) -> Result<MapCloud, String> {
             cloud.add([x, y, z])?;
         }
     }
+}
+
+/// Reads compressed points. Formats that keep what belongs to a point apart are decoded in part.
+fn compressed(mut file: BufReader<File>, layout: LazVlr) -> Result<MapCloud, String> {
+    let header = Header::new(&mut file).map_err(|error| error.to_string())?;
+    let mut record = vec![0; layout.items_size() as usize];
+    let coordinates = DecompressionSelection::xy_returns_channel().decompress_z();
+    let mut points = LasZipDecompressor::selective(Shallow::new(file), layout, coordinates)
+        .map_err(|error| error.to_string())?;
+    let transforms = header.transforms();
+    let mut cloud = Collector::default();
+    for _ in 0..header.number_of_points() {
+        points.decompress_one(&mut record).map_err(|error| error.to_string())?;
+        let (numbers, _) = record.as_chunks();
+        let at = |axis: usize| i32::from_le_bytes(numbers[axis]);
+        cloud.add([
+            transforms.x.direct(at(0)),
+            transforms.y.direct(at(1)),
+            transforms.z.direct(at(2)),
+        ])?;
+    }
+    Ok(cloud.finish())
+}
+
+/// A file whose decoder may call itself only so often. That of a point's time does so for each switch to another
+/// sequence of times, of which a sound file has one for a point and a damaged one has any number. It reads a byte for
+/// 36,000 switches or fewer, so its stack is looked at whenever it reads.
+struct Shallow {
+    file: BufReader<File>,
+    /// Where the stack is without the decoder.
+    base: usize,
+}
+
+impl Shallow {
+    fn new(file: BufReader<File>) -> Self {
+        Self { file, base: stack() }
+    }
+}
+
+impl Read for Shallow {
+    fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
+        if self.base.abs_diff(stack()) > DEEPEST {
+            return Err(io::Error::other("times of points expected, the file is damaged"));
+        }
+        self.file.read(bytes)
+    }
+}
+
+impl Seek for Shallow {
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        self.file.seek(to)
+    }
+}
+
+/// About where the stack of this thread ends.
+fn stack() -> usize {
+    let here = 0_u8;
+    std::ptr::from_ref(&here).addr()
 }
 
 /// Bytes at a position of a file.
