@@ -105,6 +105,51 @@ fn hostile_number(bytes: &mut Vec<u8>, random: &mut Pcg64Mcg) {
     bytes.splice(start..start + length, number.bytes());
 }
 
+/// With right check sums where a format has some: without, no reader looks at what is damaged.
+fn summed(mut bytes: Vec<u8>) -> Vec<u8> {
+    const PNG: u32 = 0xedb8_8320;
+    const E57: u32 = 0x82f6_3b78;
+    if bytes.starts_with(b"ASTM-E57") {
+        for page in bytes.chunks_exact_mut(1024) {
+            let (content, sum) = page.split_at_mut(1020);
+            sum.copy_from_slice(&check_sum(content, E57));
+        }
+    }
+    if bytes.starts_with(b"\x89PNG") {
+        let mut at = 8;
+        while let Some(&[a, b, c, d]) = bytes.get(at..at + 4) {
+            let length = u32::from_be_bytes([a, b, c, d]) as usize;
+            let (start, end) = (at + 4, at + 8 + length);
+            let Some(sum) = bytes.get(start..end).map(|chunk| check_sum(chunk, PNG)) else { break };
+            let Some(place) = bytes.get_mut(end..end + 4) else { break };
+            place.copy_from_slice(&sum);
+            at = end + 4;
+        }
+    }
+    bytes
+}
+
+/// The cyclic check of 32 bits by a polynomial whose bits are reversed.
+fn check_sum(bytes: &[u8], polynomial: u32) -> [u8; 4] {
+    let sum = bytes.iter().fold(u32::MAX, |sum, &byte| {
+        (0..8).fold(sum ^ u32::from(byte), |sum, _| {
+            if sum & 1 == 1 { sum >> 1 ^ polynomial } else { sum >> 1 }
+        })
+    });
+    (!sum).to_be_bytes()
+}
+
+#[test]
+fn check_sums_are_those_of_sound_files() {
+    let folder = TempDir::new().expect("a folder");
+    scene_toml::write(folder.path());
+    scene_toml::write_clouds(folder.path());
+    for name in ["map.e57", "photos/img0.png"] {
+        let sound = fs::read(folder.path().join(name)).expect("just written");
+        assert!(summed(sound.clone()) == sound, "{name}");
+    }
+}
+
 /// Damages one file after the other, reads, and mends it. `read` says what it was told.
 fn mutate<E: Display>(name: &str, files: &[PathBuf], mut read: impl FnMut() -> Result<(), Vec<E>>) {
     if is_left_out(name) {
@@ -119,6 +164,7 @@ fn mutate<E: Display>(name: &str, files: &[PathBuf], mut read: impl FnMut() -> R
         let which = random.random_range(0..files.len());
         let path = &files[which];
         match damaged(&whole[which], &mut random) {
+            Some(bytes) if random.random() => fs::write(path, summed(bytes)).expect("writable"),
             Some(bytes) => fs::write(path, bytes).expect("writable"),
             None => fs::remove_file(path).expect("is there"),
         }
