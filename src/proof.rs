@@ -136,10 +136,11 @@ pub struct ProofCase<'a> {
 }
 
 impl ProofPicture {
-    /// The picture that proves the primary verdict, or shows the stage that decided where there is none. `None`
-    /// where the method told nothing that can be drawn.
+    /// The picture that proves the primary verdict. Where there is none, or the method told nothing of what that picture
+    /// shows, the stage that decided, or the cloud on the photos.
     pub fn of(case: &ProofCase<'_>) -> Option<Self> {
-        let picture = Self::in_metres(case)?;
+        // Another system's pose has no search, and a failure early on nothing of what its verdict is about.
+        let picture = Self::in_metres(case).or_else(|| case.deciding_stage())?;
         Some(picture.in_words_of(case.params.scale.unit()))
     }
 
@@ -231,7 +232,8 @@ impl<'a> ProofCase<'a> {
         let method = responsible(self.result);
         let entry = method.and_then(estimator::find);
         if entry.and_then(Entry::cost).is_some() {
-            maps::cost_map(self, MapOverlay::Ranks).or_else(|| photos::matches(self))
+            let map = maps::cost_map(self, MapOverlay::Ranks);
+            map.or_else(|| photos::matches(self)).or_else(|| photos::cloud_on_photo(self))
         } else {
             photos::matches(self).or_else(|| photos::cloud_on_photo(self))
         }

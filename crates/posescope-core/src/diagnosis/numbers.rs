@@ -2,10 +2,14 @@
 
 use crate::geometry::PoseError;
 
-/// Two numbers to compare: three significant digits, and more where those are equal and the numbers are not.
+/// Two numbers to compare: three significant digits, and more where those are equal and the numbers are not. The second
+/// says so where they are equal in six.
 pub(super) fn pair(a: f64, b: f64) -> (String, String) {
     let texts = |digits| (with_digits(a, digits), with_digits(b, digits));
-    (3..=6).map(texts).find(|(a, b)| a != b).unwrap_or_else(|| texts(3))
+    (3..=6).map(texts).find(|(a, b)| a != b).unwrap_or_else(|| {
+        let (a, b) = texts(3);
+        (a, format!("{b} (the same)"))
+    })
 }
 
 /// A distance with two decimals below 10 m and one above.
@@ -61,7 +65,8 @@ mod tests {
         };
         assert_eq!(texts(0.9146, 0.9270), "0.915 0.927");
         assert_eq!(texts(0.72141, 0.72144), "0.72141 0.72144");
-        assert_eq!(texts(0.5, 0.5), "0.500 0.500");
+        assert_eq!(texts(0.5, 0.5), "0.500 0.500 (the same)");
+        assert_eq!(texts(0.5, 0.500_000_01), "0.500 0.500 (the same)");
     }
 
     #[test]

@@ -329,6 +329,11 @@ impl<'a> FinishedSearch<'a> {
         self.scorer.score(&[self.truth])[0].cost
     }
 
+    /// The cost at the truth itself; `None` where too little is covered.
+    pub(super) fn eligible_cost_at_truth(&self) -> Option<f64> {
+        self.eligible(self.scorer.score(&[self.truth])).into_iter().next().flatten()
+    }
+
     /// What chance gives at a pose, and what the images cost there.
     pub(super) fn against_chance(&self, offset: &Offset) -> Option<AgainstChance> {
         let known = || {

@@ -97,7 +97,12 @@ evidence!(Missed {
 fn by_given(search: &FinishedSearch<'_>) -> Option<Diagnosis> {
     let cost_at_result = search.result_cost?;
     let cost_near_truth = match search.rivals() {
-        Some(rivals) => rivals.is_missed.then_some(rivals.near.cost)?,
+        // Its pose has all freedoms, and the pose near the truth only those of a search on the ground.
+        Some(rivals) if rivals.is_missed => {
+            let at_truth = search.eligible_cost_at_truth().unwrap_or(f64::INFINITY);
+            at_truth.min(rivals.near.cost)
+        }
+        Some(_) => return None,
         None => search.cost_at_truth().filter(|cost| *cost < cost_at_result)?,
     };
     Some(RULE.found(&CheaperTruth {
