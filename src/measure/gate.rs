@@ -22,6 +22,16 @@ enum Metric {
     Share(Code),
 }
 
+impl Metric {
+    /// Whether its values are shares or probabilities.
+    fn is_share(self) -> bool {
+        match self {
+            Self::Figure(name) => ["right", "success", "median(confidence)"].contains(&name),
+            Self::Recall(_) | Self::Share(_) => true,
+        }
+    }
+}
+
 /// The names of [`Measures::figure`] that gates may use.
 const FIGURES: [&str; 8] = [
     "right",
@@ -95,13 +105,13 @@ impl FromStr for Gate {
         if is_unordered || !limit.is_finite() {
             return Err(expected());
         }
-        Ok(Self {
-            text: text.trim().to_owned(),
-            metric: metric_of(metric).ok_or_else(expected)?,
-            method,
-            relation,
-            limit,
-        })
+        let metric = metric_of(metric).ok_or_else(expected)?;
+        if metric.is_share() && !(0.0..=1.0).contains(&limit) {
+            return Err(format!(
+                "`{text}`: a number from 0 to 1 expected, {limit} found; 1 is all"
+            ));
+        }
+        Ok(Self { text: text.trim().to_owned(), metric, method, relation, limit })
     }
 }
 
@@ -238,6 +248,19 @@ mod tests {
         ] {
             let error = wrong.parse::<Gate>().expect_err(wrong);
             assert!(error.contains("METRIC@METHOD"), "{error}");
+        }
+    }
+
+    #[test]
+    fn a_share_is_from_0_to_1() {
+        for wrong in
+            ["right@fb >= 2", "success@fb >= 90", "recall@0.5m,5deg@fb < -1", "share(D3)@mi <= 5"]
+        {
+            let error = wrong.parse::<Gate>().expect_err(wrong);
+            assert!(error.contains("a number from 0 to 1 expected"), "{error}");
+        }
+        for possible in ["right@fb >= 1", "right@fb > 0", "median_deg@fb < 5", "rmse_m@fb <= 12"] {
+            assert!(possible.parse::<Gate>().is_ok(), "{possible}");
         }
     }
 }

@@ -6,6 +6,7 @@ use super::findings::{Finding, findings};
 use super::groups::grouped;
 use super::metrics::median;
 use crate::diagnosis::{Code, Confidence, Grade};
+use crate::estimator;
 use crate::localize::QueryResult;
 
 /// What a run came to.
@@ -98,7 +99,34 @@ fn causes<'a>(results: impl Iterator<Item = &'a &'a QueryResult>) -> Vec<(Code, 
     causes.map(|(code, results)| (code, results.len())).collect()
 }
 
+/// The poses of another system are what a run is about, and methods beside it are there to compare.
 fn headline(results: &[&QueryResult], bars: &[Bar]) -> String {
+    let is_foreign = |result: &&QueryResult| estimator::find(result.method).is_none();
+    let (foreign, own): (Vec<_>, Vec<_>) = results.iter().copied().partition(is_foreign);
+    let of = |those: &[&QueryResult]| -> Vec<Bar> {
+        let is_of = |bar: &&Bar| those.iter().any(|one| one.method_name() == bar.name);
+        bars.iter().filter(is_of).cloned().collect()
+    };
+    match (of(&foreign).as_slice(), of(&own).as_slice()) {
+        ([only], own_bars @ [_, ..]) => {
+            let words = best_in_words(&foreign, std::slice::from_ref(only), true);
+            let compared = own_bars.iter().map(|bar| {
+                format!("{} for {} of {}", bar.name, bar.count(Grade::Right), bar.total())
+            });
+            let compared: Vec<String> = compared.collect();
+            let is_measured = foreign.iter().any(|one| one.error.is_some());
+            if is_measured {
+                format!("{words} Beside it are right: {}.", compared.join(", "))
+            } else {
+                words
+            }
+        }
+        _ => best_in_words(results, bars, false),
+    }
+}
+
+/// How the best method did, which is called by its name even if it is right for nothing where `is_named`.
+fn best_in_words(results: &[&QueryResult], bars: &[Bar], is_named: bool) -> String {
     let is_measured =
         results.iter().any(|result| matches!(result.grade, Grade::Right | Grade::Wrong));
     let worth = |bar: &Bar| {
@@ -111,7 +139,11 @@ fn headline(results: &[&QueryResult], bars: &[Bar]) -> String {
     let (name, good, total) = (&best.name, worth(best), best.total());
     let queries = if total == 1 { "query" } else { "queries" };
     if !is_measured && good == 0 {
-        return format!("No method gives a pose for any of {total} {queries}.");
+        return if is_named {
+            format!("{name} gives no pose for any of {total} {queries}.")
+        } else {
+            format!("No method gives a pose for any of {total} {queries}.")
+        };
     }
     if !is_measured {
         return format!(
@@ -119,6 +151,7 @@ fn headline(results: &[&QueryResult], bars: &[Bar]) -> String {
         );
     }
     let mut words = match good {
+        0 if is_named => format!("{name} is right for none of {total} {queries}."),
         0 if total == 1 => "No method is right for the query.".to_owned(),
         0 => format!("No method is right for any of {total} {queries}."),
         _ if bars.len() > 1 => {
@@ -128,7 +161,7 @@ fn headline(results: &[&QueryResult], bars: &[Bar]) -> String {
     };
     // Where none is right, all failures count.
     let is_counted = |result: &QueryResult| good == 0 || result.method_name() == *name;
-    let whose = if good == 0 { "the" } else { "its" };
+    let whose = if good == 0 && !is_named { "the" } else { "its" };
     let failed: Vec<&&QueryResult> =
         results.iter().filter(|result| is_counted(result) && result.grade.is_failure()).collect();
     let causes = causes(failed.iter().copied());
@@ -155,6 +188,7 @@ fn headline(results: &[&QueryResult], bars: &[Bar]) -> String {
 mod tests {
     use super::*;
     use crate::measure::metrics::tests::row;
+    use crate::method::Method;
 
     #[test]
     fn the_headline_names_the_best_method_and_its_most_frequent_cause() {
@@ -189,6 +223,21 @@ mod tests {
         let words = "No method is right for the query. Most frequent cause of the failures:";
         assert_eq!(wrong.headline, format!("{words} {title} (1 of 2)."));
         assert_eq!(Overview::of(&[], &[]).headline, "There are no results yet.");
+    }
+
+    #[test]
+    fn the_headline_is_about_the_other_system() {
+        let mine = |query: &str, off_m: f64| QueryResult {
+            method: Method::called("mine").expect("a name"),
+            ..row(query, "fb", Some(off_m))
+        };
+        let rows =
+            [mine("1", 9.0), row("1", "fb", Some(0.1)), mine("2", 0.1), row("2", "fb", Some(0.1))];
+        let all: Vec<&QueryResult> = rows.iter().collect();
+        let said = Overview::of(&all, &[]).headline;
+        assert_eq!(said, "mine is right for 1 of 2 queries. Beside it are right: fb for 2 of 2.");
+        let said = Overview::of(&all[..2], &[]).headline;
+        assert_eq!(said, "mine is right for none of 1 query. Beside it are right: fb for 1 of 1.");
     }
 
     #[test]
