@@ -12,6 +12,7 @@ mod estimates;
 mod exif;
 mod file_scene;
 mod folder;
+mod frame_list;
 mod frame_names;
 mod gps;
 mod kitti;
@@ -52,6 +53,7 @@ use crate::geometry::Pose;
 
 pub use cloud_file::is_decoding;
 pub use estimates::read_estimates;
+pub use frame_list::{FRAME_LIST, FRAME_LIST_SCHEMA};
 pub use gps::located;
 pub use loose::{CameraArgument, LoosePhotos};
 pub use pair_matches::{MatchFolder, PixelMaps, write_matches};
@@ -68,6 +70,7 @@ pub const ALL: &[SceneFormat] = &[
     seven_scenes::ENTRY,
     colmap::ENTRY,
     transforms::ENTRY,
+    frame_list::ENTRY,
     described::ENTRY,
 ];
 

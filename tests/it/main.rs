@@ -23,6 +23,7 @@ mod foreign;
 mod foreign_runs;
 mod frame_cache;
 mod frame_layout;
+mod frame_list;
 mod gps;
 mod hardening;
 mod imports;

@@ -9,7 +9,7 @@ use posescope::scene::{self, Scene};
 use tempfile::TempDir;
 
 use crate::small_sequence::SmallSequence;
-use crate::{colmap, kitti_raw, rgbd, robotcar, scene_toml, transforms};
+use crate::{colmap, frame_list, kitti_raw, rgbd, robotcar, scene_toml, transforms};
 
 /// A small scene of a format on disk, and its argument.
 pub struct Sample {
@@ -55,6 +55,10 @@ fn sample(format: &str) -> Sample {
         }
         "transforms" => {
             transforms::write(&root);
+            root
+        }
+        "frames" => {
+            frame_list::write(&root);
             root
         }
         "toml" => {
