@@ -93,6 +93,7 @@ impl Draw<'_> {
             drawn: names(excluded),
             queries: names(&chosen),
             times_s: times_of(queries, &chosen),
+            references: Vec::new(),
         })
     }
 

@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use super::plan::Plan;
+use super::protocol::Protocol;
 use super::run_file::RunItem;
 use super::run_folder::{FolderError, RunFolder};
 use super::scene_pair::ScenePair;
@@ -138,7 +139,7 @@ impl<'a> Evaluation<'a> {
         let frame = localizer.queries().find(item.query)?;
         let mut results = Vec::new();
         let localized = catch_unwind(AssertUnwindSafe(|| -> Result<_, RunError> {
-            let requests = self.requests(item.pair, localizer, frame, excluded)?;
+            let requests = self.requests(item, localizer, frame, excluded)?;
             localizer.localize(
                 item.index,
                 frame,
@@ -188,12 +189,16 @@ impl<'a> Evaluation<'a> {
 
     fn requests(
         &self,
-        pair: &ScenePair,
+        item: &RunItem<'_>,
         localizer: &Localizer<'_>,
         frame: usize,
         excluded: &BTreeSet<usize>,
     ) -> Result<Vec<Request>, RunError> {
-        let protocol = &self.plan.run.protocol;
+        let (protocol, pair) = (&self.plan.run.protocol, item.pair);
+        if let Some(named) = named(protocol, item, localizer, frame)? {
+            let settings = self.plan.run.settings().into_iter();
+            return Ok(settings.map(|setting| self.plan.run.request(setting, &named)).collect());
+        }
         let index = self.plan.indices.get(pair.scene_index).map(|index| index.as_ref());
         let choose = |radius_m: f64| {
             let chooser = protocol.chooser(localizer, radius_m, index);
@@ -244,6 +249,30 @@ impl<'a> Evaluation<'a> {
         }
         results
     }
+}
+
+/// The references that are named for a query; `None` where they are to be chosen. No photo is its own reference.
+fn named(
+    protocol: &Protocol,
+    item: &RunItem<'_>,
+    localizer: &Localizer<'_>,
+    frame: usize,
+) -> Result<Option<References>, SceneError> {
+    let names: Vec<&str> = match item.references {
+        Some(names) => names.iter().map(String::as_str).collect(),
+        None => protocol.named_references().collect(),
+    };
+    if item.references.is_none() && names.is_empty() {
+        return Ok(None);
+    }
+    let mut frames = Vec::new();
+    for name in names {
+        let reference = localizer.references().find(name)?;
+        if !(localizer.is_one_drive() && reference == frame) {
+            frames.push(reference);
+        }
+    }
+    Ok(Some(frames.into()))
 }
 
 /// The result with the scenes as the run calls them.

@@ -27,6 +27,8 @@ pub struct EvaluationRequest<'a> {
     pub scenes: &'a [String],
     /// The names of the queries; all drawn frames if empty.
     pub queries: &'a [String],
+    /// The references of queries, by name, where each query has its own.
+    pub pairs: &'a BTreeMap<String, Vec<String>>,
     /// The settings, over those that the scenes have by default.
     pub protocol: &'a dyn Fn(Protocol) -> Result<Protocol, ProtocolError>,
     /// A TOML file of parameters, or `paper`.
@@ -104,12 +106,6 @@ pub enum PlanError {
 /// What an evaluation cannot be asked.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Refusal {
-    /// References that are named.
-    #[error(
-        "eval chooses references for each query: --reference takes random:K, nearest:K, matches:K or \
-         retrieve:K; `posescope run` takes frames"
-    )]
-    NamedReferences,
     /// A scene twice.
     #[error("the scene {label} is given twice, as {argument}; give it once")]
     SceneTwice {
@@ -172,17 +168,21 @@ impl EvaluationRequest<'_> {
         let defaults =
             defaults(given.preset, first.map_or("", |scene| scene.name())).at_size(&size);
         let mut protocol = (self.protocol)(defaults.clone())?;
-        if protocol.is_by_hand() {
-            return Err(Refusal::NamedReferences.into());
-        }
         // The large experiment has the fusion of a run without preset.
         let has_own_fusions = protocol.preset.is_some_and(|one| one != Preset::Large);
-        if protocol.selection().count() > 1 && !has_own_fusions {
+        let most = self.pairs.values().map(Vec::len).max().unwrap_or(protocol.reference_count());
+        if most > 1 && !has_own_fusions {
             let fusions = Fusion::all().filter(|fusion| fusion.name == "r-wavg").collect();
             protocol = (self.protocol)(Protocol { fusions, ..defaults })?;
         }
+        if !self.pairs.is_empty() {
+            protocol.select(Selection::Nearest(most));
+        }
         let draw = Draw { limit: protocol.limit, only: self.queries, seed: protocol.seed };
-        let pairs = pairs(&draw, &scenes, self.scenes, &protocol.query_scene)?;
+        let mut pairs = pairs(&draw, &scenes, self.scenes, &protocol.query_scene)?;
+        for pair in &mut pairs {
+            self.name_references(pair, &scenes, &protocol)?;
+        }
         let run = RunFile {
             schema: RUN_SCHEMA.to_owned(),
             version: env!("CARGO_PKG_VERSION").to_owned(),
@@ -195,6 +195,42 @@ impl EvaluationRequest<'_> {
             params: written(&params),
         };
         Ok(Plan { run, scenes, params, indices: Vec::new(), size })
+    }
+
+    /// Gives each query of a pair its own references, and checks those that are named for all.
+    fn name_references(
+        &self,
+        pair: &mut ScenePair,
+        scenes: &Scenes,
+        protocol: &Protocol,
+    ) -> Result<(), PlanError> {
+        let references = scenes.references[pair.scene_index].as_ref();
+        let name = |name: &String| -> Result<String, SceneError> {
+            let frame = references.find(name)?;
+            let name = references.frames()[frame].clone();
+            if references.pose(frame).is_none() {
+                let scene = references.name().to_owned();
+                return Err(SceneError::NoPose { scene, frame: name });
+            }
+            Ok(name)
+        };
+        for named in protocol.named_references() {
+            name(&named.to_owned())?;
+        }
+        if self.pairs.is_empty() {
+            return Ok(());
+        }
+        let queries = scenes.of_queries(pair);
+        let mut own = BTreeMap::new();
+        for (query, names) in self.pairs {
+            let names = names.iter().map(name).collect::<Result<Vec<_>, _>>()?;
+            own.insert(queries.find(query)?, names);
+        }
+        let of_query = |query: &String| -> Result<Vec<String>, SceneError> {
+            Ok(own.get(&queries.find(query)?).cloned().unwrap_or_default())
+        };
+        pair.references = pair.queries.iter().map(of_query).collect::<Result<_, _>>()?;
+        Ok(())
     }
 
     /// The failed queries of a run, with other settings.

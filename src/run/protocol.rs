@@ -369,6 +369,12 @@ impl Protocol {
         chosen.unwrap_or(Selection::Random(1))
     }
 
+    /// How many references each query gets at most.
+    pub fn reference_count(&self) -> usize {
+        let named = self.named_references().count();
+        if named > 0 { named } else { self.selection().count() }
+    }
+
     /// Chooses the references of each query.
     pub fn select(&mut self, selection: Selection) {
         self.references = vec![Reference::Chosen(selection)];

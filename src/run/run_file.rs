@@ -119,7 +119,7 @@ fn invalid(run: &RunFile) -> Option<(String, String)> {
     }
     for (at, pair) in run.pairs.iter().enumerate() {
         let names = [&pair.scene, &pair.query_scene].into_iter().chain(&pair.queries);
-        let mut names = names.chain(&pair.drawn);
+        let mut names = names.chain(&pair.drawn).chain(pair.references.iter().flatten());
         if let Err(message) = names.try_for_each(|name| expect_name(name)) {
             return Some((format!("pair.{at}"), message));
         }
@@ -161,6 +161,8 @@ pub struct RunItem<'a> {
     pub camera: QueryCamera,
     /// When the query was taken \[s\].
     pub time_s: Option<f64>,
+    /// Its own references, by name.
+    pub references: Option<&'a [String]>,
 }
 
 impl RunFile {
@@ -176,6 +178,7 @@ impl RunFile {
             query,
             camera: pair.cameras.get(at).copied().unwrap_or(pair.camera),
             time_s: pair.times_s.get(at).copied(),
+            references: pair.references.get(at).map(Vec::as_slice),
         })
     }
 
@@ -186,7 +189,7 @@ impl RunFile {
 
     /// The settings that every query is localised with: by radius, then by number of references.
     pub fn settings(&self) -> Vec<Setting> {
-        let most_references = self.protocol.selection().count();
+        let most_references = self.protocol.reference_count();
         let counts = match self.protocol.preset {
             Some(Preset::Multi) => 1..=most_references,
             _ => most_references..=most_references,
@@ -391,6 +394,7 @@ mod tests {
             drawn: Vec::new(),
             queries: Vec::new(),
             times_s: Vec::new(),
+            references: Vec::new(),
         };
         let numbers = |given: &[&str], pairs: &[&str]| -> Vec<Option<usize>> {
             let run = RunFile {

@@ -459,6 +459,7 @@ mod tests {
             drawn: Vec::new(),
             queries: queries.iter().map(|query| (*query).to_owned()).collect(),
             times_s: Vec::new(),
+            references: Vec::new(),
         };
         RunFile {
             schema: RUN_SCHEMA.to_owned(),

@@ -28,6 +28,9 @@ pub struct ScenePair {
     pub queries: Vec<String>,
     /// The times of the queries \[s\], if all are known.
     pub times_s: Vec<f64>,
+    /// The references of each query, if each has its own.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub references: Vec<Vec<String>>,
 }
 
 /// Intrinsics \[px\], with the centre of the top-left pixel at (0, 0).
@@ -64,6 +67,7 @@ impl ScenePair {
             cameras: those(&kept, &self.cameras),
             queries: those(&kept, &self.queries),
             times_s: those(&kept, &self.times_s),
+            references: those(&kept, &self.references),
             ..self.clone()
         }
     }

@@ -118,6 +118,27 @@ fn a_run_folder_holds_what_is_promised() {
 }
 
 #[test]
+fn named_references_are_those_of_every_query_but_themselves() {
+    let sequence = SmallSequence::of(&FRAMES);
+    let line = "eval sequences/42 --method fb --reference 3 --reference 5 --query 2 --query 3 --radius 3 \
+                --keep-failures 0 --out run";
+    sequence.run(line).ok();
+    let run = RunResults::read(&sequence.path().join("run")).expect("a run");
+    let found: Vec<(&str, Vec<&str>)> = run
+        .results
+        .iter()
+        .map(|one| (&*one.query, one.references.iter().map(String::as_str).collect()))
+        .collect();
+    assert_eq!(
+        found,
+        [("000002", vec!["000003", "000005"]), ("000003", vec!["000005"])],
+        "two are fused, and no photo is its own reference"
+    );
+    has(&sequence.text("run/run.toml"), "reference = [\"3\", \"5\"]");
+    refused(sequence.path(), "3 | eval sequences/42 --method fb --reference 77 --out other | 77");
+}
+
+#[test]
 fn threads_kills_and_shards_make_no_difference() {
     let sequence = SmallSequence::of(&FRAMES);
     let folder = |name: &str| sequence.path().join(name);

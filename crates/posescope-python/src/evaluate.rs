@@ -108,6 +108,7 @@ impl Request {
         let plan = Plan::of(&EvaluationRequest {
             scenes: &self.scenes,
             queries: &self.queries,
+            pairs: &BTreeMap::new(),
             protocol: &|defaults| self.protocol(defaults),
             config: self.config.as_deref(),
             assignments: &self.assignments,

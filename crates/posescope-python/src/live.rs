@@ -160,6 +160,7 @@ pub fn run_text(
             drawn: queries.clone(),
             queries,
             times_s: Vec::new(),
+            references: Vec::new(),
         }],
         params: params.map_err(|error: toml::de::Error| errors::internal(&error.to_string()))?,
     };

@@ -147,7 +147,7 @@ def test_each_error_has_its_class_file_and_place(tmp_path: Path) -> None:
         {"gate": "right@mi >= 0.5", "method": "fb"},
         {"radius": -1},
         {"limit": "many"},
-        {"reference": "70"},
+        {"reference": ["70", "nearest:2"]},
         {"set": "fb.ratio=7"},
         {"sweep": "gamma=0.2:1:0.1"},
         {"compute": "abacus"},

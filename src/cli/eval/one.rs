@@ -1,5 +1,6 @@
 //! One evaluation: planned, run and judged.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -93,6 +94,7 @@ fn plan(
         Ok(protocol)
     };
     Ok(Plan::of(&EvaluationRequest {
+        pairs: &BTreeMap::new(),
         scenes: &args.scenes,
         queries: &args.query,
         protocol: &protocol,
