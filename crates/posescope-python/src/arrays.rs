@@ -5,7 +5,7 @@ use posescope_core::geometry::pose_from_matrix;
 use posescope_core::image::{GrayImage, RgbImage};
 use posescope_core::{Cloud, Photo, Pose};
 use pyo3::prelude::*;
-use pyo3::types::{PyByteArray, PyBytes};
+use pyo3::types::{PyByteArray, PyBytes, PyDict, PyString};
 
 use crate::errors;
 
@@ -37,10 +37,28 @@ impl<'py> Array<'py> {
 
     /// What is wrong with it: its name, what was expected, and its dtype and shape.
     fn wrong(&self, expected: &str) -> PyErr {
+        errors::value(self.wrong_words(expected))
+    }
+
+    fn wrong_words(&self, expected: &str) -> String {
         let sides: Vec<String> = self.shape.iter().map(ToString::to_string).collect();
         let dtype = self.array.getattr("dtype").map_or("?".to_owned(), |dtype| dtype.to_string());
         let (name, shape) = (self.name, sides.join(", "));
-        errors::value(format!("{name}: {expected} expected, {dtype} of shape ({shape}) given"))
+        format!("{name}: {expected} expected, {dtype} of shape ({shape}) given")
+    }
+
+    /// What is wrong with a photo, and what makes one of it where that is known.
+    fn wrong_photo(&self) -> PyErr {
+        let words = self.wrong_words(PHOTO);
+        let remedy = match (self.element, &*self.shape) {
+            (('f', _), _) => {
+                "; if its values are from 0 to 1: (255 * photo).round().astype(numpy.uint8)"
+            }
+            (('u', 1), [_, _, 4]) => "; without its transparency: photo[..., :3]",
+            (('u', 1), [_, _, 1]) => "; photo[..., 0]",
+            _ => "",
+        };
+        errors::value(words + remedy)
     }
 
     fn is_small(&self) -> bool {
@@ -80,7 +98,7 @@ const PHOTO: &str = "uint8 of shape (H, W) or (H, W, 3)";
 
 /// A photo: uint8, H × W or H × W × 3.
 pub fn photo(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Photo> {
-    let given = Array::of(name, value)?;
+    let given = photo_array(name, value)?;
     let (width, height, has_color) = size_of_photo(&given)?;
     let bytes = given.bytes("u1")?;
     let values = bytes.as_bytes();
@@ -92,12 +110,26 @@ pub fn photo(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Photo> {
             GrayImage::from_raw(width, height, values).map(Photo::from_gray)
         }
     });
-    photo.ok_or_else(|| given.wrong(PHOTO))
+    photo.ok_or_else(|| given.wrong_photo())
+}
+
+/// A photo as an array. What is no array at all is named with what people may have meant.
+fn photo_array<'py>(name: &'py str, value: &Bound<'py, PyAny>) -> PyResult<Array<'py>> {
+    if value.is_none() {
+        return Err(errors::value(format!(
+            "{name}: {PHOTO} expected, None given; cv2.imread returns None where it finds no photo"
+        )));
+    }
+    if value.is_instance_of::<PyString>() || value.hasattr("__fspath__")? {
+        let read = "read the file first, for example by cv2.imread";
+        return Err(errors::value(format!("{name}: {PHOTO} expected, a path given; {read}")));
+    }
+    Array::of(name, value)
 }
 
 /// Checks that a value is a photo of this size, without copying it.
 pub fn check_photo(name: &str, value: &Bound<'_, PyAny>, size: (u32, u32)) -> PyResult<()> {
-    let given = Array::of(name, value)?;
+    let given = photo_array(name, value)?;
     let (width, height, _) = size_of_photo(&given)?;
     if (width, height) == size {
         return Ok(());
@@ -109,40 +141,43 @@ pub fn check_photo(name: &str, value: &Bound<'_, PyAny>, size: (u32, u32)) -> Py
 /// Width and height \[px\], and whether it has colours.
 fn size_of_photo(given: &Array<'_>) -> PyResult<(u32, u32, bool)> {
     let is_bytes = given.element == ('u', 1) && given.is_small();
-    let side = |side: usize| u32::try_from(side).map_err(|_| given.wrong(PHOTO));
+    let side = |side: usize| u32::try_from(side).map_err(|_| given.wrong_photo());
     match *given.shape {
         [height, width] if is_bytes => Ok((side(width)?, side(height)?, false)),
         [height, width, 3] if is_bytes => Ok((side(width)?, side(height)?, true)),
-        _ => Err(given.wrong(PHOTO)),
+        _ => Err(given.wrong_photo()),
     }
 }
 
-/// A cloud: float32 or float64, N × 3, in the camera's frame or, with its pose, in the world's. Points that are not
-/// finite are left out.
+/// A cloud: float32 or float64, N × 3, in the camera's frame or, with its pose, in the world's. Of N × 4, the last column
+/// is left out: scanners have the reflectance there, and homogeneous points 1. Points that are not finite are left out.
 pub fn cloud(
     name: &str,
     value: &Bound<'_, PyAny>,
     world_from_camera: Option<&Pose>,
 ) -> PyResult<Cloud> {
     let given = Array::of(name, value)?;
-    if !given.is_small()
-        || !matches!(*given.shape, [_, 3])
-        || !matches!(given.element, ('f', 4 | 8))
-    {
-        return Err(given.wrong("float32 or float64 of shape (N, 3)"));
+    let columns = match *given.shape {
+        [_, columns @ (3 | 4)] if given.is_small() && matches!(given.element, ('f', 4 | 8)) => {
+            columns
+        }
+        _ => return Err(given.wrong("float32 or float64 of shape (N, 3) or (N, 4)")),
+    };
+    fn xyz<T: Copy>(row: &[T]) -> [T; 3] {
+        [row[0], row[1], row[2]]
     }
     let is_finite = |point: &Point3<f32>| point.iter().all(|x| x.is_finite());
     let points = match world_from_camera {
         None => {
             let numbers = given.f32s()?;
-            let points = numbers.as_chunks().0.iter().copied().map(Point3::from);
+            let points = numbers.chunks_exact(columns).map(|row| Point3::from(xyz(row)));
             points.filter(is_finite).collect()
         }
         Some(pose) => {
             // Map coordinates do not fit f32, so they become the camera's before they are rounded.
             let camera_from_world = pose.inverse();
             let numbers = given.f64s()?;
-            let points = numbers.as_chunks().0.iter().copied().map(Point3::<f64>::from);
+            let points = numbers.chunks_exact(columns).map(|row| Point3::<f64>::from(xyz(row)));
             let points = points.map(|point| (camera_from_world * point).cast());
             points.filter(is_finite).collect()
         }
@@ -150,8 +185,27 @@ pub fn cloud(
     Ok(Cloud { points })
 }
 
-/// A pose: numbers, 4 × 4 or 3 × 4.
+/// A pose: numbers, 4 × 4 or 3 × 4, or what pycolmap has: a `Rigid3d` in the direction of the argument, or whatever has
+/// a `cam_from_world`, such as an `Image` or the answer of an estimator, which is inverted.
 pub fn pose(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Pose> {
+    let of_dict = match value.cast::<PyDict>() {
+        Ok(answer) => answer.get_item("cam_from_world")?,
+        Err(_) => None,
+    };
+    let camera_from_world = match of_dict {
+        None if value.hasattr("cam_from_world")? => Some(value.getattr("cam_from_world")?),
+        found => found,
+    };
+    if let Some(mut found) = camera_from_world {
+        // Older versions have the pose, newer ones a method.
+        if found.is_callable() {
+            found = found.call0()?;
+        }
+        return Ok(pose(name, &found)?.inverse());
+    }
+    if value.hasattr("rotation")? && value.hasattr("translation")? && value.hasattr("matrix")? {
+        return pose(name, &value.call_method0("matrix")?);
+    }
     let given = Array::of(name, value)?;
     if !given.has_numbers() || !matches!(*given.shape, [3 | 4, 4]) {
         return Err(given.wrong("numbers of shape (4, 4)"));

@@ -30,6 +30,8 @@ struct Request {
     scenes: Vec<String>,
     folder: PathBuf,
     queries: Vec<String>,
+    /// The references of each query, where it has its own.
+    pairs: BTreeMap<String, Vec<String>>,
     /// The options of the protocol.
     protocol: Options,
     config: Option<PathBuf>,
@@ -43,11 +45,17 @@ struct Request {
 }
 
 impl Request {
-    fn of(scene: String, folder: PathBuf, options: Options) -> PyResult<Self> {
+    fn of(
+        scene: String,
+        folder: PathBuf,
+        pairs: BTreeMap<String, Vec<String>>,
+        options: Options,
+    ) -> PyResult<Self> {
         let mut request = Self {
             scenes: vec![scene],
             folder,
-            queries: Vec::new(),
+            queries: pairs.keys().cloned().collect(),
+            pairs,
             protocol: Options::new(),
             config: None,
             assignments: Vec::new(),
@@ -108,7 +116,7 @@ impl Request {
         let plan = Plan::of(&EvaluationRequest {
             scenes: &self.scenes,
             queries: &self.queries,
-            pairs: &BTreeMap::new(),
+            pairs: &self.pairs,
             protocol: &|defaults| self.protocol(defaults),
             config: self.config.as_deref(),
             assignments: &self.assignments,
@@ -262,11 +270,12 @@ pub fn evaluate(
     py: Python<'_>,
     scene: String,
     folder: PathBuf,
+    pairs: BTreeMap<String, Vec<String>>,
     options: Options,
     threads: Option<NonZeroUsize>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Option<String>> {
-    let request = Request::of(scene, folder, options)?;
+    let request = Request::of(scene, folder, pairs, options)?;
     let counted = Progress::default();
     let mut shown = (0, 0);
     let tick = |py: Python<'_>| {

@@ -7,7 +7,7 @@ use pyo3::prelude::*;
 
 use crate::scene::{Opened, Scene};
 use crate::travel::{self, Parts, Reduced};
-use crate::{arrays, camera::Camera, errors};
+use crate::{arrays, camera, camera::Camera, errors};
 
 /// The frame of a scene that a query or a reference is.
 #[derive(Clone)]
@@ -30,7 +30,7 @@ impl Origin {
 ///
 /// Args:
 ///     photo: uint8, H × W or H × W × 3 (red, green, blue), with any strides. It is copied.
-///     camera: The camera that took it.
+///     camera: The camera that took it, also a camera of pycolmap without distortion.
 ///     name: Its name in results. Random choices derive from it, too.
 ///     truth: The true `world_from_camera`, 4 × 4, where it is known; results then have a grade and an error.
 ///
@@ -52,10 +52,11 @@ impl Query {
     #[pyo3(signature = (photo, camera, name = "query", truth = None))]
     fn new(
         photo: &Bound<'_, PyAny>,
-        camera: &Camera,
+        camera: &Bound<'_, PyAny>,
         name: &str,
         truth: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
+        let camera = camera::taken("camera", camera)?;
         let photo = arrays::photo("photo", photo)?;
         let query = posescope_core::Query::new(name, photo, camera.intrinsics);
         Ok(Self {
@@ -111,9 +112,9 @@ impl Query {
 ///
 /// Args:
 ///     photo: uint8, H × W or H × W × 3 (red, green, blue), with any strides. It is copied.
-///     camera: The camera that took it.
-///     world_from_camera: Its pose, 4 × 4 [m]. Camera frame: x right, y down, z forward.
-///     cloud: Points, float32 or float64, N × 3 [m]. Points that are not finite are left out.
+///     camera: The camera that took it, also a camera of pycolmap without distortion.
+///     world_from_camera: Its pose, 4 × 4 [m], or an `Image` of pycolmap. Camera frame: x right, y down, z forward.
+///     cloud: Points, float32 or float64, N × 3 [m]; a fourth column is left out, and so are points that are not finite.
 ///     cloud_frame: The frame of the points, `camera` or `world`.
 ///     name: Its name in results. Random choices derive from it, too.
 ///
@@ -133,12 +134,13 @@ impl Reference {
     #[pyo3(signature = (photo, camera, world_from_camera, cloud, cloud_frame = "camera", name = "reference"))]
     fn from_arrays(
         photo: &Bound<'_, PyAny>,
-        camera: &Camera,
+        camera: &Bound<'_, PyAny>,
         world_from_camera: &Bound<'_, PyAny>,
         cloud: &Bound<'_, PyAny>,
         cloud_frame: &str,
         name: &str,
     ) -> PyResult<Self> {
+        let camera = camera::taken("camera", camera)?;
         let photo = arrays::photo("photo", photo)?;
         let pose = arrays::pose("world_from_camera", world_from_camera)?;
         let cloud = match cloud_frame {
@@ -213,7 +215,7 @@ impl Reference {
 #[pyfunction]
 pub fn restored_query(
     photo: &Bound<'_, PyAny>,
-    camera: &Camera,
+    camera: &Bound<'_, PyAny>,
     name: &str,
     truth: Option<Parts>,
 ) -> PyResult<Query> {

@@ -119,6 +119,8 @@ pub struct Job {
     pub seed: u64,
     /// The largest error of a right pose.
     pub right: Tolerance,
+    /// How many variations of a wrong result are tried.
+    pub explain: usize,
     /// Poses and matches of another system.
     pub foreign: Foreign,
 }
@@ -135,7 +137,7 @@ impl Job {
     /// A frame that cannot be read, and a run that its observer stopped.
     pub fn run(&self, observer: &mut dyn LocalizeObserver) -> Result<QueryResult, LocalizeError> {
         // Of frames that Python holds nothing is kept, so that a result stays small.
-        self.run_with(&self.frames.store.clone().unwrap_or_default(), observer)
+        self.run_with(&self.frames.store.clone().unwrap_or_default(), self.explain, observer)
     }
 
     /// Localises the query as if nothing were cached: the events are those of the command.
@@ -143,19 +145,21 @@ impl Job {
     /// # Errors
     /// Those of [`Self::run`].
     pub fn watch(&self, observer: &mut dyn LocalizeObserver) -> Result<QueryResult, LocalizeError> {
-        self.run_with(&Arc::default(), observer)
+        self.run_with(&Arc::default(), 0, observer)
     }
 
     fn run_with(
         &self,
         store: &Arc<FrameStore>,
+        explain: usize,
         observer: &mut dyn LocalizeObserver,
     ) -> Result<QueryResult, LocalizeError> {
         let Frames { references, queries, query, .. } = &self.frames;
         let scenes = (store.of(references), store.of(queries));
         let localizer = Localizer::with_cached_scenes(scenes, &self.params, self.seed)
             .with_foreign(self.foreign.clone())
-            .with_tolerance(self.right);
+            .with_tolerance(self.right)
+            .explaining(explain);
         let mut found = None;
         localizer.localize(
             0,

@@ -10,6 +10,7 @@ mod command;
 mod detached;
 mod errors;
 mod evaluate;
+mod folder;
 mod frames;
 mod held;
 mod job;
@@ -31,6 +32,7 @@ fn extension(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<frames::Reference>()?;
     module.add_class::<scene::Scene>()?;
     module.add_class::<localize::Answer>()?;
+    module.add_function(wrap_pyfunction!(camera::camera_of, module)?)?;
     module.add_function(wrap_pyfunction!(camera::restored_camera, module)?)?;
     module.add_function(wrap_pyfunction!(frames::restored_query, module)?)?;
     module.add_function(wrap_pyfunction!(frames::restored_reference, module)?)?;
@@ -46,12 +48,22 @@ fn extension(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(detached::panic, module)?)?;
     module.add_function(wrap_pyfunction!(live::check_photo, module)?)?;
     module.add_function(wrap_pyfunction!(live::save_photo, module)?)?;
+    module.add_function(wrap_pyfunction!(live::pose_parts, module)?)?;
+    module.add_function(wrap_pyfunction!(live::pose_of, module)?)?;
+    module.add_function(wrap_pyfunction!(live::reference_parts, module)?)?;
     module.add_function(wrap_pyfunction!(live::check_matches, module)?)?;
     module.add_function(wrap_pyfunction!(live::save_matches, module)?)?;
-    module.add_function(wrap_pyfunction!(live::frame_name, module)?)?;
+    module.add_function(wrap_pyfunction!(live::save_cloud, module)?)?;
+    module.add_function(wrap_pyfunction!(live::fingerprint, module)?)?;
+    module.add_function(wrap_pyfunction!(live::alone, module)?)?;
+    module.add_function(wrap_pyfunction!(live::reference_name, module)?)?;
     module.add_function(wrap_pyfunction!(live::nearest, module)?)?;
     module.add_function(wrap_pyfunction!(live::unjudged, module)?)?;
-    module.add_function(wrap_pyfunction!(live::run_text, module)?)?;
-    module.add_function(wrap_pyfunction!(live::summarise, module)?)?;
+    module.add_function(wrap_pyfunction!(folder::check_judging, module)?)?;
+    module.add_function(wrap_pyfunction!(folder::run_text, module)?)?;
+    module.add_function(wrap_pyfunction!(folder::summarise, module)?)?;
+    module.add_function(wrap_pyfunction!(folder::recording_files, module)?)?;
+    module.add_function(wrap_pyfunction!(folder::exported, module)?)?;
+    module.add_function(wrap_pyfunction!(folder::query_facts, module)?)?;
     Ok(())
 }

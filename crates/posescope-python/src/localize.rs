@@ -193,10 +193,14 @@ struct Asked<'a> {
     estimate: Option<Pose>,
     matches: Option<Vec<FoundMatches>>,
     params: Vec<(String, String)>,
-    radius: Option<f64>,
+    judging: Judging,
     fusion: Option<&'a str>,
     seed: u64,
 }
+
+/// The radius of the search \[m\], when a pose is right, and how many variations of a wrong one are tried.
+#[derive(Clone, FromPyObject)]
+pub struct Judging(pub Option<f64>, pub Option<String>, pub usize);
 
 impl Asked<'_> {
     /// Defaults of the scene's size, then what is given.
@@ -206,12 +210,16 @@ impl Asked<'_> {
         }
         let frames = Frames::of(self.query, &self.references, self.truth.as_ref());
         let frames = frames.map_err(|error| errors::array(&error))?;
-        let protocol = Protocol::default().at_size(&frames.size);
+        let mut protocol = Protocol::default().at_size(&frames.size);
+        let Judging(radius, right, explain) = &self.judging;
+        if let Some(right) = right {
+            protocol.right = right.parse().map_err(|why| errors::value(format!("right: {why}")))?;
+        }
         let mut params = Params::at_scale(frames.size.scale);
         for (key, value) in &self.params {
             params.set(key, value).map_err(errors::value)?;
         }
-        let radius_m = self.radius.unwrap_or_else(|| protocol.radius_m());
+        let radius_m = radius.unwrap_or_else(|| protocol.radius_m());
         if !(radius_m.is_finite() && radius_m > 0.0) {
             return Err(errors::value(format!(
                 "radius: a finite number above 0 expected, {radius_m} given"
@@ -233,6 +241,7 @@ impl Asked<'_> {
             params,
             seed: self.seed,
             right: protocol.right,
+            explain: *explain,
         })
     }
 
@@ -267,7 +276,7 @@ fn threads_of(threads: Option<usize>) -> PyResult<Option<NonZeroUsize>> {
 
 /// Localises a query, unless the result came from another process.
 #[pyfunction]
-#[pyo3(signature = (query, references, method, params, radius, matches, fusion, seed, threads, before = None))]
+#[pyo3(signature = (query, references, method, params, judging, matches, fusion, seed, threads, before = None))]
 #[expect(clippy::too_many_arguments, reason = "Python names them")]
 pub fn localize(
     py: Python<'_>,
@@ -275,7 +284,7 @@ pub fn localize(
     references: Vec<PyRef<'_, Reference>>,
     method: &str,
     params: Vec<(String, String)>,
-    radius: Option<f64>,
+    judging: Judging,
     matches: Option<Vec<GivenMatches<'_>>>,
     fusion: Option<&str>,
     seed: u64,
@@ -293,7 +302,7 @@ pub fn localize(
         estimate: None,
         matches: all_found(matches)?,
         params,
-        radius,
+        judging,
         fusion,
         seed,
     };
@@ -302,7 +311,7 @@ pub fn localize(
 
 /// What the verdicts say of a pose, unless the result came from another process.
 #[pyfunction]
-#[pyo3(signature = (query, references, world_from_camera, truth, params, name, threads, before = None))]
+#[pyo3(signature = (query, references, world_from_camera, truth, params, judging, name, threads, before = None))]
 #[expect(clippy::too_many_arguments, reason = "Python names them")]
 pub fn diagnose(
     py: Python<'_>,
@@ -311,6 +320,7 @@ pub fn diagnose(
     world_from_camera: &Bound<'_, PyAny>,
     truth: Option<&Bound<'_, PyAny>>,
     params: Vec<(String, String)>,
+    judging: Judging,
     name: &str,
     threads: Option<usize>,
     before: Option<Before>,
@@ -328,7 +338,7 @@ pub fn diagnose(
         estimate: Some(arrays::pose("world_from_camera", world_from_camera)?),
         matches: None,
         params,
-        radius: None,
+        judging,
         fusion: None,
         seed: 0,
     };

@@ -1,10 +1,13 @@
 //! Scenes.
 
 use std::collections::BTreeMap;
+use std::path::PathBuf;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError, Weak};
 
 use posescope::scene::{FrameStore, Scene as _, SceneError, SceneSize};
+use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
+use pyo3::types::PyBool;
 
 use crate::detached::detached;
 use crate::errors;
@@ -31,6 +34,12 @@ pub struct Opened {
 }
 
 impl Opened {
+    /// Whether it is the scene of the same path.
+    pub fn is_same(&self, other: &Self) -> bool {
+        std::ptr::eq(self, other)
+            || (&self.argument, &self.format) == (&other.argument, &other.format)
+    }
+
     /// How large the scene is.
     pub fn size(&self) -> SceneSize {
         *self.size.get_or_init(|| SceneSize::of(self.scene.as_ref()))
@@ -71,19 +80,56 @@ impl Scene {
     }
 }
 
+/// The name of a frame: a text, a path, a whole number, or what has a `name`, as queries and references do.
+pub fn called(name: &Bound<'_, PyAny>) -> PyResult<String> {
+    if let Ok(text) = name.extract::<String>() {
+        return Ok(text);
+    }
+    if let Ok(path) = name.extract::<PathBuf>() {
+        return Ok(path.to_string_lossy().into_owned());
+    }
+    // True is a number in Python.
+    if let Ok(number) = name.extract::<u64>()
+        && !name.is_instance_of::<PyBool>()
+    {
+        return Ok(number.to_string());
+    }
+    if let Some(text) = name.getattr_opt("name")?
+        && let Ok(text) = text.extract::<String>()
+    {
+        return Ok(text);
+    }
+    let given = name.get_type().fully_qualified_name()?.to_string();
+    let words = format!("name: the name of a frame or its number expected, {given} given");
+    Err(PyTypeError::new_err(words))
+}
+
 #[pymethods]
 impl Scene {
     /// Opens a scene.
     ///
     /// Args:
-    ///     path: A folder or file, or `street` or `street:CONDITION`, as the command takes it.
+    ///     path: A folder or file, or `street` or `street:CONDITION`, as the command takes it. Or a `Reconstruction` of
+    ///         pycolmap, which is written to a temporary folder of this process.
     ///     format: The name of the format, where it is not recognised.
+    ///     images: The folder of the photos of a `Reconstruction`.
     ///
     /// Raises:
     ///     InputError: There is no scene, or it cannot be read.
     #[staticmethod]
-    #[pyo3(signature = (path, format = None))]
-    fn open(py: Python<'_>, path: std::path::PathBuf, format: Option<&str>) -> PyResult<Self> {
+    #[pyo3(signature = (path, format = None, images = None))]
+    fn open(
+        py: Python<'_>,
+        path: &Bound<'_, PyAny>,
+        format: Option<&str>,
+        images: Option<PathBuf>,
+    ) -> PyResult<Self> {
+        let path: PathBuf = if path.hasattr("write_text")? && !path.hasattr("__fspath__")? {
+            let written = py.import("posescope._neighbours")?.getattr("written_model")?;
+            written.call1((path, images))?.extract()?
+        } else {
+            path.extract()?
+        };
         Self::of(py, &path.to_string_lossy(), format)
     }
 
@@ -122,12 +168,12 @@ impl Scene {
     /// A frame as a query, with its true pose where the scene knows it.
     ///
     /// Args:
-    ///     name: The frame's name; leading zeros may be left out.
+    ///     name: The frame's name, whose leading zeros may be left out; a whole number; or a frame with a `name`.
     ///
     /// Raises:
     ///     InputError: There is no such frame, or its photo cannot be read.
-    fn query(&self, py: Python<'_>, name: &str) -> PyResult<Query> {
-        let origin = self.find(name)?;
+    fn query(&self, py: Python<'_>, name: &Bound<'_, PyAny>) -> PyResult<Query> {
+        let origin = self.find(&called(name)?)?;
         let read = detached(py, None, |_| {
             let Origin { opened, frame } = &origin;
             opened.store.of(&opened.scene).query(*frame)
@@ -140,12 +186,12 @@ impl Scene {
     /// A frame as a reference: photo, camera, pose and cloud.
     ///
     /// Args:
-    ///     name: The frame's name; leading zeros may be left out.
+    ///     name: The frame's name, whose leading zeros may be left out; a whole number; or a frame with a `name`.
     ///
     /// Raises:
     ///     InputError: There is no such frame, it has no pose or no cloud, or a file cannot be read.
-    fn reference(&self, py: Python<'_>, name: &str) -> PyResult<Reference> {
-        let origin = self.find(name)?;
+    fn reference(&self, py: Python<'_>, name: &Bound<'_, PyAny>) -> PyResult<Reference> {
+        let origin = self.find(&called(name)?)?;
         let read: Result<_, SceneError> = detached(py, None, |_| {
             let Origin { opened, frame } = &origin;
             opened.store.of(&opened.scene).reference(*frame)

@@ -10,6 +10,18 @@ import pytest
 import posescope
 
 
+def pytest_configure(config: pytest.Config) -> None:
+    config.addinivalue_line("markers", "slow: takes minutes; run it with -m slow")
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: "list[pytest.Item]") -> None:
+    if not config.getoption("-m"):
+        skip = pytest.mark.skip(reason="slow: run it with -m slow")
+        for item in items:
+            if item.get_closest_marker("slow"):
+                item.add_marker(skip)
+
+
 @pytest.fixture(scope="session")
 def street() -> posescope.Scene:
     return posescope.Scene.street()

@@ -99,7 +99,7 @@ def test_a_cloud_may_be_in_the_world(camera: posescope.Camera) -> None:
 @pytest.mark.parametrize(
     ("cloud", "words"),
     [
-        (np.ones((3, 7)), "cloud: float32 or float64 of shape (N, 3) expected, float64 of shape (3, 7) given"),
+        (np.ones((3, 7)), "cloud: float32 or float64 of shape (N, 3) or (N, 4) expected, float64 of shape (3, 7) given"),
         (np.ones((7, 3), np.int32), "int32 of shape (7, 3) given"),
         (np.ones((7, 3), np.float16), "float16 of shape (7, 3) given"),
         (np.ones((7, 3), complex), "complex128 of shape (7, 3) given"),

@@ -76,7 +76,7 @@ def test_an_evaluation_is_a_run(tmp_path: Path, capfd: pytest.CaptureFixture[str
     assert {row["method"] for row in run.rows()} == {"fb"} and len(run.rows()) == 2
     assert sum(run.grades()["fb"].values()) == 2
     flat = run.results("list")
-    assert "confidence.probability" in flat[0] and "verdicts" in flat[0]
+    assert "confidence.probability" in flat[0] and "codes" in flat[0]
     assert run.report().read_text().startswith("<!DOCTYPE html>")
     assert run.summary()["groups"]
     assert "<table>" in run._repr_html_()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import collections
+from pathlib import Path
 from typing import Any, Callable, List
 
 import numpy as np
@@ -118,3 +119,33 @@ def test_a_thousand_random_arguments_crash_nothing() -> None:
     # Some of each went through, or the test tests nothing.
     assert seen["ValueError"] > 100
     assert seen["no pose"] + seen["unmeasured"] + seen["wrong"] + seen["right"] > 100, seen
+
+
+def test_a_thousand_random_queries_cost_a_recording_nothing(tmp_path: Path) -> None:
+    camera = posescope.Camera(30.0, 30.0, 15.5, 11.5, SIZE[1], SIZE[0])
+    pixels = np.random.default_rng(0).integers(0, 256, SIZE, np.uint8)
+    cloud = np.random.default_rng(1).normal(0, 5, (40, 3)) + [0, 0, 9]
+    reference = posescope.Reference(pixels, camera, np.eye(4), cloud)
+    seen: "collections.Counter[str]" = collections.Counter()
+    with posescope.record(tmp_path / "live", keep=2, waiting=2) as log:
+        for seed in range(1000):
+            draw = Draw(seed)
+            matches = draw.matches()
+            inliers = draw.of([lambda: None, lambda: [0], lambda: np.ones(3, bool), draw.garbage])
+            named = {
+                "matches": None if callable(matches) else matches,
+                "inliers": inliers if matches is not None else None,
+                "reference": draw.mostly([lambda: reference, lambda: None]),
+                "truth": draw.mostly([lambda: None, draw.pose]),
+                "name": draw.mostly([lambda: None, lambda: f"a/{seed}", lambda: "twice"]),
+                "time": draw.mostly([lambda: None, lambda: float(seed)]),
+            }
+            try:
+                log.query(draw.photo(), draw.mostly([lambda: camera]), draw.pose(), **named)
+                seen["taken"] += 1
+            except DOCUMENTED as error:
+                seen[type(error).__name__] += 1
+    assert seen["taken"] > 50 and seen["ValueError"] > 200, seen
+    run = posescope.Run.open(tmp_path / "live")
+    assert len({row["query"] for row in run.rows()}) == seen["taken"]
+    assert run.summary()["groups"] and run.report().stat().st_size > 10_000

@@ -73,7 +73,12 @@ def test_matches_give_verdicts_of_their_own_and_are_stored(street: posescope.Sce
         ("none", "live", "no pose"),
         ("none", "fb", "right"),
     ]
-    assert [row[:2] for row in rows[4:]] == [("bad", "live"), ("bad", "fb"), ("without", "live")]
+    assert [row[:2] for row in rows[4:]] == [
+        ("bad", "live"),
+        ("bad", "fb"),
+        ("without", "live"),
+        ("without", "fb"),
+    ]
     assert rows[4][2] == "wrong" and rows[5][2] != "right"
     assert run.rows()[5]["diagnosis"][0]["code"].startswith("R")
     assert sorted(file.name for file in (folder / "failures").iterdir()) == ["bad-fb.rrd", "bad-live.rrd"]
@@ -125,7 +130,7 @@ def test_wrong_arguments_are_named_at_once(street: posescope.Scene, tmp_path: Pa
         with pytest.raises(ValueError, match="reference"):
             log.query(query.photo, query.camera, query.truth, matches=(np.zeros((0, 2)),) * 2)
         with pytest.raises(ValueError, match="name"):
-            log.query(query.photo, query.camera, query.truth, name="a/b")
+            log.query(query.photo, query.camera, query.truth, name="a\\b")
         with pytest.raises(posescope.InputError, match="900"):
             log.query(query.photo, query.camera, query.truth, reference="900")
         points = np.zeros((3, 2))

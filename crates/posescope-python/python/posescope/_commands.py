@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+import html
 import importlib
 import os
 from dataclasses import dataclass
-from typing import Any, Callable, Dict, List, Optional, Sequence, Tuple, Union
+from pathlib import Path
+from typing import Any, Callable, Dict, List, Mapping, Optional, Sequence, Tuple, Union
 
 import numpy as np
 from numpy.typing import NDArray
 
-from . import _posescope
-from ._errors import GateError
+from . import _notebook, _posescope
+from ._errors import InputError
 from ._posescope import Scene
-from ._run import Run
+from ._run import GateError, Run
 
+Pairs = Union[str, "os.PathLike[str]", Sequence[Sequence[Any]], Mapping[Any, Sequence[Any]]]
+"""The references of queries: a file, pairs, or lists by query."""
 _Option = Union[None, bool, str, int, float, "os.PathLike[str]", Sequence[Any]]
 
 
@@ -23,6 +27,8 @@ def evaluate(
     out: "str | os.PathLike[str]",
     threads: Optional[int] = None,
     progress: Optional[bool] = None,
+    pairs: Optional[Pairs] = None,
+    references: "Optional[Sequence[Any]]" = None,
     **options: _Option,
 ) -> Run:
     """Localises many queries into a run folder, as ``posescope eval`` does.
@@ -32,6 +38,9 @@ def evaluate(
         out: The run folder; it must not hold anything yet.
         threads: The number of threads; by default one per core.
         progress: Whether to show a progress bar of tqdm. By default where tqdm is installed.
+        pairs: The references of each query, whose queries are evaluated: hloc's file of pairs (``query reference`` in
+            each line), a list of such pairs, or a dict of lists. Several references are fused.
+        references: The references of all queries: names of frames, their numbers, or frames with a ``name``.
         options: The options of ``posescope eval`` with ``_`` for ``-``, such as ``limit=40``, ``method="fb,mi"``,
             ``query_scene="street:night"``, ``gate=["right@fb >= 0.6"]`` or ``set=["fb.ratio=0.7"]``, but for ``sweep``
             and ``rerun_failed``. A list repeats an option; True gives one without a value. ``posescope eval --help``
@@ -48,11 +57,58 @@ def evaluate(
     """
     place = scene.path if isinstance(scene, Scene) else os.fspath(scene)
     show = _progress_bar(progress)
-    failed = _posescope.evaluate(place, os.fspath(out), _options(options), threads, show)
+    if references is not None:
+        if pairs is not None or "reference" in options:
+            raise ValueError("references: either references, pairs or reference expected")
+        options["reference"] = [_named(one) for one in references]
+    failed = _posescope.evaluate(place, os.fspath(out), _pairs_of(pairs), _options(options), threads, show)
     run = Run.open(out)
     if failed is not None:
         raise GateError(failed, run)
     return run
+
+
+def _named(frame: Any) -> str:
+    """The name of a frame that has one."""
+    return str(getattr(frame, "name", frame))
+
+
+def _pairs_of(pairs: Optional[Pairs]) -> Dict[str, List[str]]:
+    """The references of each query."""
+    if pairs is None:
+        return {}
+    if isinstance(pairs, Mapping):
+        found = {_named(query): [_named(one) for one in references] for query, references in pairs.items()}
+    else:
+        listed: Sequence[Any]
+        if isinstance(pairs, (str, os.PathLike)):
+            listed = _pairs_in(Path(pairs))
+        else:
+            listed = pairs
+        found = {}
+        for pair in listed:
+            if isinstance(pair, str) or len(pair) != 2:
+                raise ValueError(f"pairs: pairs of a query and a reference expected, {pair!r} given")
+            found.setdefault(_named(pair[0]), []).append(_named(pair[1]))
+    if not found:
+        raise ValueError("pairs: at least one pair expected, none given")
+    return found
+
+
+def _pairs_in(file: Path) -> List[List[str]]:
+    """The pairs of a file of hloc."""
+    try:
+        lines = file.read_text(encoding="utf-8").splitlines()
+    except OSError as error:
+        raise InputError(str(file), "", error.strerror or str(error)) from error
+    pairs: List[List[str]] = []
+    for number, line in enumerate(lines, 1):
+        words = line.split()
+        if len(words) not in (0, 2):
+            raise InputError(str(file), f"line {number}", f"`query reference` expected, {len(words)} words found")
+        if words:
+            pairs.append(words)
+    return pairs
 
 
 def _options(options: "dict[str, _Option]") -> Dict[str, List[str]]:
@@ -91,7 +147,7 @@ def _progress_bar(wanted: Optional[bool]) -> "Optional[Callable[[int, int], None
     return show
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Examination:
     """What ``doctor`` finds in a scene. In a notebook it shows itself."""
 
@@ -118,6 +174,13 @@ class Examination:
     def __str__(self) -> str:
         return self.text
 
+    def __repr__(self) -> str:
+        found = self.answer if self.mistake is None else f"{self.answer}: {self.mistake}"
+        return f"<Examination {found}, {len(self.remarks)} remarks>"
+
+    def _repr_html_(self) -> str:
+        return _shown(self.text, self.picture)
+
 
 def doctor(scene: "Scene | str | os.PathLike[str]") -> Examination:
     """Checks that the photos, poses and clouds of a scene fit together, as ``posescope doctor`` does.
@@ -135,9 +198,9 @@ def doctor(scene: "Scene | str | os.PathLike[str]") -> Examination:
     return Examination(mistake=mistake, remedy=remedy, **found)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Calibration:
-    """How far camera and scanner are from where a scene says.
+    """How far camera and scanner are from where a scene says. In a notebook it shows itself.
 
     Values are pairs: what was found, and half of the interval that holds the true value with 90 %. They are ``None``
     where the calibration cannot be judged.
@@ -166,6 +229,18 @@ class Calibration:
 
     def __str__(self) -> str:
         return self.text
+
+    def __repr__(self) -> str:
+        return f"<Calibration {self.answer}, {self.frames} frames>"
+
+    def _repr_html_(self) -> str:
+        return _shown(self.text, self.picture)
+
+
+def _shown(text: str, picture: Optional[NDArray[np.uint8]]) -> str:
+    """A text with its picture, for a notebook."""
+    drawn = "" if picture is None else _notebook.image(picture, "what was compared")
+    return f"<div><pre>{html.escape(text)}</pre>{drawn}</div>"
 
 
 def calibration(scene: "Scene | str | os.PathLike[str]") -> Calibration:

@@ -1,11 +1,6 @@
-"""The exceptions of posescope."""
+"""The exceptions of posescope that its extension raises."""
 
 from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from ._run import Run
 
 
 class InputError(Exception):
@@ -29,19 +24,3 @@ class InputError(Exception):
 
 class InternalError(RuntimeError):
     """A bug of posescope. The message says where it happened."""
-
-
-class GateError(Exception):
-    """A gate of an evaluation failed.
-
-    Attributes:
-        run: The run, which is complete.
-    """
-
-    def __init__(self, message: str, run: "Run") -> None:
-        # With both, the error can be pickled: a pool of processes passes it on.
-        super().__init__(message, run)
-        self.run = run
-
-    def __str__(self) -> str:
-        return str(self.args[0])

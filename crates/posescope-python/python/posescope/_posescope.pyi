@@ -36,7 +36,7 @@ class Camera:
 
 class Query:
     def __new__(
-        cls, photo: ArrayLike, camera: Camera, name: str = "query", truth: Optional[ArrayLike] = None
+        cls, photo: ArrayLike, camera: Any, name: str = "query", truth: Optional[Any] = None
     ) -> Query: ...
     @property
     def name(self) -> str: ...
@@ -51,8 +51,8 @@ class Reference:
     def __new__(
         cls,
         photo: ArrayLike,
-        camera: Camera,
-        world_from_camera: ArrayLike,
+        camera: Any,
+        world_from_camera: Any,
         cloud: ArrayLike,
         cloud_frame: str = "camera",
         name: str = "reference",
@@ -70,7 +70,9 @@ class Reference:
 
 class Scene:
     @staticmethod
-    def open(path: str | os.PathLike[str], format: Optional[str] = None) -> Scene: ...
+    def open(
+        path: Any, format: Optional[str] = None, images: Optional[str | os.PathLike[str]] = None
+    ) -> Scene: ...
     @staticmethod
     def street(condition: Optional[str] = None) -> Scene: ...
     @property
@@ -79,8 +81,8 @@ class Scene:
     def frames(self) -> List[str]: ...
     @property
     def path(self) -> str: ...
-    def query(self, name: str) -> Query: ...
-    def reference(self, name: str) -> Reference: ...
+    def query(self, name: Any) -> Query: ...
+    def reference(self, name: Any) -> Reference: ...
     def __len__(self) -> int: ...
 
 class Answer:
@@ -95,7 +97,10 @@ class Answer:
 
 _OneMatches = Tuple[Any, Any, Any]
 _Matches = Sequence[_OneMatches]
+_Parts = Tuple[float, float, float, float, float, float, float]
+_Judging = Tuple[Optional[float], Optional[str], int]
 
+def camera_of(value: Any) -> Camera: ...
 def restored_camera(
     fx: float, fy: float, cx: float, cy: float, width: int, height: int, pixel_center: float
 ) -> Camera: ...
@@ -111,7 +116,7 @@ def localize(
     references: Sequence[Reference],
     method: str,
     params: Sequence[Tuple[str, str]],
-    radius: Optional[float],
+    judging: _Judging,
     matches: Optional[_Matches],
     fusion: Optional[str],
     seed: int,
@@ -124,6 +129,7 @@ def diagnose(
     world_from_camera: ArrayLike,
     truth: Optional[ArrayLike],
     params: Sequence[Tuple[str, str]],
+    judging: _Judging,
     name: str,
     threads: Optional[int],
     before: Optional[Tuple[str, float]] = None,
@@ -134,6 +140,7 @@ def main(arguments: Sequence[str]) -> int: ...
 def evaluate(
     scene: str,
     folder: str,
+    pairs: Dict[str, List[str]],
     options: Dict[str, List[str]],
     threads: Optional[int],
     progress: Optional[Callable[[int, int], None]],
@@ -141,28 +148,48 @@ def evaluate(
 def doctor(scene: Scene) -> Dict[str, Any]: ...
 def calibration(scene: Scene) -> Dict[str, Any]: ...
 def write_report(folder: str) -> str: ...
-def check_photo(photo: ArrayLike, camera: Camera) -> None: ...
+def check_photo(photo: ArrayLike, camera: Any) -> None: ...
 def save_photo(photo: ArrayLike, path: str) -> None: ...
+def pose_parts(name: str, pose: Any) -> _Parts: ...
+def pose_of(parts: _Parts) -> NDArray[np.float64]: ...
+def reference_parts(reference: Reference) -> _Parts: ...
 def check_matches(matches: _OneMatches) -> None: ...
-def save_matches(scene: Scene, folder: str, query: str, reference: str, matches: _OneMatches) -> None: ...
-def frame_name(scene: Scene, name: str) -> str: ...
-def nearest(scene: Scene, world_from_camera: ArrayLike) -> Optional[str]: ...
+def save_matches(
+    scene: Optional[Scene], folder: str, query: str, reference: str, matches: _OneMatches
+) -> None: ...
+def save_cloud(reference: Reference, path: str) -> None: ...
+def fingerprint(reference: Reference) -> int: ...
+def alone(reference: Reference) -> Reference: ...
+def reference_name(scene: Scene, reference: Any) -> str: ...
+def nearest(scene: Scene, pose: _Parts) -> Optional[str]: ...
 def unjudged(
-    scene: Scene,
-    query_scene: str,
-    query: str,
+    scene: Optional[Scene],
+    query: Tuple[str, str],
     method: str,
-    world_from_camera: Optional[ArrayLike],
-    truth: Optional[ArrayLike],
+    pose: Optional[_Parts],
+    truth: Optional[_Parts],
+    right: Optional[str],
+    missing: Optional[str] = None,
+    unreadable: Optional[str] = None,
+    bug: Optional[str] = None,
 ) -> str: ...
+def check_judging(
+    scene: Optional[Scene], method: str, radius: Optional[float], right: Optional[str]
+) -> None: ...
 def run_text(
-    scene: Scene,
+    scene: Optional[Scene],
     query_scene: str,
-    query_folder: str,
+    folder: str,
     method: str,
-    estimates: str,
-    matches: Optional[str],
-    camera: Camera,
-    queries: Sequence[str],
+    judging: _Judging,
+    has_matches: bool,
+    queries: Sequence[Tuple[str, Camera, Optional[float]]],
 ) -> str: ...
-def summarise(folder: str) -> None: ...
+def summarise(folder: str, gates: Sequence[str] = ...) -> Optional[str]: ...
+def recording_files(folder: str, results: Sequence[Tuple[str, str]]) -> List[Optional[str]]: ...
+def exported(
+    folder: str, format: str, method: Optional[str], grade: Optional[str]
+) -> List[Tuple[str, str]]: ...
+def query_facts(
+    folder: str,
+) -> Dict[Tuple[str, str], Tuple[Optional[_Parts], Optional[float]]]: ...

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import html
-import importlib
 import json
 import math
 import os
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Dict, List, Optional, Tuple
+from typing import TYPE_CHECKING, Any, Dict, List, Optional, Tuple, Union
 
 import numpy as np
 
-from . import _notebook
+from . import _notebook, _posescope
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -166,9 +165,22 @@ class Result:
 
     @property
     def counts(self) -> Optional[Dict[str, int]]:
-        """Where the features went, from ``query_keypoints`` to ``inliers``; None without features."""
-        counts = self._row["counts"]
-        return None if counts is None else dict(counts)
+        """Where the features went, from ``query_keypoints`` to ``inliers``; None without features.
+
+        Where several references were fused, the sum over all of them.
+        """
+        all_counts = [self._row["counts"], *(one["counts"] for one in self.per_reference)]
+        known = [counts for counts in all_counts if counts is not None]
+        if not known:
+            return None
+        return {name: sum(counts[name] for counts in known) for name in known[0]}
+
+    @property
+    def explanation(self) -> Optional[Dict[str, Any]]:
+        """What was tried to make a wrong pose right, where ``explain`` asked for it: what ``helped``, each with its
+        ``args`` and ``error``, how many ``runs`` there were, and whether all was tried (``complete``)."""
+        found: Optional[Dict[str, Any]] = self._row.get("explanation")
+        return found
 
     @property
     def cost(self) -> Optional[Dict[str, Any]]:
@@ -212,6 +224,28 @@ class Result:
         """
         return [json.loads(line) for line in self._answer.events().splitlines()]
 
+    def inlier_mask(self) -> "Union[None, NDArray[np.bool_], List[NDArray[np.bool_]]]":
+        """Which of the matches that were given to :func:`localize` are inliers, in their order; None without matches.
+
+        Where several references were fused, a list with one mask for each. Localises again, which gives the same
+        result.
+        """
+        given = self._matches()
+        if given is None:
+            return None
+        events = self.events()
+        alone = [one["references"][0] for one in self.per_reference] or self.references
+        masks = [
+            _mask([event for event in events if event["reference"] == name], matches)
+            for name, matches in zip(alone, given)
+        ]
+        return masks if len(given) > 1 else masks[0]
+
+    def _matches(self) -> "Optional[List[Any]]":
+        """The matches that were given, one entry per reference."""
+        function, arguments = self._asked
+        return arguments[5] if function == "localize" else None
+
     def save(self, path: "str | os.PathLike[str]") -> None:
         """Saves a recording (``.rrd``) for the Rerun viewer 0.36. Localises again, which gives the same result.
 
@@ -226,7 +260,7 @@ class Result:
         Raises:
             ImportError: ``rerun-sdk[notebook]`` is not installed; the message says how to install it.
         """
-        return _notebook.show(self)
+        return _notebook.show(self.save)
 
     def proof(self) -> Optional[Tuple[str, str]]:
         """The picture that proves the first verdict or shows what decided: a data URI, and what it shows.
@@ -239,8 +273,7 @@ class Result:
         return self._proof
 
     def __reduce__(self) -> Tuple[Any, ...]:
-        travel = importlib.import_module("posescope._travel")
-        return travel.result, (self._asked, self._json, self.seconds, self._from_matches)
+        return restored, (self._asked, self._json, self.seconds, self._from_matches)
 
     def __repr__(self) -> str:
         return f"<Result {self.headline}>"
@@ -257,3 +290,33 @@ class Result:
             picture, words = drawn
             parts += f'<img src="{picture}" alt="{html.escape(words)}" style="max-width: 100%">'
         return f"<div>{parts}</div>"
+
+
+def restored(
+    asked: Tuple[str, Tuple[Any, ...]], line: str, seconds: float, from_matches: Optional[Result]
+) -> Result:
+    """A result that travelled: its line in ``results.jsonl``, and what was asked."""
+    function, arguments = asked
+    answer = getattr(_posescope, function)(*arguments, (line, seconds))
+    return Result(answer, asked, from_matches)
+
+
+def _mask(events: List[Dict[str, Any]], matches: Any) -> "NDArray[np.bool_]":
+    """Which matches are inliers by the events of one reference."""
+    queries, references = (np.asarray(part, np.float32).reshape(-1, 2) for part in matches[:2])
+    keypoints: Dict[str, Any] = {}
+    states: List[str] = []
+    partners: Dict[int, int] = {}
+    for event in events:
+        if event["kind"] == "FeaturesDetected":
+            keypoints[event["side"]] = np.array([event["x_px"], event["y_px"]], np.float32).T.reshape(-1, 2)
+        elif event["kind"] == "MatchesDecided":
+            partners = dict(zip(event["query_keypoint"], event["reference_keypoint"]))
+        elif event["kind"] == "FeaturesClassified":
+            states = event["state"]
+    inliers = set()
+    for at, state in enumerate(states):
+        if state == "inlier" and at in partners:
+            inliers.add((*keypoints["query"][at].tolist(), *keypoints["reference"][partners[at]].tolist()))
+    pairs = np.hstack([queries, references]).tolist()
+    return np.array([tuple(pair) in inliers for pair in pairs], np.bool_)

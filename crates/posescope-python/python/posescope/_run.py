@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import html
-import importlib
-import importlib.util
 import json
 import os
 from collections import Counter
@@ -13,9 +11,26 @@ from typing import Any, Dict, List, Optional
 
 from . import _posescope
 from ._errors import InputError
+from ._table import error_vector, table
 
 _RESULTS = "results.jsonl"
-_LIBRARIES = ("polars", "pandas", "pyarrow")
+_GRADES = ("right", "wrong", "no pose", "unmeasured")
+
+
+class GateError(Exception):
+    """A gate of an evaluation failed.
+
+    Attributes:
+        run: The run, which is complete.
+    """
+
+    def __init__(self, message: str, run: "Run") -> None:
+        # With both, the error can be pickled: a pool of processes passes it on.
+        super().__init__(message, run)
+        self.run = run
+
+    def __str__(self) -> str:
+        return str(self.args[0])
 
 
 class Run:
@@ -53,52 +68,118 @@ class Run:
         file = self._path / _RESULTS
         rows: List[Dict[str, Any]] = []
         try:
-            lines = file.read_text(encoding="utf-8").splitlines()
+            text = file.read_text(encoding="utf-8")
         except OSError as error:
             raise InputError(str(file), "", error.strerror or str(error)) from error
-        for number, line in enumerate(lines, 1):
+        # What a killed process wrote last has no end.
+        for number, line in enumerate(text[: text.rfind("\n") + 1].splitlines(), 1):
             try:
                 rows.append(json.loads(line))
             except ValueError as error:
                 raise InputError(str(file), f"line {number}", f"a result expected, {error}") from error
         return rows
 
-    def results(self, library: Optional[str] = None) -> Any:
-        """The results as a table, one row each, with columns such as ``error.translation_m``.
+    def results(
+        self, library: Optional[str] = None, method: Optional[str] = None, grade: Optional[str] = None
+    ) -> Any:
+        """The results as a table, one row each. Columns and their types are the same for every run.
 
         Args:
             library: ``polars``, ``pandas``, ``pyarrow`` or ``list``. By default the first that is installed; without
-                any, a list of flat dicts.
+                any, a list of dicts.
+            method: Only those of this method.
+            grade: Only those of this grade: ``right``, ``wrong``, ``no pose`` or ``unmeasured``.
+
+        ``error.right_m``, ``error.down_m`` and ``error.forward_m`` are in the frame of the true camera. They and
+        ``time_s`` need the scene of the queries.
 
         Raises:
-            ValueError: There is no such library.
+            ValueError: There is no such library or grade.
             ImportError: The library is not installed.
             InputError: A line is damaged.
         """
-        if library not in (None, "list", *_LIBRARIES):
-            raise ValueError(f"library: polars, pandas, pyarrow or list expected, `{library}` given")
-        flat = [_flat(row) for row in self.rows()]
-        installed = (name for name in _LIBRARIES if importlib.util.find_spec(name))
-        chosen = library or next(installed, "list")
-        if chosen == "list":
-            return flat
-        # All rows have all columns: a missing value is None.
-        names = list(dict.fromkeys(name for row in flat for name in row))
-        columns = {name: [row.get(name) for row in flat] for name in names}
-        module: Any = importlib.import_module(chosen)
-        if chosen == "pyarrow":
-            return module.table(columns)
-        if chosen == "polars":
-            return module.DataFrame(columns, strict=False)
-        return module.DataFrame(columns)
+        if grade not in (None, *_GRADES):
+            raise ValueError(f"grade: {', '.join(_GRADES)} expected, `{grade}` given")
+        rows = [
+            row
+            for row in self.rows()
+            if method in (None, row["method"]) and grade in (None, row["grade"])
+        ]
+        facts = _posescope.query_facts(os.fspath(self._path))
+        for row in rows:
+            truth, row["time_s"] = facts.get((row.get("query_scene") or row["scene"], row["query"]), (None, None))
+            if truth is not None and row["pose"] is not None and row["error"] is not None:
+                row["error_vector"] = error_vector(row["pose"]["position_m"], truth)
+        return table(rows, library)
 
-    def summary(self) -> Dict[str, Any]:
-        """Figures by group and method, gates and findings: ``summary.json``.
+    def to_tum(
+        self, path: "str | os.PathLike[str]", method: Optional[str] = None, grade: Optional[str] = None
+    ) -> Path:
+        """Writes the poses as TUM RGB-D and evo read them: ``time x y z qx qy qz qw``, and returns the path.
+
+        Args:
+            path: The file.
+            method: The method, where the run has several.
+            grade: Only the poses of this grade.
 
         Raises:
-            InputError: The run has no summary, or a damaged one.
+            ValueError: Queries have no time, or several results are left of one.
+            InputError: The run cannot be read.
+        """
+        return self._exported("tum", Path(path), method, grade)
+
+    def to_vloc(
+        self, path: "str | os.PathLike[str]", method: Optional[str] = None, grade: Optional[str] = None
+    ) -> Path:
+        """Writes the poses as visuallocalization.net and hloc do: ``name qw qx qy qz x y z``, world to camera.
+
+        The arguments and exceptions are those of :func:`Run.to_tum`.
+        """
+        return self._exported("vloc", Path(path), method, grade)
+
+    def to_colmap(
+        self, path: "str | os.PathLike[str]", method: Optional[str] = None, grade: Optional[str] = None
+    ) -> Path:
+        """Writes the poses as a text model of COLMAP without points, into a folder.
+
+        The arguments and exceptions are those of :func:`Run.to_tum`.
+        """
+        return self._exported("colmap", Path(path), method, grade)
+
+    def _exported(self, format: str, path: Path, method: Optional[str], grade: Optional[str]) -> Path:
+        if grade not in (None, *_GRADES):
+            raise ValueError(f"grade: {', '.join(_GRADES)} expected, `{grade}` given")
+        for name, text in _posescope.exported(os.fspath(self._path), format, method, grade):
+            file = path / name if name else path
+            file.parent.mkdir(parents=True, exist_ok=True)
+            file.write_text(text, encoding="utf-8")
+        return path
+
+    def gate(self, *gates: str) -> None:
+        """Checks gates as ``posescope eval --gate`` does, also of a recorded run, and writes them into the summary.
+
+        Args:
+            gates: Conditions such as ``right@mine >= 0.9`` or ``share(D3)@mine <= 0.05``.
+
+        Raises:
+            GateError: A gate failed.
+            ValueError: A gate is not possible.
+        """
+        failed = _posescope.summarise(os.fspath(self._path), list(gates))
+        if failed is not None:
+            raise GateError(failed, self)
+
+    def summary(self) -> Dict[str, Any]:
+        """Figures by group and method, gates and findings: ``summary.json``, which is made where a process was killed
+        before.
+
+        Raises:
+            InputError: The summary is damaged.
+            OSError: The run cannot be read.
         """
         file = self._path / "summary.json"
+        if not file.exists():
+            _posescope.summarise(os.fspath(self._path), [])
         try:
             found: Dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
         except (OSError, ValueError) as error:
@@ -125,29 +206,11 @@ class Run:
 
     def _repr_html_(self) -> str:
         grades = self.grades()
-        names = ["right", "wrong", "no pose", "unmeasured"]
-        head = "".join(f"<th>{name}</th>" for name in ["method", *names])
+        head = "".join(f"<th>{name}</th>" for name in ["method", *_GRADES])
         rows = "".join(
             f"<tr><td>{html.escape(method)}</td>"
-            + "".join(f"<td>{counts.get(name, 0)}</td>" for name in names)
+            + "".join(f"<td>{counts.get(name, 0)}</td>" for name in _GRADES)
             + "</tr>"
             for method, counts in grades.items()
         )
         return f"<div>{html.escape(str(self._path))}</div><table><tr>{head}</tr>{rows}</table>"
-
-
-def _flat(row: Dict[str, Any], prefix: str = "") -> Dict[str, Any]:
-    """Nested objects as columns with dots; lists of objects as JSON, but for the codes of the verdicts."""
-    flat: Dict[str, Any] = {}
-    for key, value in row.items():
-        name = prefix + key
-        if isinstance(value, dict):
-            flat.update(_flat(value, f"{name}."))
-        elif name == "diagnosis":
-            flat["verdicts"] = [one["code"] for one in value]
-            flat["verdict"] = value[0]["text"] if value else None
-        elif isinstance(value, list) and any(isinstance(one, dict) for one in value):
-            flat[name] = json.dumps(value)
-        else:
-            flat[name] = value
-    return flat

@@ -1,11 +1,10 @@
-"""What pickle and copy call to make a value again. Everything here is found by its name in a pickle."""
+"""What pickle and copy call to make a value of the extension again. Everything here is found by its name in a pickle."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Optional, Tuple
+from typing import TYPE_CHECKING, Any, Optional
 
 from . import _posescope
-from ._result import Result
 
 if TYPE_CHECKING:
     from ._posescope import Camera, Query, Reference, Scene
@@ -39,10 +38,3 @@ def reference_of(scene: "Scene", name: str) -> "Reference":
 def reference(*numbers: Any) -> "Reference":
     """A reference of arrays."""
     return _posescope.restored_reference(*numbers)
-
-
-def result(asked: Tuple[str, Tuple[Any, ...]], line: str, seconds: float, from_matches: Optional[Result]) -> Result:
-    """A result of its line in ``results.jsonl``, and of what was asked."""
-    function, arguments = asked
-    answer = getattr(_posescope, function)(*arguments, (line, seconds))
-    return Result(answer, asked, from_matches)
