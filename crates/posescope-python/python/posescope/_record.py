@@ -28,7 +28,8 @@ if TYPE_CHECKING:
 
 _HELD = 16
 """How many references are known by their object."""
-_SPARE = 2
+_SPARE = 8
+"""The memory of how many photos is used again."""
 _UNSAFE = set('\\:*?"<>|\0,;')
 _LATE = "verdict of {name}, since too many queries waited for theirs"
 _LARGE = "verdict of {name}, since the photos that waited took too much memory"
@@ -236,6 +237,7 @@ class Recording:
             if spare.shape == photo.shape:
                 np.copyto(self._spare.pop(at), photo)
                 return spare
+        self._spare.clear()
         return np.array(photo, order="C")
 
     def close(self) -> Run:
@@ -325,8 +327,10 @@ class Recording:
         """Gives the memory of a photo back."""
         with self._lock:
             self._bytes -= logged.bytes
-            if logged.photo is not None:
-                self._spare = [logged.photo, *self._spare[: _SPARE - 1]]
+            if logged.photo is not None and len(self._spare) < _SPARE:
+                held = self._bytes + sum(spare.nbytes for spare in self._spare)
+                if held + logged.photo.nbytes <= self._bytes_allowed:
+                    self._spare.append(logged.photo)
         logged.photo, logged.bytes = None, 0
 
     def _judge_all(self) -> None:
