@@ -33,7 +33,7 @@ fn a_sweep_has_a_run_per_value_a_table_and_curves_and_goes_on() {
     sequence.run(&format!("{sweep} --threads 3 --resume")).ok();
     assert!(before == texts());
 
-    let line = format!("{EVAL} ratio --sweep fb.ratio=0.6:0.8:0.2 --gate 'success@fb > 2'");
+    let line = format!("{EVAL} ratio --sweep fb.ratio=0.6:0.8:0.2 --gate 'success@fb > 1'");
     sequence.run(&line).fails_with(1, "fb.ratio=0.8: gate");
     has(&sequence.text("ratio/fb.ratio=0.6/run.toml"), "ratio = 0.6\n");
 }

@@ -21,10 +21,10 @@ fn a_photo_that_cannot_be_read_costs_its_queries_alone_and_is_tried_again() {
     for photo in &photos {
         write(photo, "no photo");
     }
-    let said = sequence.run(&format!("{EVAL} run --gate 'right@fb >= 2'"));
+    let said = sequence.run(&format!("{EVAL} run --gate 'right@fb >= 1'"));
     let said = said.fails(
         3,
-        "queries were not localised ~ 000002.png ~ --resume ~ gate `right@fb >= 2` failed",
+        "queries were not localised ~ 000002.png ~ --resume ~ gate `right@fb >= 1` failed",
     );
     has(&said.out, "fb ~ pm");
     for file in ["summary.json", "junit.xml", "report.html"] {
