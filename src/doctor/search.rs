@@ -28,7 +28,8 @@ pub(super) fn camera_reading(stated: &Intrinsics, change: Change) -> Reading {
     Reading::new(Mistake::WrongCamera, &remedy, change)
 }
 
-/// Turns of clouds [°] about y, x and z and shifts along x, y and z, those that are told; `None` where none is.
+/// The remedy for clouds that are turned [°] about y, x and z and shifted along x, y and z. It names the moves that `is_told`
+/// selects; `None` if that selects none.
 pub(super) fn moves_in_words(moves: &[f64; 6], is_told: impl Fn(usize) -> bool) -> Option<String> {
     const NAMES: [&str; 6] = ["about y", "about x", "about z", "along x", "along y", "along z"];
     let words = (0..6).filter(|axis| is_told(*axis)).map(|axis| match axis {

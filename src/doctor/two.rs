@@ -36,7 +36,7 @@ impl Sample<'_> {
         /// Lengths of poses and of motions differ by less, as the logarithm of their ratio.
         const SAME: f64 = 0.2;
         let stated = self.explained(&AS_STATED, 1.0);
-        // The part of a map that is in view is cut by the poses.
+        // The poses decide which part of a map is in view.
         if self.has_map || stated >= FITTING_MOTIONS {
             return None;
         }
