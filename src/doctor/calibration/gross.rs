@@ -151,7 +151,7 @@ impl Outlines {
         match change {
             Change::Aside(right_m) => Some(aside_reading(right_m)),
             Change::Camera { .. } => Some(camera_reading(&self.camera, change)),
-            // This names the camera alone. A second search, with that camera, finds clouds that are moved too.
+            // This names the camera alone. A second search, with that camera, looks for clouds that are moved too.
             _ if kind == Kind::All && values[FOCAL_LENGTH].abs() >= MIN_FOCAL => {
                 let change = Kind::Camera.change(&values, self.camera.fx);
                 Some(camera_reading(&self.camera, change))
