@@ -27,9 +27,9 @@ pub use posescope_core::{
     localize_traced,
 };
 pub use posescope_core::{
-    camera, cloud, cost, depth, describe, diagnosis, estimator, event, features, foreign, fusion,
-    geometry, grid, history, image, localize, method, params, problem, render, retrieval, robust,
-    scale, solver, text, trace,
+    camera, cloud, cost, covariance, depth, describe, diagnosis, estimator, event, features,
+    foreign, fusion, geometry, grid, history, image, localize, method, params, problem, render,
+    retrieval, robust, scale, solver, text, trace,
 };
 
 #[cfg(feature = "app")]

@@ -4,9 +4,11 @@
 //! A format that cannot leave them out is refused: poses are never invented.
 
 use std::path::Path;
+use std::time::Duration;
 
 use nalgebra::{Quaternion, Translation3, UnitQuaternion};
 
+use crate::covariance::PoseCovariance;
 use crate::geometry::Pose;
 use crate::localize::QueryResult;
 use crate::method::Method;
@@ -23,6 +25,8 @@ pub enum Format {
     Colmap,
     /// visuallocalization.net: `name qw qx qy qz x y z`, world to camera.
     Vloc,
+    /// ROS: a YAML document of a `geometry_msgs/PoseWithCovarianceStamped` for each pose, camera to world.
+    Ros,
 }
 
 /// Why a run cannot be exported in a format.
@@ -57,8 +61,13 @@ pub enum ExportError {
     )]
     Name(String),
     /// The format needs times, and the scene has none.
-    #[error("tum needs times, and the frames of {0} have none; use --as vloc or colmap")]
-    NoTime(String),
+    #[error("{1} needs times, and the frames of {0} have none; use --as vloc or colmap")]
+    NoTime(String, &'static str),
+    /// The format needs covariances, and a pose has none.
+    #[error(
+        "ros needs a covariance, and the pose of query {0} has none; use --as tum, vloc or colmap"
+    )]
+    NoCovariance(String),
 }
 
 /// Chooses the results to export.
@@ -80,6 +89,15 @@ pub struct Export {
 struct Localized<'a> {
     item: RunItem<'a>,
     pose: Option<Pose>,
+    covariance: Option<PoseCovariance>,
+}
+
+impl Localized<'_> {
+    /// When the photo was taken \[s\].
+    fn time_s(&self, format: &'static str) -> Result<f64, ExportError> {
+        let scene = &self.item.pair.query_scene;
+        self.item.time_s.ok_or_else(|| ExportError::NoTime(scene.clone(), format))
+    }
 }
 
 /// Exports the results of a run that `takes` chooses, at most one per query.
@@ -102,6 +120,7 @@ pub fn export(
         Format::Kitti => vec![("", kitti(&localized)?)],
         Format::Vloc => vec![("", vloc(&localized)?)],
         Format::Colmap => colmap(&localized),
+        Format::Ros => vec![("", ros(&localized)?)],
     };
     Ok(Export { files, excluded })
 }
@@ -137,7 +156,8 @@ fn localized<'a>(
                     UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z)),
                 )
             });
-            all.push(Localized { item, pose });
+            let covariance = result.confidence.and_then(|confidence| confidence.covariance);
+            all.push(Localized { item, pose, covariance });
         }
     }
     Ok(all)
@@ -145,10 +165,9 @@ fn localized<'a>(
 
 fn tum(localized: &[Localized<'_>]) -> Result<String, ExportError> {
     let mut text = "# time x y z qx qy qz qw\n".to_owned();
-    for Localized { item, pose } in localized {
-        let Some(pose) = pose else { continue };
-        let scene = &item.pair.query_scene;
-        let time = item.time_s.ok_or_else(|| ExportError::NoTime(scene.clone()))?;
+    for one in localized {
+        let Some(pose) = one.pose else { continue };
+        let time = one.time_s("tum")?;
         let (t, q) = (pose.translation.vector, pose.rotation.coords);
         text += &format!("{time} {} {} {} {} {} {} {}\n", t.x, t.y, t.z, q.x, q.y, q.z, q.w);
     }
@@ -157,7 +176,7 @@ fn tum(localized: &[Localized<'_>]) -> Result<String, ExportError> {
 
 fn kitti(localized: &[Localized<'_>]) -> Result<String, ExportError> {
     let mut text = String::new();
-    for (line, Localized { item, pose }) in localized.iter().enumerate() {
+    for (line, Localized { item, pose, .. }) in localized.iter().enumerate() {
         if item.query.parse() != Ok(line) {
             return Err(ExportError::Gap(format!("frame {line} is not a query")));
         }
@@ -181,7 +200,7 @@ fn camera_from_world(pose: &Pose) -> String {
 
 fn vloc(localized: &[Localized<'_>]) -> Result<String, ExportError> {
     let mut text = String::new();
-    for Localized { item, pose } in localized {
+    for Localized { item, pose, .. } in localized {
         let Some(pose) = pose else { continue };
         // A name is the first word of a line.
         let is_word = |c: char| !c.is_whitespace() && c != ',';
@@ -189,6 +208,37 @@ fn vloc(localized: &[Localized<'_>]) -> Result<String, ExportError> {
             return Err(ExportError::Name(item.query.to_owned()));
         }
         text += &format!("{} {}\n", item.query, camera_from_world(pose));
+    }
+    Ok(text)
+}
+
+/// As `ros2 topic echo` prints messages. Frame `map` has the axes of the scene.
+fn ros(localized: &[Localized<'_>]) -> Result<String, ExportError> {
+    let mut text = String::new();
+    for one in localized {
+        let Some(pose) = one.pose else { continue };
+        let query = one.item.query;
+        let covariance =
+            one.covariance.ok_or_else(|| ExportError::NoCovariance(query.to_owned()))?;
+        let time = Duration::try_from_secs_f64(one.time_s("ros")?).unwrap_or_default();
+        let (t, q) = (pose.translation.vector, pose.rotation.coords);
+        let in_world = covariance.in_world_axes(&pose).transpose();
+        let numbers: Vec<String> = in_world.iter().map(ToString::to_string).collect();
+        text += &format!(
+            "header:\n  stamp:\n    sec: {}\n    nanosec: {}\n  frame_id: map\npose:\n  pose:\n    position:\n      \
+             x: {}\n      y: {}\n      z: {}\n    orientation:\n      x: {}\n      y: {}\n      z: {}\n      w: {}\n  \
+             covariance: [{}]\n---\n",
+            time.as_secs(),
+            time.subsec_nanos(),
+            t.x,
+            t.y,
+            t.z,
+            q.x,
+            q.y,
+            q.z,
+            q.w,
+            numbers.join(", ")
+        );
     }
     Ok(text)
 }

@@ -164,7 +164,7 @@ pub struct Measures {
     /// The success rate of chance; `None` if the truth is unknown.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub chance: Option<Chance>,
-    /// Median probability of being within 1 m, over poses with a confidence.
+    /// Median probability of being right, over poses with a confidence.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub median_confidence: Option<f64>,
     /// Median time of the method \[s\]; not in summaries, which contain no times.

@@ -198,7 +198,7 @@ pub struct Protocol {
     pub failure_radius_m: Option<f64>,
     /// Refuse poses with a lower probability than this
     ///
-    /// It is the probability of being within 1 m of the truth.
+    /// It is the probability of being right.
     #[cfg_attr(
         feature = "cli",
         arg(

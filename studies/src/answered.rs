@@ -79,7 +79,7 @@ impl Scene for Mirrored {
 struct Found {
     is_right: bool,
     is_beyond_chance: bool,
-    /// Probability of being within 1 m.
+    /// Probability of being right.
     probability: f64,
     inliers: usize,
     /// Inliers of a second consensus, among the matches that the first does not explain.

@@ -318,6 +318,16 @@ fn exports_hold_the_poses_and_say_what_they_cannot_hold() {
     let vloc = export("vloc");
     let line = vloc.lines().nth(1).expect("a line");
     assert!(line.starts_with("000001 "), "{line}");
+    let ros = export("ros");
+    let messages: Vec<&str> = ros.split_terminator("---\n").collect();
+    assert_eq!(messages.len(), 4);
+    has(messages[1], "sec: 0\n    nanosec: 100000000\n  frame_id: map");
+    has(messages[1], &format!("position:\n      x: {}\n      y: {}\n", position[0], position[1]));
+    let (_, covariance) = messages[1].split_once("covariance: [").expect("a covariance");
+    let covariance = covariance.split_once(']').expect("its end").0.split(", ");
+    let covariance: Vec<f64> = covariance.map(|word| word.parse().expect("a number")).collect();
+    assert_eq!(covariance.len(), 36);
+    assert!((0..6).all(|axis| covariance[7 * axis] > 0.0), "{covariance:?}");
     assert_eq!(export("csv").lines().count(), 5);
     refused(
         sequence.path(),

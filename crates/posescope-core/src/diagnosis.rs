@@ -53,6 +53,7 @@ use crate::geometry::{Pose, PoseError};
 use crate::method::Method;
 use crate::params::Params;
 use crate::problem::Problem;
+use confidence::Trust;
 use search::FinishedSearch;
 
 /// A verdict on why a pose is wrong, missing or uncertain.
@@ -93,6 +94,8 @@ pub struct Subject<'a> {
     pub truth: Option<&'a Pose>,
     /// When a pose is right.
     pub tolerance: Tolerance,
+    /// What the confidence follows from.
+    trust: Option<Trust>,
 }
 
 impl<'a> Subject<'a> {
@@ -104,6 +107,7 @@ impl<'a> Subject<'a> {
         outcome: &'a Outcome,
         evidence: &'a Evidence,
     ) -> Self {
+        let tolerance = Tolerance::default().at(params.scale);
         let subject = Self {
             problem,
             method,
@@ -112,15 +116,24 @@ impl<'a> Subject<'a> {
             evidence,
             confidence: None,
             truth: None,
-            tolerance: Tolerance::default(),
+            tolerance,
+            trust: None,
         };
-        Self { confidence: PoseConfidence::of(&subject), ..subject }
+        let trust = Trust::of(&subject);
+        Self { trust, ..subject }.against(None, tolerance)
     }
 
     /// The same, compared with the truth: a pose within the tolerance of it is right.
     #[must_use]
     pub fn against(self, truth: Option<&'a Pose>, tolerance: Tolerance) -> Self {
-        Self { truth, tolerance, ..self }
+        let confidence = self.trust.as_ref().map(|trust| trust.confidence(tolerance));
+        Self { truth, tolerance, confidence, ..self }
+    }
+
+    /// The same, with what became of the answer.
+    #[must_use]
+    pub fn answering(self, outcome: &'a Outcome) -> Self {
+        Self { outcome, ..self }
     }
 
     /// What the pose is worth by the truth.

@@ -262,7 +262,7 @@ impl Entry {
         self.cost
     }
 
-    /// The least probability of being within 1 m with which it lets a pose pass; 0 for those that judge
+    /// The least probability of being right with which it lets a pose pass; 0 for those that judge
     /// their poses by nothing else than what they are found by, as the paper's do.
     pub fn least_probability(&self, params: &Params) -> f64 {
         (self.least_probability)(params)

@@ -182,6 +182,8 @@ pub mod camera;
 #[doc(hidden)]
 pub mod cloud;
 #[doc(hidden)]
+pub mod covariance;
+#[doc(hidden)]
 pub mod depth;
 #[doc(hidden)]
 pub mod describe;

@@ -88,8 +88,11 @@ fn why(ui: &mut Ui, context: &ViewContext<'_>) {
             "Confidence: {} ({} likely within {} m)",
             known.word,
             confidence::percent(known.probability),
-            confidence::WITHIN_M
+            known.within.m
         );
+        if let Some(interval) = known.interval() {
+            words = format!("{words}; if so, {interval}");
+        }
         if known.word == Confidence::Trusted && result.grade == Grade::Wrong {
             words += ", although the pose is wrong";
         }

@@ -25,9 +25,10 @@ pub struct ResultsArgs {
     /// Show at most N rows
     #[arg(long, value_name = "N")]
     pub rows: Option<usize>,
-    /// The form: text, json, csv, markdown, latex, html, or poses as tum, kitti, colmap, vloc
+    /// The form: text, json, csv, markdown, latex, html, or poses as tum, kitti, colmap, vloc, ros
     ///
-    /// json prints lines of results.jsonl, html writes the report, vloc is the format of visuallocalization.net.
+    /// json prints lines of results.jsonl, html writes the report, vloc is the format of visuallocalization.net,
+    /// ros a PoseWithCovarianceStamped in YAML for each pose.
     #[arg(long = "as", value_name = "FORM", value_enum, default_value = "text")]
     pub form: Form,
     /// The table: rows, summary, verdicts, or paper:1 … paper:6
@@ -107,6 +108,7 @@ pub enum Form {
     Kitti,
     Colmap,
     Vloc,
+    Ros,
 }
 
 impl Form {
@@ -117,6 +119,7 @@ impl Form {
             Self::Kitti => Some(Format::Kitti),
             Self::Colmap => Some(Format::Colmap),
             Self::Vloc => Some(Format::Vloc),
+            Self::Ros => Some(Format::Ros),
             _ => None,
         }
     }

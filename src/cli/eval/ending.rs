@@ -74,9 +74,8 @@ fn meanings(run: &RunFile, bars: &[Bar]) -> String {
         "Right: within {metres} m and {degrees}° of the truth. Median error: over all poses, right or wrong.\n"
     );
     let trusted = format!(
-        "Trusted: by the method's own evidence at least {} likely within {} m.\n",
-        confidence::percent(confidence::TRUSTED_FROM),
-        confidence::WITHIN_M
+        "Trusted: by the method's own evidence at least {} likely right.\n",
+        confidence::percent(confidence::TRUSTED_FROM)
     );
     let is_measured = bars.iter().any(|bar| bar.median_m.is_some());
     if is_measured { measured + &trusted } else { trusted }

@@ -104,7 +104,7 @@ impl Field {
             Some(r.initial_error?.translation_m)
         })
         .called("distance"),
-        number("probability", "probability of being within 1 m", "", 3, |r| {
+        number("probability", "probability of being right", "", 3, |r| {
             Some(r.confidence.as_ref()?.probability)
         })
         .called("confidence")

@@ -1,24 +1,29 @@
-//! How likely an accepted pose is right, without knowing the truth.
+//! How likely an accepted pose is right, and how far it may be off, without knowing the truth.
 //!
 //! The evidence of an estimator shows how far its pose stands out from chance. For feature-based methods these are
 //! the inliers beyond chance, how well they determine the pose, and whether the photos agree better there than
 //! elsewhere. For a grid search it is the depth of the minimum compared with other hypotheses, the runner-up and
 //! shuffled pixels. For a multi-start search it is how many of them end there, and whether features agree. A
-//! logistic function of these signals is the probability of being within [`WITHIN_M`]. Its coefficients were
-//! fitted on some conditions of the street with default parameters, and evaluated on others (numbers in
-//! `studies/README.md`).
+//! logistic function of these signals is the probability of being [near](NEAR). How far a pose that is near is off
+//! follows from the inliers or the edges that fix it, scaled by another function of the same signals. Both together
+//! say how likely the pose is right, whatever error still counts as right. What is fitted was fitted on generated
+//! towns with default parameters, and evaluated on others (numbers in `studies/README.md`). Lengths are in units of
+//! the scene's scale.
 
 mod appearance;
 mod coefficients;
+mod edges;
 mod inliers;
 mod minimum;
 mod settled;
 
 use serde::{Deserialize, Serialize};
 
-pub use coefficients::probability;
+pub use coefficients::{Fitted, fitted, units};
 
-use super::{Family, Subject};
+use super::numbers::with_digits;
+use super::{Family, Subject, Tolerance};
+use crate::covariance::PoseCovariance;
 use crate::estimator::{self, CostSummary, Failure, Outcome};
 use crate::grid::ScoredLattice;
 use crate::method::Method;
@@ -27,8 +32,8 @@ use crate::stats::median_and_deviation;
 use crate::text::words;
 use appearance::Look;
 
-/// The distance from the truth that [`PoseConfidence::probability`] refers to \[m\].
-pub const WITHIN_M: f64 = 1.0;
+/// A pose that is this near to the truth was found, however well, at the scale of the paper.
+pub const NEAR: Tolerance = Tolerance { translation_m: 1.0, rotation_deg: 5.0 };
 
 /// The least probability of a trusted pose.
 pub const TRUSTED_FROM: f64 = 0.95;
@@ -69,26 +74,56 @@ impl Confidence {
 
 words!(Confidence, "confidence": Trusted = "trusted", Unsure = "unsure", Low = "low");
 
-/// What the coefficients of a probability were fitted on.
+/// What the probability of a pose was fitted on.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Calibration {
-    /// Conditions of the built-in street.
+    /// Generated towns.
     #[default]
-    Street,
+    #[serde(alias = "street")]
+    Generated,
+}
+
+/// A distance and an angle.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Within {
+    /// Distance \[m, or the unit of the scene\].
+    pub m: f64,
+    /// Angle \[°\].
+    pub deg: f64,
+}
+
+impl From<Tolerance> for Within {
+    fn from(tolerance: Tolerance) -> Self {
+        Self { m: tolerance.translation_m, deg: tolerance.rotation_deg }
+    }
+}
+
+impl Default for Within {
+    fn default() -> Self {
+        NEAR.into()
+    }
 }
 
 /// How likely a pose is right, and how far it may be off.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PoseConfidence {
-    /// Probability of being within 1 m of the truth, from this method alone.
+    /// Probability of being right, from this method alone.
     pub probability: f64,
     /// The same in one word.
     pub word: Confidence,
-    /// What the probability was calibrated on.
+    /// What still counts as right.
+    #[serde(default)]
+    pub within: Within,
+    /// What the probability was fitted on.
     pub calibrated_on: Calibration,
-    /// Standard deviation of the camera centre along its own axes, right, down, forward \[m\]; 0 along
-    /// what is not searched. `None` where nothing fixes the pose.
+    /// How far 95 % of the poses like this one are off at most, of those that are right.
+    #[serde(default)]
+    pub within_95: Option<Within>,
+    /// The covariance of the pose, if it is right.
+    #[serde(default)]
+    pub covariance: Option<PoseCovariance>,
+    /// Standard deviation of the camera centre along its own axes, right, down, forward \[m\].
     pub position_std_m: Option<[f64; 3]>,
     /// Standard deviation of the rotation about the same axes \[°\].
     pub rotation_std_deg: Option<[f64; 3]>,
@@ -116,17 +151,30 @@ pub type Signals = Vec<(&'static str, f64)>;
 
 impl PoseConfidence {
     /// A probability alone.
-    pub fn new(probability: f64) -> Self {
+    pub fn new(probability: f64, within: Within) -> Self {
         Self {
             probability,
             word: Confidence::of(probability),
-            calibrated_on: Calibration::Street,
+            within,
+            calibrated_on: Calibration::Generated,
+            within_95: None,
+            covariance: None,
             position_std_m: None,
             rotation_std_deg: None,
             inlier_spread: None,
             runner_up_margin: None,
             chance_level: None,
         }
+    }
+
+    /// How far such poses are off, as people read it; lengths in metres.
+    pub fn interval(&self) -> Option<String> {
+        let Within { m, deg } = self.within_95?;
+        Some(format!(
+            "95 % of such poses within {} m and {}°",
+            with_digits(m, 2),
+            with_digits(deg, 2)
+        ))
     }
 
     /// The probability as people read it, with the glyph of a low one before it.
@@ -137,17 +185,84 @@ impl PoseConfidence {
             _ => percent,
         }
     }
+}
 
-    /// That of a subject's pose; `None` without a pose, for a method that was not calibrated, and for a scene of
-    /// another scale than those of the calibration.
+/// What a method leaves behind that speaks for its pose or against it.
+#[derive(Clone, Debug)]
+pub struct Evidenced {
+    /// What a probability is made of.
+    pub signals: Signals,
+    /// The covariance of the pose by what fixes it alone; `None` where nothing does.
+    pub alone: Option<PoseCovariance>,
+    inlier_spread: Option<f64>,
+    runner_up_margin: Option<f64>,
+    chance_level: Option<f64>,
+}
+
+/// How far a pose can be trusted, whatever counts as right.
+#[derive(Clone, Debug)]
+pub(super) struct Trust {
+    evidenced: Evidenced,
+    /// The probability of being [`NEAR`].
+    near: f64,
+    /// That of poses that are near, and how many times farther than those of a normal distribution 95 % of the
+    /// errors go.
+    spread: Option<(PoseCovariance, f64)>,
+    /// What near is at the scale of the scene.
+    is_near: Tolerance,
+}
+
+impl Trust {
+    /// That of a subject's pose; `None` without a pose, for a method for which nothing was fitted, and for a scene of
+    /// another scale than those that it was fitted on: in rooms, poses that are wrong would be trusted.
     pub(super) fn of(subject: &Subject<'_>) -> Option<Self> {
         if !subject.params.scale.is_paper() {
             return None;
         }
-        let (signals, rest) = left_behind(subject)?;
-        let values: Vec<f64> = signals.iter().map(|(_, value)| *value).collect();
-        let probability = probability(responsible(subject.method, subject.outcome), &values)?;
-        Some(Self { probability, word: Confidence::of(probability), ..rest })
+        let evidenced = evidenced(subject)?;
+        let fitted = fitted(responsible(subject.method, subject.outcome))?;
+        let scale = subject.params.scale;
+        let values: Vec<f64> = evidenced.signals.iter().map(|(_, value)| *value).collect();
+        let spread =
+            evidenced.alone.map(|alone| (fitted.covariance(&alone, &values, scale), fitted.tail));
+        let near = fitted.probability(&values);
+        Some(Self { near, spread, is_near: NEAR.at(scale), evidenced })
+    }
+
+    /// The confidence that a pose is right, where a pose within this tolerance is.
+    pub(super) fn confidence(&self, right: Tolerance) -> PoseConfidence {
+        let Evidenced { inlier_spread, runner_up_margin, chance_level, .. } = self.evidenced;
+        let probability = self.near * self.share_of_near(right);
+        let within_95 =
+            self.spread.as_ref().map(|(spread, tail)| spread.scaled(*tail).holding(0.95));
+        let covariance = self.spread.as_ref().map(|(spread, _)| *spread);
+        let deviations = covariance.as_ref().map(PoseCovariance::deviations);
+        let three = |first: usize, unit: f64| {
+            deviations.map(|all| [0, 1, 2].map(|axis| unit * all[first + axis]))
+        };
+        PoseConfidence {
+            within_95: within_95.map(Within::from),
+            position_std_m: three(3, 1.0),
+            rotation_std_deg: three(0, 1_f64.to_degrees()),
+            covariance,
+            inlier_spread,
+            runner_up_margin,
+            chance_level,
+            ..PoseConfidence::new(probability, right.into())
+        }
+    }
+
+    /// How many of the poses that are near are right. Where more than near is right, all are.
+    fn share_of_near(&self, right: Tolerance) -> f64 {
+        let is_stricter = right.translation_m < self.is_near.translation_m
+            || right.rotation_deg < self.is_near.rotation_deg;
+        match &self.spread {
+            Some((spread, tail)) if is_stricter => {
+                let errors = spread.scaled(*tail);
+                (errors.share_within(right) / errors.share_within(self.is_near)).min(1.0)
+            }
+            _ => 1.0,
+        }
     }
 }
 
@@ -180,27 +295,30 @@ pub fn accepted(subject: &Subject<'_>, asked: Option<f64>) -> Outcome {
     }
 }
 
-/// The signals of a subject with a pose, as the probability takes them.
-pub fn signals(subject: &Subject<'_>) -> Option<Signals> {
-    Some(left_behind(subject)?.0)
-}
-
-/// The signals of a subject with a pose, and its confidence but for the probability.
-fn left_behind(subject: &Subject<'_>) -> Option<(Signals, PoseConfidence)> {
-    let &Subject { method, params, outcome, evidence, .. } = subject;
-    outcome.pose.as_ref().ok()?;
+/// What a method leaves behind with its pose; `None` without one, and for a search other than the method's own.
+pub fn evidenced(subject: &Subject<'_>) -> Option<Evidenced> {
+    let &Subject { problem, method, params, outcome, evidence, .. } = subject;
+    let pose = outcome.pose.as_ref().ok()?;
     let responsible = responsible(method, outcome);
     let family = Family::of(responsible, params)?;
-    // The coefficients of a method were fitted to its own search.
+    // What was fitted for a method was fitted to its own search.
     let is_usual = Family::of(responsible, &Params::default()) == Some(family);
-    match family {
+    let of_search = |found: Option<Evidenced>| {
+        let alone = edges::covariance(problem, params, &problem.reference_from_query(pose));
+        Some(Evidenced { alone, ..found? })
+    };
+    let mut found = match family {
         _ if !is_usual => None,
-        Family::Features => inliers::signals(subject, Look::QUICK),
-        Family::Guided => inliers::signals(subject, Look::THOROUGH),
-        Family::Grid => minimum::signals(outcome, evidence),
-        Family::MultiStart => settled::signals(outcome, evidence),
+        Family::Features => inliers::evidenced(subject, Look::QUICK),
+        Family::Guided => inliers::evidenced(subject, Look::THOROUGH),
+        Family::Grid => of_search(minimum::evidenced(outcome, evidence)),
+        Family::MultiStart => of_search(settled::evidenced(outcome, evidence, params.scale)),
         Family::Descent | Family::Given => None,
-    }
+    }?;
+    // The farther a method looked, the more it may have confused with the place.
+    let radius = problem.uncertainty_radius_m() / params.scale.metre();
+    found.signals.push(("radius", radius.ln()));
+    Some(found)
 }
 
 /// Large values say little more than moderate ones.
@@ -245,6 +363,7 @@ fn gain_and_coverage(summary: &CostSummary) -> Signals {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scale::Scale;
 
     #[test]
     fn a_pose_is_trusted_from_nineteen_in_twenty_on_and_low_below_one_half() {
@@ -257,10 +376,31 @@ mod tests {
     }
 
     #[test]
+    fn what_was_fitted_is_complete() {
+        for method in ["fb", "pm", "mi", "fb2", "mi6", "robust"] {
+            let fitted = fitted(Method::named(method)).expect(method);
+            let signals = fitted.signals.len();
+            assert_eq!((fitted.seen.len(), fitted.near.len()), (signals, signals + 1), "{method}");
+            for weights in &fitted.deviations {
+                assert_eq!(weights.len(), signals + 2, "{method}");
+            }
+            // A signal that is beyond all that was seen says no more than the outermost.
+            let far = |by: f64| -> Vec<f64> { vec![by; signals] };
+            let alone =
+                PoseCovariance::new(1e-4 * nalgebra::Matrix6::identity()).expect("positive");
+            let of = |by| fitted.covariance(&alone, &far(by), Scale::PAPER);
+            assert_eq!(of(1e3), of(1e6), "{method}");
+            assert!((0.5..5.0).contains(&fitted.tail), "{method}: {}", fitted.tail);
+        }
+        assert!(super::fitted(Method::HY).is_none());
+    }
+
+    #[test]
     fn a_limit_that_was_missed_does_not_read_as_reached() {
         let texts = [0.003, 0.4999, 0.9499, 1.0].map(percent);
         assert_eq!(texts, ["under 1 %", "49 %", "94 %", "100 %"]);
-        let likely = [0.34, 0.5].map(|probability| PoseConfidence::new(probability).likely());
+        let likely = [0.34, 0.5]
+            .map(|probability| PoseConfidence::new(probability, Within::default()).likely());
         assert_eq!(likely, ["◆ 34 %", "50 %"]);
     }
 }

@@ -1,7 +1,7 @@
 //! Fused poses: their verdicts and their confidence.
 
 use super::case::{FusionCase, Member, RankingCase, heaviest};
-use super::confidence::{PoseConfidence, WITHIN_M};
+use super::confidence::PoseConfidence;
 use super::rules::{RULES, Test, low};
 use super::{Diagnosis, Tolerance};
 use crate::estimator::Failure;
@@ -44,16 +44,21 @@ pub fn diagnose_fusion(
         found.push(Diagnosis::of_failure(failure));
     }
     if let Ok(pose) = pose {
-        let doubt = low(fused_confidence(pose, members).as_ref());
+        let doubt = low(fused_confidence(pose, members, tolerance).as_ref());
         let place = if truth.is_none() { 0 } else { found.len() };
         found.splice(place..place, doubt);
     }
     found
 }
 
-/// The confidence of a fused pose: that of the poses in it on average, by their weights. A pose that the
-/// fused one is not near speaks against it.
-pub fn fused_confidence(pose: &Pose, members: &[Member<'_>]) -> Option<PoseConfidence> {
+/// The confidence of a fused pose, where a pose within the tolerance is right: that of the poses in it on average, by
+/// their weights. A pose that the fused one is not near speaks against it. How far it may be off is said as of the
+/// pose of most weight: an average of poses that may share their error is not known to be better.
+pub fn fused_confidence(
+    pose: &Pose,
+    members: &[Member<'_>],
+    right: Tolerance,
+) -> Option<PoseConfidence> {
     let supports = |member: &Member<'_>| {
         let own = member.share.pose.as_ref();
         let (Some(own), Some(confidence)) = (own, member.confidence) else {
@@ -61,11 +66,23 @@ pub fn fused_confidence(pose: &Pose, members: &[Member<'_>]) -> Option<PoseConfi
             return member.share.support.map(|_| 0.0);
         };
         let apart = PoseError::between(pose, own).translation_m;
-        Some(if apart <= WITHIN_M { member.share.weight * confidence.probability } else { 0.0 })
+        let is_near = apart <= right.translation_m;
+        Some(if is_near { member.share.weight * confidence.probability } else { 0.0 })
     };
     let kept = members.iter().filter(|member| member.share.outcome == ShareOutcome::Kept);
     let probability = kept.map(supports).sum::<Option<f64>>()?;
-    Some(PoseConfidence::new(probability))
+    let of_heaviest = heaviest(members).and_then(|member| member.confidence);
+    let alone = PoseConfidence::new(probability, right.into());
+    Some(match of_heaviest {
+        Some(one) => PoseConfidence {
+            within_95: one.within_95,
+            covariance: one.covariance,
+            position_std_m: one.position_std_m,
+            rotation_std_deg: one.rotation_std_deg,
+            ..alone
+        },
+        None => alone,
+    })
 }
 
 /// Whether references that were ranked by what they look like are all of another place (V1). A frame is of

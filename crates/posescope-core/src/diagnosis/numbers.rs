@@ -41,7 +41,7 @@ pub(super) fn ordinal(rank: usize) -> String {
     format!("{rank}{suffix}")
 }
 
-fn with_digits(value: f64, digits: usize) -> String {
+pub(super) fn with_digits(value: f64, digits: usize) -> String {
     if value == 0.0 || !value.is_finite() {
         return format!("{value}");
     }

@@ -4,6 +4,7 @@ use std::fmt;
 use std::str::FromStr;
 
 use crate::geometry::PoseError;
+use crate::scale::Scale;
 use crate::text::UnknownWord;
 
 /// How far a pose may be from the truth and still be right.
@@ -25,6 +26,12 @@ impl Default for Tolerance {
 }
 
 impl Tolerance {
+    /// The tolerance that stands for this one at another scale. Angles are the same at all.
+    #[must_use]
+    pub fn at(self, scale: Scale) -> Self {
+        Self { translation_m: scale.length(self.translation_m), ..self }
+    }
+
     /// Whether an error is within. One that is no number is not.
     pub fn contains(&self, error: &PoseError) -> bool {
         error.translation_m <= self.translation_m && error.rotation_deg <= self.rotation_deg

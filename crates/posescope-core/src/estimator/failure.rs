@@ -191,10 +191,10 @@ pub enum Failure {
     },
     /// The confidence of the pose is below what the user or the method requires.
     #[error(
-        "The pose was refused: only {} likely within 1 m, {:.0} % required.", percent(*.probability), 100.0 * .needed
+        "The pose was refused: only {} likely right, {:.0} % required.", percent(*.probability), 100.0 * .needed
     )]
     LowConfidence {
-        /// Its probability of being within 1 m.
+        /// Its probability of being right.
         probability: f64,
         /// The probability that is required.
         needed: f64,

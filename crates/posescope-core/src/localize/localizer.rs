@@ -67,7 +67,7 @@ pub struct Localizer<'a> {
     params: &'a Params,
     seed: u64,
     tolerance: Tolerance,
-    /// The least probability of being within 1 m with which a pose is accepted.
+    /// The least probability of being right with which a pose is accepted.
     least_probability: Option<f64>,
     /// How often a query that went wrong is localised again to see what would have helped.
     runs_to_explain: usize,
@@ -135,7 +135,7 @@ impl<'a> Localizer<'a> {
         Self { tolerance, ..self }
     }
 
-    /// The same localizer, which accepts no pose that is within 1 m of the truth with less than this
+    /// The same localizer, which accepts no pose that is right with less than this
     /// probability.
     #[must_use]
     pub fn accepting_from(self, least_probability: Option<f64>) -> Self {
@@ -454,7 +454,8 @@ impl<'a> Localizer<'a> {
             let mut evidence = Evidence::default();
             let outcome =
                 trace.heard_by(&mut evidence, |trace| localize_by(first, problem, trace))?;
-            let subject = Subject::new(problem, parts.first, self.params, &outcome, &evidence);
+            let subject = Subject::new(problem, parts.first, self.params, &outcome, &evidence)
+                .against(None, self.tolerance);
             Ok(confidence::accepted(&subject, self.least_probability))
         };
         Hybrid::new(method, parts, self.params).estimate_with(problem, ask_first, trace)

@@ -92,13 +92,18 @@ impl QueryResult {
     pub fn evidence(&self) -> String {
         let rests_on = self.rests_on();
         match &self.confidence {
-            Some(known) if self.grade == Grade::Unmeasured => format!(
-                "{} {}, {} likely within {} m; {rests_on}",
-                known.word.glyph(),
-                known.word,
-                confidence::percent(known.probability),
-                confidence::WITHIN_M
-            ),
+            Some(known) if self.grade == Grade::Unmeasured => {
+                let interval = known.interval().map(|words| format!(" ({words})"));
+                let words = format!(
+                    "{} {}, {} likely within {} m{}; {rests_on}",
+                    known.word.glyph(),
+                    known.word,
+                    confidence::percent(known.probability),
+                    known.within.m,
+                    interval.unwrap_or_default()
+                );
+                self.unit.words(&words)
+            }
             _ => rests_on,
         }
     }

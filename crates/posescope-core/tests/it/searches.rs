@@ -3,7 +3,7 @@
 
 use posescope_core::cost::SearchRule;
 use posescope_core::diagnosis::{
-    Code, Evidence, Family, PoseConfidence, Subject, Tolerance, diagnose,
+    Code, Evidence, Family, PoseConfidence, Subject, Tolerance, confidence, diagnose,
 };
 use posescope_core::estimator::{self, Failure, Outcome};
 use posescope_core::event::{BranchTaken, MinimumAssessed};
@@ -135,6 +135,33 @@ fn what_is_said_of_a_cost_is_of_the_pose_that_is_answered() {
         let offset = Offset::of(&problem.reference_from_query(&pose));
         assert!(minimum.offset.distance_from(&offset) < 1e-6, "{name}");
         assert_eq!((minimum.best, minimum.shuffled), (cost.best, cost.shuffled), "{name}");
+    }
+}
+
+#[test]
+fn a_confidence_follows_what_counts_as_right() {
+    let (problem, params) = (solvable(), Params::default());
+    for method in ["fb", "pm", "mi", "fb2", "mi6", "robust"].map(Method::named) {
+        let (outcome, evidence, _) = assessed(&problem, method, &params);
+        let subject = Subject::new(&problem, method, &params, &outcome, &evidence);
+        let evidenced = confidence::evidenced(&subject).expect("a pose");
+        let names: Vec<&str> = evidenced.signals.iter().map(|(name, _)| *name).collect();
+        assert_eq!(names, confidence::fitted(method).expect("fitted").signals, "{method}");
+        let of = |metres, degrees| {
+            let right = Tolerance { translation_m: metres, rotation_deg: degrees };
+            let subject = Subject::new(&problem, method, &params, &outcome, &evidence);
+            subject.against(None, right).confidence.expect("of a pose")
+        };
+        let (usual, wide) = (of(1.0, 5.0), of(3.0, 9.0));
+        assert_eq!(usual.probability, wide.probability, "{method}: of being near at most");
+        let held = usual.within_95.expect("an interval");
+        let covariance = usual.covariance.expect("a covariance");
+        let deviations = covariance.deviations();
+        assert_eq!(usual.position_std_m, Some([3, 4, 5].map(|axis| deviations[axis])), "{method}");
+        // Of poses that are near, 95 % are within the interval, and few within a hundredth of it.
+        let strict = of(0.01 * held.m, held.deg);
+        assert!(strict.probability < 0.2 * usual.probability, "{method}: {strict:?}");
+        assert_eq!((strict.within.m, strict.within_95), (0.01 * held.m, usual.within_95));
     }
 }
 

@@ -63,11 +63,29 @@ class Confidence:
     """How likely a pose is right. It needs no truth."""
 
     probability: float
-    """Probability of being within 1 m of the truth."""
+    """Probability of being right."""
     word: str
     """``trusted`` from 0.95, ``unsure`` from 0.5, else ``low``."""
     details: Dict[str, Any] = field(default_factory=dict)
     """The further fields of ``confidence`` in a results file."""
+
+    @property
+    def within(self) -> Tuple[float, float]:
+        """What counts as right: a distance [m] and an angle [degrees]."""
+        return _length_and_angle(self.details["within"])
+
+    @property
+    def within_95(self) -> Optional[Tuple[float, float]]:
+        """A distance [m] and an angle [degrees] that each hold the error in 95 % of cases, if the pose is right."""
+        held = self.details["within_95"]
+        return None if held is None else _length_and_angle(held)
+
+    @property
+    def covariance(self) -> Optional["NDArray[np.float64]"]:
+        """The covariance of the pose, 6 x 6, if it is right: rotation about the camera's axes x, y, z [rad], then the
+        position of its centre along them [m]."""
+        numbers = self.details["covariance"]
+        return None if numbers is None else np.asarray(numbers, dtype=np.float64).reshape(6, 6)
 
     def __float__(self) -> float:
         return self.probability
@@ -75,7 +93,11 @@ class Confidence:
     def __str__(self) -> str:
         # Rounded down, so that a limit that was missed never reads as reached.
         percent = math.floor(100 * self.probability)
-        return f"{self.word}, {f'{percent} %' if percent else 'under 1 %'} likely within 1 m"
+        return f"{self.word}, {f'{percent} %' if percent else 'under 1 %'} likely within {self.within[0]:g} m"
+
+
+def _length_and_angle(held: Dict[str, float]) -> Tuple[float, float]:
+    return held["m"], held["deg"]
 
 
 class Result:

@@ -13,6 +13,7 @@ use crate::judge::Judge;
 use crate::params::Params;
 use crate::problem::Problem;
 use crate::render::{Objective as _, Score};
+use crate::scale::Scale;
 use crate::search::moved;
 use crate::stats::median_and_deviation;
 
@@ -32,7 +33,7 @@ impl Look {
     pub(super) const THOROUGH: Self = Self { shrink: 2, around: 64 };
 }
 
-/// How far the poses around the reference go \[m\].
+/// How far the poses around the reference go, at the scale of the paper \[m\].
 const AROUND_M: f64 = 8.0;
 
 /// Poses around the reference are turned by up to twice this to both sides \[°\].
@@ -41,7 +42,8 @@ const TURN_DEG: f64 = 5.0;
 /// The golden angle, by which neighbours on a spiral that fills a disc evenly are turned \[rad\].
 const GOLDEN_RAD: f64 = 2.399_963_229_728_653;
 
-/// How far the neighbours of the pose are, in two rings \[m\], and what turn goes with a metre \[°\].
+/// How far the neighbours of the pose are, in two rings, at the scale of the paper \[m\], and what turn goes with a
+/// metre \[°\].
 const RINGS_M: [f64; 2] = [0.5, 1.0];
 const DEG_PER_M: f64 = 2.0;
 
@@ -59,13 +61,14 @@ pub(super) fn signals(
     reference_from_query: &Pose,
     look: Look,
 ) -> [(&'static str, f64); 6] {
-    let inputs = (&params.judge, &params.render, look, reference_from_query);
+    let scale = params.scale;
+    let inputs = (&params.judge, &params.render, scale, look, reference_from_query);
     let seen = || {
         let judge = Judge::new(problem, &params.render, &params.judge, look.shrink);
         let mut poses = vec![*reference_from_query, Pose::identity()];
-        poses.extend(neighbours(reference_from_query));
+        poses.extend(neighbours(reference_from_query, scale));
         let first_around = poses.len();
-        poses.extend(around(look.around));
+        poses.extend(around(look.around, scale));
         Ok(Appearance::among(&judge.score(&poses), first_around).unwrap_or_default())
     };
     let Ok::<_, Infallible>(seen) = problem.try_recall(inputs, |_| 0, seen);
@@ -130,9 +133,10 @@ impl Appearance {
 }
 
 /// The pose moved along and turned about each of its axes, to both sides, by the step of each ring.
-fn neighbours(pose: &Pose) -> impl Iterator<Item = Pose> + '_ {
-    RINGS_M.into_iter().flat_map(move |step_m| {
-        let step_rad = (DEG_PER_M * step_m).to_radians();
+fn neighbours(pose: &Pose, scale: Scale) -> impl Iterator<Item = Pose> + '_ {
+    RINGS_M.into_iter().flat_map(move |paper_m| {
+        let step_rad = (DEG_PER_M * paper_m).to_radians();
+        let step_m = scale.length(paper_m);
         let steps = [step_m, step_m, step_m, step_rad, step_rad, step_rad];
         let both = |axis: usize| [(axis, 1.0), (axis, -1.0)];
         (0..steps.len()).flat_map(both).map(move |(axis, sign)| {
@@ -144,9 +148,9 @@ fn neighbours(pose: &Pose) -> impl Iterator<Item = Pose> + '_ {
 }
 
 /// Poses on a spiral around the reference, in its plane.
-fn around(count: usize) -> impl Iterator<Item = Pose> {
+fn around(count: usize, scale: Scale) -> impl Iterator<Item = Pose> {
     (0..count).map(move |k| {
-        let distance_m = AROUND_M * ((k as f64 + 0.5) / count as f64).sqrt();
+        let distance_m = scale.length(AROUND_M) * ((k as f64 + 0.5) / count as f64).sqrt();
         let angle = GOLDEN_RAD * k as f64;
         let turn = TURN_DEG.to_radians() * ((k % 5) as f64 - 2.0);
         let mut pose = Pose::translation(distance_m * angle.sin(), 0.0, distance_m * angle.cos());
@@ -196,7 +200,7 @@ mod tests {
 
     #[test]
     fn the_poses_around_a_reference_fill_its_disc_to_all_sides() {
-        let poses: Vec<Pose> = around(48).collect();
+        let poses: Vec<Pose> = around(48, Scale::PAPER).collect();
         assert_eq!(poses.len(), 48);
         let mut quarters = [0; 4];
         for pose in &poses {
@@ -205,6 +209,6 @@ mod tests {
             quarters[usize::from(at.x > 0.0) + 2 * usize::from(at.z > 0.0)] += 1;
         }
         assert!(quarters.iter().all(|&count| count >= 10), "{quarters:?}");
-        assert_eq!(neighbours(&Pose::identity()).count(), 24);
+        assert_eq!(neighbours(&Pose::identity(), Scale::PAPER).count(), 24);
     }
 }

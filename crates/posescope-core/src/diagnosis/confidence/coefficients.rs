@@ -1,31 +1,83 @@
-//! The fitted coefficients of each method's probability.
+//! What was fitted to say how likely a pose is right and how far it may be off.
 //!
-//! `cargo run -p posescope-studies -- calibration` fits them, prints them in this form and shows how well
-//! they hold on conditions that they were not fitted on.
+//! `cargo run -p posescope-studies -- calibration --fit FILE --write` fits all of it, writes `fitted.json` beside this
+//! file, and shows how well it holds on towns that it was not fitted on. `studies/README.md` says which numbers are of
+//! which run.
 
+use std::collections::BTreeMap;
+use std::sync::LazyLock;
+
+use nalgebra::Vector6;
+use serde::{Deserialize, Serialize};
+
+use crate::covariance::PoseCovariance;
 use crate::method::Method;
+use crate::scale::Scale;
 
-/// The probability that a pose of these signals, in their order, is within a metre; `None` for a method
-/// without coefficients.
-pub fn probability(method: Method, signals: &[f64]) -> Option<f64> {
-    let (_, coefficients) = FITTED.iter().find(|(name, _)| *name == method.name())?;
-    let (constant, weights) = coefficients.split_first()?;
-    let sum: f64 = weights.iter().zip(signals).map(|(w, v)| w * v).sum();
-    Some(1.0 / (1.0 + (-(constant + sum)).exp()))
+/// What was fitted for the poses of one method.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Fitted {
+    /// The signals, in the order of all numbers below.
+    pub signals: Vec<String>,
+    /// What signals were seen when the deviations were fitted, from the least to the greatest. There, one beyond counts
+    /// as the outermost.
+    pub seen: Vec<[f64; 2]>,
+    /// Of the logistic function that says how likely a pose is near: the constant, then a weight for each signal.
+    pub near: Vec<f64>,
+    /// The natural logarithm of the standard deviation of each freedom, in the order of a [`PoseCovariance`]: a
+    /// constant, the weight of its logarithm as the photo alone gives it, and a weight for each signal.
+    pub deviations: [Vec<f64>; 6],
+    /// How many times farther than those of a normal distribution 95 % of the errors go.
+    pub tail: f64,
 }
 
-/// By method: the constant, then one weight per signal in their order.
-#[rustfmt::skip]
-const FITTED: &[(&str, &[f64])] = &[
-    // constant, inliers, inlier_share, beyond_chance, spread, deviation, residual,
-    // seen_depth, seen_margin, seen_rise, seen_rise_farther, seen_above_start, seen_gain
-    ("fb", &[1.5666, -0.0583, 2.2681, 0.1688, 10.4057, 0.5639, -1.1226, 0.4405, 0.4729, 0.1839, 0.4326, 0.2974, 1.0304]),
-    ("fb2", &[-10.5208, 1.9956, 7.6333, -0.1726, -0.2390, -0.1165, 0.4882, 0.0244, 0.3044, 0.0078, 0.1357, 0.8271, 0.0258]),
-    // constant, depth, refined_by, margin, above_start, gain, coverage, yaw_depth
-    ("mi", &[-6.6958, 0.5146, 0.3756, 1.1216, -0.2002, 4.2765, 0.7650, 3.3455]),
-    ("pm", &[-13.2549, 4.9114, -7.2906, 0.9337, -2.1627, 7.7036, -0.3163, 4.0411]),
-    // constant, depth, margin, above_start, gain, coverage, gathered
-    ("mi6", &[-8.0405, 1.2557, 0.6542, 1.2628, 4.2296, 0.7023, 6.4612]),
-    // constant, depth, margin, above_start, gain, coverage, gathered, support, against
-    ("robust", &[-5.9610, 0.7129, 0.4500, 0.9737, 1.6127, 0.1653, 6.6869, 1.6426, 0.1989]),
-];
+/// No freedom is more uncertain than that: rotation \[rad\], and position at the scale of the paper \[m\].
+const MOST: [f64; 2] = [1.0, 20.0];
+
+/// The fitted numbers of a method's poses; `None` for a method without.
+pub fn fitted(method: Method) -> Option<&'static Fitted> {
+    static FITTED: LazyLock<BTreeMap<String, Fitted>> = LazyLock::new(|| {
+        serde_json::from_str(include_str!("fitted.json")).expect("a test reads it")
+    });
+    FITTED.get(method.name())
+}
+
+impl Fitted {
+    /// The probability that a pose of these signals is near.
+    pub fn probability(&self, signals: &[f64]) -> f64 {
+        1.0 / (1.0 + (-weighted_sum(&self.near, signals)).exp())
+    }
+
+    /// The covariance of a pose of these signals, if it is near, from what the photo alone gives.
+    pub fn covariance(
+        &self,
+        alone: &PoseCovariance,
+        signals: &[f64],
+        scale: Scale,
+    ) -> PoseCovariance {
+        let units = units(scale);
+        let seen = signals.iter().zip(&self.seen);
+        let signals: Vec<f64> =
+            seen.map(|(value, [least, most])| value.clamp(*least, *most)).collect();
+        let alone_deviations = alone.deviations().component_div(&units);
+        let deviations = Vector6::from_fn(|freedom, _| {
+            let weights = &self.deviations[freedom];
+            let own = weights[1] * alone_deviations[freedom].ln();
+            let rest: Vec<f64> = [&weights[..1], &weights[2..]].concat();
+            (own + weighted_sum(&rest, &signals)).exp().min(MOST[freedom / 3])
+        });
+        alone.with_deviations(&deviations.component_mul(&units))
+    }
+}
+
+/// The constant and the weighted sum of the signals.
+fn weighted_sum(weights: &[f64], signals: &[f64]) -> f64 {
+    let weighted = weights[1..].iter().zip(signals).map(|(weight, value)| weight * value);
+    weights[0] + weighted.sum::<f64>()
+}
+
+/// What deviations are measured in: radians, and the length that stands for a metre.
+pub fn units(scale: Scale) -> Vector6<f64> {
+    let metre = scale.metre();
+    Vector6::new(1.0, 1.0, 1.0, metre, metre, metre)
+}

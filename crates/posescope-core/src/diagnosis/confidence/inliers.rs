@@ -1,18 +1,19 @@
 //! What the inliers of a consensus say about its pose, and both photos with them.
 
+use super::Evidenced;
 use super::appearance::{self, Look};
-use super::{PoseConfidence, Signals};
+use crate::covariance::PoseCovariance;
 use crate::diagnosis::Subject;
 use crate::estimator::Family;
 use crate::features::FeatureState;
 use crate::solver::{Correspondence, pose_covariance};
 use crate::stats::median;
 
-/// The signals of the inliers, and what else is known of their pose.
+/// What the inliers say of their pose.
 ///
 /// How far the pose is from the reference is none of the signals: on the street right poses are near, by
 /// how its pairs are drawn, and on real drives they are not.
-pub(super) fn signals(subject: &Subject<'_>, look: Look) -> Option<(Signals, PoseConfidence)> {
+pub(super) fn evidenced(subject: &Subject<'_>, look: Look) -> Option<Evidenced> {
     let &Subject { problem, params, evidence, .. } = subject;
     let features = evidence.query.as_ref()?;
     let states = evidence.states.as_ref()?;
@@ -42,31 +43,27 @@ pub(super) fn signals(subject: &Subject<'_>, look: Look) -> Option<(Signals, Pos
     // few points is no proof of perfect pixels.
     let sigma_px = (median_residual_px / 1.177).max(0.3);
     let camera_from_reference = refined.reference_from_query.inverse();
-    // Of rotation and position, along the camera's axes.
-    let covariance = pose_covariance(&inliers, intrinsics, &camera_from_reference, sigma_px);
-    let deviation_m =
-        covariance.map_or(1e3, |c| (c[(3, 3)] + c[(4, 4)] + c[(5, 5)]).sqrt().clamp(1e-4, 1e3));
+    let alone = pose_covariance(&inliers, intrinsics, &camera_from_reference, sigma_px)
+        .and_then(PoseCovariance::new);
+    let deviation_m = alone.map_or(f64::INFINITY, |known| known.of_position().trace().sqrt());
+    let deviation = (deviation_m / params.scale.metre()).clamp(1e-4, 1e3);
     let log10_nfa = evidence.judged.as_ref().map(|judged| judged.acceptance.log10_nfa);
     let mut signals = vec![
         ("inliers", (inliers.len() as f64).ln_1p()),
         ("inlier_share", inliers.len() as f64 / correspondences.max(1) as f64),
         ("beyond_chance", (-log10_nfa.unwrap_or(0.0)).max(0.0).ln_1p()),
         ("spread", spread),
-        ("deviation", deviation_m.ln()),
+        ("deviation", deviation.ln()),
         ("residual", median_residual_px),
     ];
     signals.extend(appearance::signals(problem, params, &refined.reference_from_query, look));
-    let deviations = |first: usize| {
-        covariance.map(|c| [0, 1, 2].map(|axis| c[(first + axis, first + axis)].sqrt()))
-    };
-    let confidence = PoseConfidence {
-        position_std_m: deviations(3),
-        rotation_std_deg: deviations(0).map(|d| d.map(f64::to_degrees)),
+    Some(Evidenced {
+        signals,
+        alone,
         inlier_spread: Some(spread),
+        runner_up_margin: None,
         chance_level: log10_nfa,
-        ..PoseConfidence::new(f64::NAN)
-    };
-    Some((signals, confidence))
+    })
 }
 
 /// Root mean square distance of the inliers from their centre \[px\].

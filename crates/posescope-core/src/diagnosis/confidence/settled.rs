@@ -1,18 +1,14 @@
 //! What a multi-start search says about the pose in which they settled.
 
-use super::{Costs, PoseConfidence, Signals, gain_and_coverage, signed_log};
+use super::{Costs, Evidenced, NEAR, gain_and_coverage, signed_log};
 use crate::diagnosis::Evidence;
 use crate::estimator::Outcome;
 use crate::geometry::{Pose, PoseError};
 use crate::grid::Phase;
 use crate::scale::Scale;
 
-/// A pose this far from the answer speaks against it \[m\].
-const ELSEWHERE_M: f64 = 1.0;
-
-/// The signals of a pose in which some of many starts settled, among the others, and what else is known of
-/// it. Depths are in robust standard deviations of the coarse costs, below their median.
-pub(super) fn signals(outcome: &Outcome, evidence: &Evidence) -> Option<(Signals, PoseConfidence)> {
+/// What the starts of a search say of the pose in which some of them settled. Depths are in robust standard deviations of the coarse costs, below their median.
+pub(super) fn evidenced(outcome: &Outcome, evidence: &Evidence, scale: Scale) -> Option<Evidenced> {
     let summary = outcome.cost.as_ref()?;
     let surfaces = evidence.surfaces.iter().map(|surface| &**surface);
     let coarse = Costs::of(surfaces.filter(|one| one.lattice.phase == Phase::PositionCoarse))?;
@@ -21,7 +17,7 @@ pub(super) fn signals(outcome: &Outcome, evidence: &Evidence) -> Option<(Signals
         Some(candidates) => candidates.first()?.refined.pose,
         None => refined.first()?.pose,
     };
-    let same = refined.iter().filter(|one| is_same(&answer, &one.pose));
+    let same = refined.iter().filter(|one| scale.is_same_pose(&answer, &one.pose));
     let depth = coarse.depth(summary.best);
     let start_depth = summary.initial.map_or(0.0, |cost| coarse.depth(cost));
     let above = |runner_up: f64| (runner_up - summary.best) / coarse.deviation;
@@ -37,13 +33,11 @@ pub(super) fn signals(outcome: &Outcome, evidence: &Evidence) -> Option<(Signals
     if let Some(candidates) = &evidence.candidates {
         let of_features = candidates.iter().filter(|one| one.from_features);
         let poses = of_features.map(|one| (one.refined.pose, one.accepted));
-        let FeaturesSay { support, against } = FeaturesSay::of(&answer, poses);
+        let FeaturesSay { support, against } = FeaturesSay::of(&answer, poses, scale);
         signals.extend([("support", support), ("against", against)]);
     }
     let chance_level = summary.shuffled;
-    let confidence =
-        PoseConfidence { runner_up_margin, chance_level, ..PoseConfidence::new(f64::NAN) };
-    Some((signals, confidence))
+    Some(Evidenced { signals, alone: None, inlier_spread: None, runner_up_margin, chance_level })
 }
 
 /// Whether the poses that features lead to, refined under the same cost, are that of the answer.
@@ -55,22 +49,18 @@ struct FeaturesSay {
 }
 
 impl FeaturesSay {
-    fn of(answer: &Pose, poses: impl Iterator<Item = (Pose, bool)>) -> Self {
+    fn of(answer: &Pose, poses: impl Iterator<Item = (Pose, bool)>, scale: Scale) -> Self {
+        let elsewhere_m = NEAR.at(scale).translation_m;
         let mut says = Self { support: 0.0, against: 0.0 };
         for (pose, accepted) in poses {
-            if is_same(answer, &pose) {
+            if scale.is_same_pose(answer, &pose) {
                 says.support = f64::max(says.support, if accepted { 1.0 } else { 0.5 });
-            } else if accepted && PoseError::between(answer, &pose).translation_m > ELSEWHERE_M {
+            } else if accepted && PoseError::between(answer, &pose).translation_m > elsewhere_m {
                 says.against = 1.0;
             }
         }
         says
     }
-}
-
-/// Confidences are of scenes at the paper's scale.
-fn is_same(a: &Pose, b: &Pose) -> bool {
-    Scale::PAPER.is_same_pose(a, b)
 }
 
 #[cfg(test)]
@@ -83,7 +73,7 @@ mod tests {
         let says = |poses: &[(f64, bool)]| {
             let poses =
                 poses.iter().map(|&(x, accepted)| (Pose::translation(x, 0.0, 0.0), accepted));
-            let says = FeaturesSay::of(&answer, poses);
+            let says = FeaturesSay::of(&answer, poses, Scale::PAPER);
             (says.support, says.against)
         };
         assert_eq!(says(&[]), (0.0, 0.0));

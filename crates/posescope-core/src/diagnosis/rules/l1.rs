@@ -22,13 +22,14 @@ pub(in crate::diagnosis) fn low(confidence: Option<&PoseConfidence>) -> Option<D
     (confidence.word == Confidence::Low).then(|| {
         RULE.found(&Low {
             probability: confidence.probability,
+            within_m: confidence.within.m,
             runner_up_margin: confidence.runner_up_margin,
             inlier_spread: confidence.inlier_spread,
         })
     })
 }
 
-evidence!(Low { probability: f64, runner_up_margin: Option<f64>, inlier_spread: Option<f64> } =>
+evidence!(Low { probability: f64, within_m: f64, runner_up_margin: Option<f64>, inlier_spread: Option<f64> } =>
     "Low confidence: {} likely within {} m.",
-    confidence::percent(*probability), confidence::WITHIN_M
+    confidence::percent(*probability), within_m
 );

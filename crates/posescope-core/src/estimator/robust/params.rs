@@ -12,7 +12,7 @@ parameters! {
         /// What the pose of features that agree beyond chance is worth, in the same standard deviations:
         /// it is taken where it costs at most so much more than the search's.
         pub credit: f64 = 3.0 => number("credit", "", 0.0..=100.0),
-        /// The least probability of being within 1 m with which the answer is accepted; 0 answers always.
+        /// The least probability of being right with which the answer is accepted; 0 answers always.
         pub least_probability: f64 = 0.0 => number("least_probability", "", 0.0..=1.0),
     }
 }

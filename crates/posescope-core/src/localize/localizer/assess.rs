@@ -36,10 +36,10 @@ impl Localizer<'_> {
     ) -> MethodOutcome {
         let Estimated { outcome: estimated, evidence, times, verdicts } = estimated;
         let solved = &work.problems[problem];
-        let subject = Subject::new(solved, method, self.params, &estimated, &evidence);
+        let subject = Subject::new(solved, method, self.params, &estimated, &evidence)
+            .against(work.truth.as_ref(), self.tolerance);
         let outcome = confidence::accepted(&subject, self.least_probability);
-        let subject = Subject { outcome: &outcome, ..subject };
-        let subject = subject.against(work.truth.as_ref(), self.tolerance);
+        let subject = subject.answering(&outcome);
         let assessment = match verdicts {
             Some(verdicts) => Assessment {
                 grade: subject.grade(),

@@ -104,7 +104,10 @@ impl Localizer<'_> {
                 self.tolerance,
                 matches!(fusion.way, Way::Joint),
             ),
-            confidence: pose.as_ref().ok().and_then(|pose| fused_confidence(pose, &fused_members)),
+            confidence: pose
+                .as_ref()
+                .ok()
+                .and_then(|pose| fused_confidence(pose, &fused_members, self.tolerance)),
             per_reference: Some(
                 solved.iter().map(|(.., candidate)| candidate.result.nested()).collect(),
             ),

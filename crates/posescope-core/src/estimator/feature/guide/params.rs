@@ -29,7 +29,7 @@ parameters! {
         pub mlesac: MlesacParams = MlesacParams::default() => group(),
         /// How far outside the uncertainty radius a pose is still accepted, as a share of it.
         pub radius_slack: f64 = 0.1 => number("radius_slack", "", 0.0..=100.0),
-        /// The least probability of being within 1 m with which a pose is accepted: streets that look alike
+        /// The least probability of being right with which a pose is accepted: streets that look alike
         /// agree on poses beyond chance. 0 accepts what chance does not explain.
         pub least_probability: f64 = 0.7 => number("least_probability", "", 0.0..=1.0),
     }

@@ -1,0 +1,189 @@
+//! Fitting what is said of poses to what they are.
+
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3, Vector6};
+use posescope::diagnosis::confidence::{Fitted, units};
+use posescope::scale::Scale;
+
+use super::trials::{Sample, Shown};
+use crate::numbers::{mean, percentile};
+
+/// What a query that does not show its place counts beside one that does: there are more of them than anybody would
+/// ask.
+const NOTHING_COUNTS: f64 = 0.25;
+
+/// What is added to the squares of the slopes, so that separable samples have a fit.
+const RIDGE: f64 = 1.0;
+
+/// The share of samples whose signal is farther out than what is kept as seen, at each end.
+const UNSEEN: f64 = 0.005;
+
+/// The natural logarithm of the size of a number of the standard normal distribution, on average.
+const LN_SIZE: f64 = -0.635_181_4;
+
+/// Smaller errors are not told apart.
+const LEAST_ERROR: f64 = 1e-5;
+
+/// Below this, 90 % of the squares of a normally distributed vector in space are.
+const NINETY_OF_THREE: f64 = 6.251;
+
+/// What is fitted to the samples of one method; `None` where there are too few.
+pub fn fitted(samples: &[&Sample]) -> Option<Fitted> {
+    let signals = samples.first()?.names.clone();
+    let range = |k: usize| {
+        let mut values: Vec<f64> = samples.iter().map(|s| s.values[k]).collect();
+        [percentile(&mut values, UNSEEN), percentile(&mut values, 1.0 - UNSEEN)]
+    };
+    let seen: Vec<[f64; 2]> = (0..signals.len()).map(range).collect();
+    let clamped = |sample: &Sample| -> Vec<f64> {
+        let values = sample.values.iter().zip(&seen);
+        values.map(|(value, [least, most])| value.clamp(*least, *most)).collect()
+    };
+    let rows: Vec<Vec<f64>> = samples.iter().map(|s| s.values.clone()).collect();
+    let labels: Vec<f64> = samples.iter().map(|s| f64::from(u8::from(s.is_near()))).collect();
+    let counts: Vec<f64> = samples
+        .iter()
+        .map(|s| if s.shown == Shown::Nothing { NOTHING_COUNTS } else { 1.0 })
+        .collect();
+    let near = Design::of(&rows).logistic(&labels, &counts)?;
+
+    let usable: Vec<(&Sample, [f64; 6], Vec<f64>)> = samples
+        .iter()
+        .filter(|s| s.is_near())
+        .filter_map(|s| {
+            let alone = s.alone?.deviations().component_div(&units(scale_of(s)));
+            Some((*s, s.error?, alone.map(f64::ln).iter().copied().collect()))
+        })
+        .collect();
+    let deviation = |freedom: usize| {
+        let row = |(sample, _, alone): &(&Sample, [f64; 6], Vec<f64>)| {
+            [&[alone[freedom]], clamped(sample).as_slice()].concat()
+        };
+        let rows: Vec<Vec<f64>> = usable.iter().map(row).collect();
+        let sizes: Vec<f64> = usable
+            .iter()
+            .map(|(_, error, _)| error[freedom].abs().max(LEAST_ERROR).ln() - LN_SIZE)
+            .collect();
+        Design::of(&rows).linear(&sizes)
+    };
+    let deviations = (0..6).map(deviation).collect::<Option<Vec<_>>>()?.try_into().ok()?;
+    let mut fitted = Fitted { signals, seen, near, deviations, tail: 1.0 };
+
+    // So that 90 % of the errors of rotation and of position are within the ellipsoids that say so.
+    for first in [0, 3] {
+        let mut squares: Vec<f64> =
+            usable.iter().map(|(sample, ..)| square(&fitted, sample, first)).collect();
+        let factor = (percentile(&mut squares, 0.9) / NINETY_OF_THREE).sqrt();
+        for weights in &mut fitted.deviations[first..first + 3] {
+            weights[0] += factor.ln();
+        }
+    }
+    let mut ratios: Vec<f64> =
+        usable.iter().flat_map(|(sample, ..)| beyond(&fitted, sample)).collect();
+    fitted.tail = percentile(&mut ratios, 0.95);
+    Some(fitted)
+}
+
+/// The scale of the scene of a sample.
+fn scale_of(sample: &Sample) -> Scale {
+    if sample.metre == 1.0 { Scale::PAPER } else { Scale::of_depth(10.0 * sample.metre, true) }
+}
+
+/// The square of the error of rotation (from 0) or position (from 3) in units of its covariance; none without one.
+pub fn square(fitted: &Fitted, sample: &Sample, first: usize) -> f64 {
+    let Some((alone, error)) = sample.alone.as_ref().zip(sample.error) else {
+        return f64::NAN;
+    };
+    let scale = scale_of(sample);
+    let covariance = fitted.covariance(alone, &sample.values, scale);
+    let own: Matrix3<f64> = covariance.matrix().fixed_view::<3, 3>(first, first).into_owned();
+    let error = Vector6::from(error).component_mul(&units(scale));
+    let error: Vector3<f64> = error.fixed_rows::<3>(first).into_owned();
+    own.cholesky().map_or(f64::NAN, |factor| error.dot(&factor.solve(&error)))
+}
+
+/// How many times farther the position and the rotation are off than 95 % would be.
+pub fn beyond(fitted: &Fitted, sample: &Sample) -> [f64; 2] {
+    let Some((alone, error)) = sample.alone.as_ref().zip(sample.error) else {
+        return [f64::NAN; 2];
+    };
+    let scale = scale_of(sample);
+    let spread = fitted.covariance(alone, &sample.values, scale).scaled(fitted.tail);
+    let within = spread.holding(0.95);
+    let error = Vector6::from(error).component_mul(&units(scale));
+    let angle = error.fixed_rows::<3>(0).norm().to_degrees();
+    [error.fixed_rows::<3>(3).norm() / within.translation_m, angle / within.rotation_deg]
+}
+
+/// Rows of signals, standardised, with a constant before them.
+struct Design {
+    means: Vec<f64>,
+    deviations: Vec<f64>,
+    matrix: DMatrix<f64>,
+}
+
+impl Design {
+    fn of(rows: &[Vec<f64>]) -> Self {
+        let columns = rows.first().map_or(0, Vec::len);
+        let column = |k: usize| rows.iter().map(move |row| row[k]);
+        let means: Vec<f64> = (0..columns).map(|k| mean(column(k))).collect();
+        let variance = |k: usize| mean(column(k).map(|v| (v - means[k]).powi(2)));
+        let deviations: Vec<f64> = (0..columns).map(|k| variance(k).sqrt().max(1e-9)).collect();
+        let matrix = DMatrix::from_fn(rows.len(), columns + 1, |row, k| match k {
+            0 => 1.0,
+            _ => (rows[row][k - 1] - means[k - 1]) / deviations[k - 1],
+        });
+        Self { means, deviations, matrix }
+    }
+
+    /// Logistic regression by iteratively reweighted least squares, with a ridge, so that signals that tell little
+    /// keep small weights. The constant first.
+    fn logistic(&self, labels: &[f64], counts: &[f64]) -> Option<Vec<f64>> {
+        let (labels, counts) = (DVector::from_row_slice(labels), DVector::from_row_slice(counts));
+        let mut weights = DVector::zeros(self.matrix.ncols());
+        for _ in 0..50 {
+            let predicted = (&self.matrix * &weights).map(|x: f64| 1.0 / (1.0 + (-x).exp()));
+            let spread = predicted.map(|p| (p * (1.0 - p)).max(1e-6)).component_mul(&counts);
+            let gradient = self.matrix.transpose() * (&labels - &predicted).component_mul(&counts);
+            let step = self.ridge_step(&spread, gradient, &weights)?;
+            weights += &step;
+            if step.amax() < 1e-9 {
+                break;
+            }
+        }
+        Some(self.of_signals(&weights))
+    }
+
+    /// Linear regression with a ridge. The constant first.
+    fn linear(&self, values: &[f64]) -> Option<Vec<f64>> {
+        let ones = DVector::from_element(values.len(), 1.0);
+        let gradient = self.matrix.transpose() * DVector::from_row_slice(values);
+        let weights = self.ridge_step(&ones, gradient, &DVector::zeros(self.matrix.ncols()))?;
+        Some(self.of_signals(&weights))
+    }
+
+    fn ridge_step(
+        &self,
+        spread: &DVector<f64>,
+        mut gradient: DVector<f64>,
+        weights: &DVector<f64>,
+    ) -> Option<DVector<f64>> {
+        let mut weighted = self.matrix.clone();
+        for (mut row, by) in weighted.row_iter_mut().zip(spread.iter()) {
+            row *= *by;
+        }
+        let mut hessian = self.matrix.transpose() * weighted;
+        for k in 1..weights.len() {
+            hessian[(k, k)] += RIDGE;
+            gradient[k] -= RIDGE * weights[k];
+        }
+        Some(hessian.cholesky()?.solve(&gradient))
+    }
+
+    /// The weights of signals that are not standardised.
+    fn of_signals(&self, weights: &DVector<f64>) -> Vec<f64> {
+        let slopes: Vec<f64> =
+            self.deviations.iter().enumerate().map(|(k, d)| weights[k + 1] / d).collect();
+        let shift: f64 = slopes.iter().zip(&self.means).map(|(slope, mean)| slope * mean).sum();
+        std::iter::once(weights[0] - shift).chain(slopes).collect()
+    }
+}

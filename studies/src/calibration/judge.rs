@@ -1,0 +1,157 @@
+//! How well what is said of poses holds.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use posescope::diagnosis::confidence::{Confidence, Fitted};
+
+use super::fit::{beyond, square};
+use super::trials::{Sample, Shown};
+use crate::numbers::{mean, percent, print_table};
+
+/// A probability, and whether the pose is near.
+type Scored = (f64, bool);
+
+/// Below this, 90 % of the squares of a normally distributed vector in space are.
+const NINETY_OF_THREE: f64 = 6.251;
+
+/// Prints how well probabilities and intervals hold.
+pub fn judge(title: &str, samples: &[Sample], fitted: &BTreeMap<String, Fitted>) {
+    println!("\n## {title}\n");
+    let radii: BTreeSet<u64> = samples.iter().map(|s| s.radius_m.to_bits()).collect();
+    let mut groups: Vec<(String, Vec<&Sample>)> = Vec::new();
+    let all: Vec<&Sample> = samples.iter().filter(|s| fitted.contains_key(&s.method)).collect();
+    let names: BTreeSet<&str> = all.iter().map(|s| s.method.as_str()).collect();
+    let of = |keep: &dyn Fn(&Sample) -> bool| -> Vec<&Sample> {
+        all.iter().copied().filter(|sample| keep(sample)).collect()
+    };
+    for name in names {
+        for (what, shown) in [("one condition", Shown::Same), ("between", Shown::Other)] {
+            groups.push((format!("{name}, {what}"), of(&|s| s.method == name && s.shown == shown)));
+        }
+        for &radius in &radii {
+            let radius_m = f64::from_bits(radius);
+            let own = of(&|s| s.method == name && s.radius_m == radius_m);
+            groups.push((format!("{name}, radius {radius_m:.3} m"), own));
+        }
+    }
+    groups.push(("all".to_owned(), of(&|_| true)));
+    groups.push(("nothing is shown".to_owned(), of(&|s| s.shown == Shown::Nothing)));
+    let mut likely = Vec::new();
+    let mut intervals = Vec::new();
+    for (name, own) in &groups {
+        if own.is_empty() {
+            continue;
+        }
+        likely.push(probabilities(name, own, fitted));
+        intervals.extend(coverage(name, own, fitted));
+    }
+    print_table(
+        "poses,number,near,calibration error,AUC,trusted of wrong,low of near,trusted of well found",
+        &likely,
+    );
+    print_table(
+        "near poses,number,median error,median interval,position in 90 %,rotation in 90 %,position in 95 %,rotation \
+         in 95 %",
+        &intervals,
+    );
+}
+
+fn probabilities(
+    name: &str,
+    samples: &[&Sample],
+    fitted: &BTreeMap<String, Fitted>,
+) -> Vec<String> {
+    let probability = |sample: &Sample| fitted[&sample.method].probability(&sample.values);
+    let mut scored: Vec<Scored> = samples.iter().map(|s| (probability(s), s.is_near())).collect();
+    scored.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let share = |of: &dyn Fn(&Sample) -> bool, word: Confidence| {
+        let own: Vec<&&Sample> = samples.iter().filter(|s| of(s)).collect();
+        let hit = own.iter().filter(|s| Confidence::of(probability(s)) == word).count();
+        if own.is_empty() {
+            "–".to_owned()
+        } else {
+            format!("{:.1} % of {}", percent(hit, own.len()), own.len())
+        }
+    };
+    let near = scored.iter().filter(|s| s.1).count();
+    vec![
+        name.to_owned(),
+        scored.len().to_string(),
+        format!("{:.1} %", percent(near, scored.len())),
+        format!("{:.3}", calibration_error(&scored)),
+        area_under_curve(&scored).map_or("–".to_owned(), |area| format!("{area:.3}")),
+        share(&|s| !s.is_near(), Confidence::Trusted),
+        share(&Sample::is_near, Confidence::Low),
+        share(&is_well_found, Confidence::Trusted),
+    ]
+}
+
+/// Whether a pose is within half of what is near.
+fn is_well_found(sample: &Sample) -> bool {
+    let half = sample.error.map(|error| error.map(|part| 2.0 * part));
+    Sample { error: half, ..sample.clone() }.is_near()
+}
+
+fn coverage(
+    name: &str,
+    samples: &[&Sample],
+    fitted: &BTreeMap<String, Fitted>,
+) -> Option<Vec<String>> {
+    let near: Vec<&&Sample> = samples.iter().filter(|s| s.is_near() && s.alone.is_some()).collect();
+    if near.is_empty() {
+        return None;
+    }
+    let within = |first: usize| {
+        let is_in = |s: &&&&Sample| square(&fitted[&s.method], s, first) <= NINETY_OF_THREE;
+        percent(near.iter().filter(is_in).count(), near.len())
+    };
+    let held = |which: usize| {
+        let is_in = |s: &&&&Sample| beyond(&fitted[&s.method], s)[which] <= 1.0;
+        percent(near.iter().filter(is_in).count(), near.len())
+    };
+    let size =
+        |s: &Sample| s.error.map_or(f64::NAN, |e| (e[3] * e[3] + e[4] * e[4] + e[5] * e[5]).sqrt());
+    let error = crate::numbers::median(near.iter().map(|s| size(s)));
+    let interval =
+        crate::numbers::median(near.iter().map(|s| size(s) / beyond(&fitted[&s.method], s)[0]));
+    let mut cells = vec![
+        name.to_owned(),
+        near.len().to_string(),
+        format!("{error:.3}"),
+        format!("{interval:.3}"),
+    ];
+    cells.extend([within(3), within(0), held(0), held(1)].map(|share| format!("{share:.1} %")));
+    Some(cells)
+}
+
+/// Ten bins of equal count of sorted samples: the mean probability, the share of poses that are near, and the count.
+fn tenths(sorted: &[Scored]) -> impl Iterator<Item = (f64, f64, usize)> {
+    let bins = (0..10).map(|k| &sorted[k * sorted.len() / 10..(k + 1) * sorted.len() / 10]);
+    bins.filter(|bin| !bin.is_empty()).map(|bin| {
+        let share = mean(bin.iter().map(|s| f64::from(u8::from(s.1))));
+        (mean(bin.iter().map(|s| s.0)), share, bin.len())
+    })
+}
+
+/// Expected calibration error over ten bins of equal count.
+fn calibration_error(scored: &[Scored]) -> f64 {
+    let all = scored.len() as f64;
+    let error = |(predicted, actual, count): (f64, f64, usize)| {
+        (predicted - actual).abs() * count as f64 / all
+    };
+    tenths(scored).map(error).sum()
+}
+
+/// The share of pairs of a near and a far pose in which the near one is believed more; ties are half.
+/// `None` where there is no such pair.
+fn area_under_curve(scored: &[Scored]) -> Option<f64> {
+    let (near, far): (Vec<Scored>, Vec<Scored>) = scored.iter().copied().partition(|s| s.1);
+    let beats = |a: &Scored, b: &Scored| match a.0.total_cmp(&b.0) {
+        std::cmp::Ordering::Greater => 1.0,
+        std::cmp::Ordering::Equal => 0.5,
+        std::cmp::Ordering::Less => 0.0,
+    };
+    let wins: f64 = near.iter().flat_map(|a| far.iter().map(move |b| beats(a, b))).sum();
+    let pairs = near.len() * far.len();
+    (pairs > 0).then(|| wins / pairs as f64)
+}
