@@ -1,4 +1,4 @@
-//! Fitting what is said of poses to what they are.
+//! Fits probabilities and intervals to poses whose errors are known.
 
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3, Vector6};
 use posescope::diagnosis::confidence::{Fitted, units};

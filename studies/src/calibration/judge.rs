@@ -1,4 +1,4 @@
-//! How well what is said of poses holds.
+//! How well probabilities and intervals hold.
 
 use std::collections::{BTreeMap, BTreeSet};
 

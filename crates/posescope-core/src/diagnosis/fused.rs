@@ -52,8 +52,8 @@ pub fn diagnose_fusion(
 }
 
 /// The confidence of a fused pose, where a pose within the tolerance is right: that of the poses in it on average, by
-/// their weights. A pose that the fused one is not near speaks against it. How far it may be off is said as of the
-/// pose of most weight: an average of poses that may share their error is not known to be better.
+/// their weights. A pose that the fused one is not near speaks against it. The interval is that of
+/// the pose of most weight, because an average of poses that may share their error need not be better.
 pub fn fused_confidence(
     pose: &Pose,
     members: &[Member<'_>],
