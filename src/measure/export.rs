@@ -4,7 +4,6 @@
 //! A format that cannot leave them out is refused: poses are never invented.
 
 use std::path::Path;
-use std::time::Duration;
 
 use nalgebra::{Quaternion, Translation3, UnitQuaternion};
 
@@ -220,7 +219,10 @@ fn ros(localized: &[Localized<'_>]) -> Result<String, ExportError> {
         let query = one.item.query;
         let covariance =
             one.covariance.ok_or_else(|| ExportError::NoCovariance(query.to_owned()))?;
-        let time = Duration::try_from_secs_f64(one.time_s("ros")?).unwrap_or_default();
+        let time_s = one.time_s("ros")?;
+        // Nanoseconds count up from whole seconds, also before zero.
+        let second = time_s.floor();
+        let nanosecond = ((time_s - second) * 1e9).round().min(999_999_999.0);
         let (t, q) = (pose.translation.vector, pose.rotation.coords);
         let in_world = covariance.in_world_axes(&pose).transpose();
         let numbers: Vec<String> = in_world.iter().map(ToString::to_string).collect();
@@ -228,8 +230,8 @@ fn ros(localized: &[Localized<'_>]) -> Result<String, ExportError> {
             "header:\n  stamp:\n    sec: {}\n    nanosec: {}\n  frame_id: map\npose:\n  pose:\n    position:\n      \
              x: {}\n      y: {}\n      z: {}\n    orientation:\n      x: {}\n      y: {}\n      z: {}\n      w: {}\n  \
              covariance: [{}]\n---\n",
-            time.as_secs(),
-            time.subsec_nanos(),
+            second as i64,
+            nanosecond as u32,
             t.x,
             t.y,
             t.z,

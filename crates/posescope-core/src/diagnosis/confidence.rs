@@ -259,7 +259,9 @@ impl Trust {
         match &self.spread {
             Some((spread, tail)) if is_stricter => {
                 let errors = spread.scaled(*tail);
-                (errors.share_within(right) / errors.share_within(self.is_near)).min(1.0)
+                // Of a spread so wide that none of the errors drawn is near, none is right.
+                let near = errors.share_within(self.is_near).max(f64::MIN_POSITIVE);
+                (errors.share_within(right) / near).min(1.0)
             }
             _ => 1.0,
         }
