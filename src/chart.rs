@@ -123,6 +123,11 @@ impl Axis {
         }
     }
 
+    /// A linear axis from one end to another, which may be the lesser.
+    pub(crate) fn between(label: impl Into<String>, ends: (f64, f64)) -> Self {
+        Self { ends, ..Self::linear(label, ends.0.min(ends.1), ends.0.max(ends.1)) }
+    }
+
     /// An axis from 0 to 100 %.
     pub(crate) fn percent(label: impl Into<String>) -> Self {
         Self::linear(label, 0.0, 100.0)

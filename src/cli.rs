@@ -23,6 +23,7 @@ mod screenshot;
 mod stderr;
 mod story;
 mod surface;
+mod survey;
 mod synth;
 mod table;
 mod terminal;
@@ -101,6 +102,7 @@ fn dispatch(arguments: &Arguments) -> Result<(), CliError> {
         Some(Command::Eval(args)) => scored(&|| eval::eval(args, &terminal)),
         Some(Command::Results(args)) => results::results(args, &terminal),
         Some(Command::Compare(args)) => compare::compare(args, &terminal),
+        Some(Command::Survey(args)) => scored(&|| survey::survey(args, &terminal)),
         Some(Command::Index(args)) => index::index(args, &terminal),
         Some(Command::Doctor(args)) => doctor::doctor(args, &terminal),
         Some(Command::Synth(args)) => synth::synth(args, &terminal),

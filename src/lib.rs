@@ -56,8 +56,11 @@ pub mod proof;
 mod relation;
 #[cfg(feature = "rerun")]
 pub mod report;
+mod route;
 pub mod run;
 pub mod scene;
 pub mod session;
 pub mod sink;
+#[cfg(feature = "rerun")]
+pub mod survey;
 pub mod table;

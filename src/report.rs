@@ -6,6 +6,7 @@ mod page;
 mod pictures;
 
 pub use page::repeat_command;
+pub(crate) use page::{document, table};
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::path::{Path, PathBuf};

@@ -22,6 +22,7 @@ mod run_folder;
 mod scene_pair;
 mod scene_paths;
 mod scenes;
+mod survey_file;
 mod sweep;
 
 #[cfg(feature = "cli")]
@@ -49,4 +50,7 @@ pub use run_folder::{
 pub use scene_pair::{QueryCamera, ScenePair, is_called};
 pub use scene_paths::{is_same, labels};
 pub use scenes::Scenes;
+pub use survey_file::{
+    Poses, SURVEY_FILE, SurveyError, SurveyFile, SurveyFrom, survey_line, survey_of,
+};
 pub use sweep::{Sweep, SweepError};

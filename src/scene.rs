@@ -58,7 +58,7 @@ pub use gps::located;
 pub use loose::{CameraArgument, LoosePhotos};
 pub use pair_matches::{MatchFolder, PixelMaps, write_matches};
 pub use recalibrated::Recalibrated;
-pub use retriever::{IndexOptions, NoIndex, Retriever};
+pub use retriever::{IndexOptions, NoIndex, Retriever, cache_file};
 
 /// Every format, in the order in which they are tried.
 pub const ALL: &[SceneFormat] = &[

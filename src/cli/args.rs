@@ -19,7 +19,7 @@ use posescope::run::{ConfigError, with_config};
 pub use eval::{EvalArgs, EvalCommand, MergeArgs};
 pub use given::Given;
 pub use look::{CompareArgs, Form, ResultsArgs};
-pub use scene::{DoctorArgs, IndexArgs, SynthArgs};
+pub use scene::{DoctorArgs, IndexArgs, SurveyArgs, SynthArgs};
 #[cfg(feature = "app")]
 pub use screenshot::ScreenshotArgs;
 #[cfg(feature = "app")]
@@ -65,6 +65,7 @@ Look at runs:
 
 Prepare data:
   doctor     Check scenes: list their contents and find the usual mistakes
+  survey     Measure where a map localises photos, and how far to trust its poses
   index      Build the retrieval index for --reference retrieve:K
   synth      Write the built-in street as a KITTI, TUM, COLMAP or scene.toml data set
 
@@ -95,6 +96,8 @@ pub enum Command {
     Compare(CompareArgs),
     /// Check scenes: list their contents and find the usual mistakes; exit code 3 if a scene is unusable
     Doctor(DoctorArgs),
+    /// Measure where a map localises photos, and how far to trust its poses
+    Survey(SurveyArgs),
     /// Build the retrieval index for --reference retrieve:K
     Index(IndexArgs),
     /// Write the built-in street as a data set, one drive per condition

@@ -12,6 +12,7 @@ use posescope::sink::{KEPT_FAILURES, merge_failures};
 
 use self::ending::ending;
 use self::one::{Evaluated, evaluate};
+pub use self::one::{User, resuming};
 use super::args::{EvalArgs, EvalCommand, MergeArgs};
 use super::compare::shown;
 use super::failure::CliError;

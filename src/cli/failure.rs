@@ -8,10 +8,12 @@ use posescope::lesson::{LessonError, SettingError};
 use posescope::localize::{ChoiceError, Selection};
 use posescope::run::{
     ConfigError, DrawError, FolderError, OutputError, PlanError, ProtocolError, Refusal, RunError,
+    SurveyError,
 };
 use posescope::scene::{NoIndex, SceneError, is_decoding};
 use posescope::session::JobError;
 use posescope::sink::rerun::RecordError;
+use posescope::survey::SurveyingError;
 use posescope::trace::Cancelled;
 
 use super::compute::ComputeError;
@@ -60,6 +62,8 @@ pub enum CliError {
     Io { path: PathBuf, source: io::Error },
     #[error(transparent)]
     Index(#[from] NoIndex),
+    #[error(transparent)]
+    Survey(#[from] SurveyError),
     #[error(transparent)]
     Choice(#[from] ChoiceError),
     #[error(transparent)]
@@ -120,6 +124,7 @@ impl CliError {
             | Self::Refused(_)
             | Self::Protocol(_)
             | Self::Index(NoIndex::NoFolder)
+            | Self::Survey(SurveyError::Scenes(_))
             | Self::Choice(ChoiceError::UnknownPosition { .. } | ChoiceError::NoIndex)
             | Self::Draw(DrawError::NotDrawn { .. })
             | Self::Folder(
@@ -134,6 +139,7 @@ impl CliError {
             | Self::Config(_)
             | Self::Io { .. }
             | Self::Index(_)
+            | Self::Survey(_)
             | Self::Choice(_)
             | Self::Folder(_)
             | Self::Draw(_)
@@ -166,8 +172,21 @@ impl From<PlanError> for CliError {
             PlanError::Draw(error) => error.into(),
             PlanError::Folder(error) => error.into(),
             PlanError::Index(error) => error.into(),
+            PlanError::Survey(error) => error.into(),
             PlanError::Output(error) => error.into(),
             PlanError::Refused(error) => error.into(),
+        }
+    }
+}
+
+impl From<SurveyingError> for CliError {
+    fn from(error: SurveyingError) -> Self {
+        match error {
+            SurveyingError::Plan(error) => error.into(),
+            SurveyingError::Run(error) => error.into(),
+            SurveyingError::Folder(error) => error.into(),
+            SurveyingError::Survey(error) => error.into(),
+            SurveyingError::Alone { .. } => Self::Unusable(error.to_string()),
         }
     }
 }

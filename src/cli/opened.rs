@@ -6,7 +6,7 @@ use std::sync::Arc;
 use posescope::camera::Intrinsics;
 use posescope::localize::Selection;
 use posescope::params::Params;
-use posescope::run::Protocol;
+use posescope::run::{Protocol, SurveyFile, survey_of};
 use posescope::scene::{LoosePhotos, Scene, SceneError, SceneSize};
 use posescope::session::{Task, TaskScenes};
 
@@ -86,6 +86,8 @@ pub struct OpenedTask {
     pub queries: Vec<usize>,
     /// The size of the references' scene.
     pub size: SceneSize,
+    /// The survey that confidence follows.
+    pub survey: Option<SurveyFile>,
 }
 
 /// Opens the scenes and queries of the arguments. A query that is a file and not a frame of its scene is a
@@ -139,6 +141,10 @@ pub fn open(args: &TaskArgs, scene: &str, queries: &[String]) -> Result<OpenedTa
         task.protocol = Protocol { references: task.protocol.references, ..protocol };
         task.params = params;
     }
+    let survey = survey_of(task.protocol.survey.as_ref(), scenes.references.as_ref(), scene)?;
+    if let Some(file) = &survey {
+        task.params.survey = file.survey.clone();
+    }
     let queries = match &task.photos {
         Some(photos) => (0..photos.paths.len()).collect(),
         None => queries
@@ -146,7 +152,7 @@ pub fn open(args: &TaskArgs, scene: &str, queries: &[String]) -> Result<OpenedTa
             .map(|name| scenes.queries.find(name))
             .collect::<Result<_, SceneError>>()?,
     };
-    Ok(OpenedTask { task, scenes, queries, size })
+    Ok(OpenedTask { task, scenes, queries, size, survey })
 }
 
 #[cfg(test)]

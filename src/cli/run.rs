@@ -8,7 +8,7 @@ use posescope::localize::{
     ChoiceError, Chooser, Localizer, QueryResult, Ranking, References, Request, Selection,
 };
 use posescope::method::Method;
-use posescope::run::{JSON_LINES, refuse_to_replace, warn_of_unseen_map};
+use posescope::run::{JSON_LINES, refuse_to_replace, survey_line, warn_of_unseen_map};
 use posescope::scene::{Retriever, Scene, frame_range, why_no_cloud};
 use posescope::session::{Breakpoints, StopAtBreakpoint, Task, none_near};
 use posescope::sink::rerun::{Identity, Recorder, Targets};
@@ -37,7 +37,7 @@ struct Plan<'a> {
 type PlannedQuery = (usize, References);
 
 pub fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), CliError> {
-    let OpenedTask { task, scenes, queries: wanted, size } =
+    let OpenedTask { task, scenes, queries: wanted, size, survey } =
         opened::open(&args.task, &args.scene, &args.query)?;
     let queries = scenes.queries.as_ref();
     if wanted.is_empty() && !args.all {
@@ -66,6 +66,9 @@ pub fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), CliError> {
     };
     if let Some(line) = opened::size_line(&size, &task.protocol, &task.params) {
         terminal.say(|| line);
+    }
+    if let Some(file) = &survey {
+        terminal.say(|| survey_line(file));
     }
     let camera = tasks.first().map(|&(query, _)| queries.intrinsics(query));
     let misfit = |camera| opened::misfit(&size, &task.protocol, &task.params, &camera);

@@ -1,7 +1,7 @@
 //! The route of the camera, seen from above.
 
 use image::{Rgb, imageops};
-use nalgebra::{Point2, Vector3};
+use nalgebra::Point2;
 
 use posescope_core::image::MAX_PIXELS;
 
@@ -9,33 +9,16 @@ use super::picture::dot;
 use crate::geometry::Pose;
 use crate::image::RgbImage;
 use crate::palette;
+use crate::route::from_above;
 
 /// The margin around the route \[px\].
 const MARGIN_PX: f64 = 20.0;
 /// The width of a picture without a photo \[px\].
 const WIDTH: u32 = 620;
 
-/// The camera's positions \[m\], right and ahead of its first pose. `None` for fewer than two poses.
-fn places(poses: &[Pose]) -> Option<Vec<Point2<f64>>> {
-    let [start, _, ..] = poses else {
-        return None;
-    };
-    // The axes of the world are arbitrary, so "down" comes from the cameras.
-    let down: Vector3<f64> = poses.iter().map(|pose| pose.rotation * Vector3::y()).sum();
-    let down = down.try_normalize(1e-9)?;
-    let right = start.rotation * Vector3::x();
-    let right = (right - down * down.dot(&right)).try_normalize(1e-9)?;
-    let ahead = right.cross(&down);
-    let place = |pose: &Pose| {
-        let way = pose.translation.vector - start.translation.vector;
-        Point2::new(right.dot(&way), ahead.dot(&way))
-    };
-    Some(poses.iter().map(place).collect())
-}
-
 /// Draws the route below a picture, or alone: its start green, its end vermilion.
 pub(super) fn below(picture: Option<RgbImage>, poses: &[Pose]) -> Option<RgbImage> {
-    let Some(places) = places(poses) else {
+    let Some(places) = from_above(poses) else {
         return picture;
     };
     let (width, top) = picture.as_ref().map_or((WIDTH, 0), RgbImage::dimensions);
@@ -73,7 +56,7 @@ pub(super) fn below(picture: Option<RgbImage>, poses: &[Pose]) -> Option<RgbImag
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::{Translation3, UnitQuaternion};
+    use nalgebra::{Translation3, UnitQuaternion, Vector3};
     use std::f64::consts::FRAC_PI_2;
 
     use super::*;
@@ -89,7 +72,7 @@ mod tests {
             Pose::translation(7.0, -3.0, 2.0) * tilted * Pose::from_parts(place, turned)
         });
         let poses: Vec<Pose> = poses.collect();
-        let places = places(&poses).expect("a way");
+        let places = from_above(&poses).expect("a way");
         assert!((places[50] - Point2::new(100.0, 100.0)).norm() < 1e-6, "{}", places[50]);
         let map = below(None, &poses).expect("a map");
         assert_eq!(map.dimensions(), (WIDTH, WIDTH / 2));

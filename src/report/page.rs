@@ -27,6 +27,45 @@ pub(super) fn page(report: &RunReport) -> String {
     let overview = Overview::of(&all, &report.summary.doctor);
     let columns = results::columns(report);
     let rules = results::column_rules(&columns);
+    let rules = format!("{rules}{}", thumbnails(report));
+    let body = html! {
+        header {
+            h1 { (title) }
+            @for finding in &overview.findings { p.headline { b.wrong { (finding.text) } } }
+            p.headline { (with_code(&overview.headline)) }
+            nav aria-label="Parts of the report" {
+                @if !report.summary.gates.is_empty() { a href="#gates" { "Gates" } " " }
+                @if report.baseline.is_some() { a href="#changes" { "Changes" } " " }
+                a href="#methods" { "Methods" } " "
+                @if !overview.causes.is_empty() { a href="#causes" { "Causes" } " " }
+                a href="#failures" { "Failures" } " "
+                a href="#queries" { "All results" } " "
+                a href="#plots" { "Plots" } " "
+                a href="#figures" { "Figures" } " "
+                a href="#asked" { "What was run" }
+            }
+        }
+        main {
+            (gates(report))
+            @if let Some(baseline) = &report.baseline { (changes(report, baseline)) }
+            (glance::methods(&overview))
+            (glance::causes(&overview))
+            (failures::failures(report))
+            (results::results(report, &columns))
+            (plots(report))
+            section aria-labelledby="figures" {
+                h2 id="figures" { "Figures" }
+                @for one in &report.tables { (table(one)) }
+            }
+            (request(report))
+        }
+        script { (PreEscaped(SCRIPT)) }
+    };
+    document(&title, &rules, &body)
+}
+
+/// A page in one file, with these rules besides the common ones.
+pub(crate) fn document(title: &str, rules: &str, body: &Markup) -> String {
     html! {
         (DOCTYPE)
         html lang="en" {
@@ -34,41 +73,9 @@ pub(super) fn page(report: &RunReport) -> String {
                 meta charset="utf-8";
                 meta name="viewport" content="width=device-width, initial-scale=1";
                 title { "posescope: " (title) }
-                style { (PreEscaped(colors())) (PreEscaped(STYLE)) (PreEscaped(rules)) (PreEscaped(thumbnails(report))) }
+                style { (PreEscaped(colors())) (PreEscaped(STYLE)) (PreEscaped(rules)) }
             }
-            body {
-                header {
-                    h1 { (title) }
-                    @for finding in &overview.findings { p.headline { b.wrong { (finding.text) } } }
-                    p.headline { (with_code(&overview.headline)) }
-                    nav aria-label="Parts of the report" {
-                        @if !report.summary.gates.is_empty() { a href="#gates" { "Gates" } " " }
-                        @if report.baseline.is_some() { a href="#changes" { "Changes" } " " }
-                        a href="#methods" { "Methods" } " "
-                        @if !overview.causes.is_empty() { a href="#causes" { "Causes" } " " }
-                        a href="#failures" { "Failures" } " "
-                        a href="#queries" { "All results" } " "
-                        a href="#plots" { "Plots" } " "
-                        a href="#figures" { "Figures" } " "
-                        a href="#asked" { "What was run" }
-                    }
-                }
-                main {
-                    (gates(report))
-                    @if let Some(baseline) = &report.baseline { (changes(report, baseline)) }
-                    (glance::methods(&overview))
-                    (glance::causes(&overview))
-                    (failures::failures(report))
-                    (results::results(report, &columns))
-                    (plots(report))
-                    section aria-labelledby="figures" {
-                        h2 id="figures" { "Figures" }
-                        @for one in &report.tables { (table(one)) }
-                    }
-                    (request(report))
-                }
-                script { (PreEscaped(SCRIPT)) }
-            }
+            body { (body) }
         }
     }
     .into_string()
@@ -138,7 +145,7 @@ fn changes(report: &RunReport, baseline: &Baseline) -> Markup {
 }
 
 /// A table, with good and bad words coloured.
-fn table(table: &Table) -> Markup {
+pub(crate) fn table(table: &Table) -> Markup {
     let class = |at: usize| match table.align.get(at) {
         Some(Align::Right) => Some("number"),
         Some(Align::Note) => Some("words"),

@@ -14,12 +14,15 @@ use super::run_folder::{FolderError, read_run};
 use super::scene_pair::{ScenePair, is_called};
 use super::scene_paths::labels;
 use super::scenes::Scenes;
+use super::survey_file::{SurveyError, SurveyFile, SurveyFrom, survey_of};
+use crate::estimator;
 use crate::fusion::Fusion;
 use crate::localize::{QueryResult, Ranking, Selection};
 use crate::measure::{Gate, KnownFailures, read_rows};
 use crate::method::Method;
 use crate::params::Params;
 use crate::scene::{NoIndex, Retriever, SceneError, SceneSize};
+use posescope_core::survey::Survey;
 
 /// What an evaluation is asked to do.
 pub struct EvaluationRequest<'a> {
@@ -41,6 +44,8 @@ pub struct EvaluationRequest<'a> {
     pub rerun_failed: Option<&'a Path>,
     /// How the run will be judged.
     pub judging: &'a Judging,
+    /// Whether a map is surveyed: confidence is as it was fitted, at any scale.
+    pub is_survey: bool,
     /// The run folder.
     pub folder: &'a Path,
     /// The file of events.
@@ -72,6 +77,8 @@ pub struct Plan {
     pub indices: Vec<Box<dyn Ranking>>,
     /// The size of the first scene.
     pub size: SceneSize,
+    /// The survey that confidence follows.
+    pub survey: Option<SurveyFile>,
 }
 
 /// Why an evaluation does not start.
@@ -95,6 +102,9 @@ pub enum PlanError {
     /// There is no index.
     #[error(transparent)]
     Index(#[from] NoIndex),
+    /// A survey does not fit.
+    #[error(transparent)]
+    Survey(#[from] SurveyError),
     /// A file must not be written.
     #[error(transparent)]
     Output(#[from] OutputError),
@@ -144,7 +154,7 @@ impl Plan {
         let gated: Vec<Method> = request.judging.gates.iter().map(Gate::method).collect();
         let others: Vec<Method> = given.estimates.iter().map(|file| file.method).collect();
         known(&gated, &others)?;
-        let Self { mut run, scenes, params, size, .. } = match request.rerun_failed {
+        let Self { mut run, scenes, params, size, survey, .. } = match request.rerun_failed {
             Some(before) => request.of_failed(before)?,
             None => request.of_scenes(&given)?,
         };
@@ -152,7 +162,7 @@ impl Plan {
         let (indices, contents) = indices(&run, &scenes, &params)?;
         run.inputs.extend(contents);
         request.check(&run)?;
-        Ok(Self { run, scenes, params, indices, size })
+        Ok(Self { run, scenes, params, indices, size, survey })
     }
 }
 
@@ -164,7 +174,15 @@ impl EvaluationRequest<'_> {
         let scenes = Scenes::open(self.scenes, &given.query_scene, given.format.as_deref())?;
         let first = scenes.references.first();
         let size = first.map_or(SceneSize::PAPER, |scene| SceneSize::of(scene.as_ref()));
-        let params = with_config(Params::at_scale(size.scale), self.config, self.assignments)?;
+        let survey = self.survey(given, &scenes)?;
+        let numbers = match &survey {
+            _ if self.is_survey => Survey::unchanged(estimator::methods()),
+            Some(file) => file.survey.clone(),
+            None => Survey::default(),
+        };
+        let mut params = Params::at_scale(size.scale);
+        params.survey = numbers;
+        let params = with_config(params, self.config, self.assignments)?;
         let defaults =
             defaults(given.preset, first.map_or("", |scene| scene.name())).at_size(&size);
         let mut protocol = (self.protocol)(defaults.clone())?;
@@ -194,7 +212,20 @@ impl EvaluationRequest<'_> {
             pairs,
             params: written(&params),
         };
-        Ok(Plan { run, scenes, params, indices: Vec::new(), size })
+        Ok(Plan { run, scenes, params, indices: Vec::new(), size, survey })
+    }
+
+    /// The survey that confidence follows.
+    fn survey(&self, given: &Protocol, scenes: &Scenes) -> Result<Option<SurveyFile>, SurveyError> {
+        let from = given.survey.as_ref();
+        match (scenes.references.as_slice(), self.scenes) {
+            _ if self.is_survey => Ok(None),
+            ([scene], [argument]) => survey_of(from, scene.as_ref(), argument),
+            (scenes, _) if matches!(from, Some(SurveyFrom::Folder(_))) => {
+                Err(SurveyError::Scenes(scenes.len()))
+            }
+            _ => Ok(None),
+        }
     }
 
     /// Gives each query of a pair its own references, and checks those that are named for all.
@@ -265,7 +296,7 @@ impl EvaluationRequest<'_> {
             params: written(&params),
             ..run
         };
-        Ok(Plan { run, scenes, params, indices: Vec::new(), size })
+        Ok(Plan { run, scenes, params, indices: Vec::new(), size, survey: None })
     }
 
     /// Refuses before the first query what would fail after the last.

@@ -10,6 +10,7 @@ use super::estimates_file::EstimatesFile;
 use super::limit::Limit;
 use super::preset::{Preset, default_failure_radius_m};
 use super::reference::Reference;
+use super::survey_file::SurveyFrom;
 use crate::diagnosis::Tolerance;
 use crate::estimator;
 use crate::fusion::Fusion;
@@ -211,6 +212,16 @@ pub struct Protocol {
     )]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub min_confidence: Option<f64>,
+    /// The survey that confidence follows, or none [default: the last of this map]
+    ///
+    /// DIR is a folder that `posescope survey` has written. `none` leaves confidence as it was fitted on generated
+    /// towns.
+    #[cfg_attr(
+        feature = "cli",
+        arg(long, help_heading = "Judging", value_name = "DIR|none", hide_short_help = true)
+    )]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub survey: Option<SurveyFrom>,
     /// Try variations of each wrong result and report what helps
     ///
     /// At most RUNS variations per result, 12 if RUNS is left out.
@@ -262,6 +273,7 @@ impl Default for Protocol {
             right: Tolerance::default(),
             failure_radius_m: None,
             min_confidence: None,
+            survey: None,
             explain: 0,
             format: None,
         }

@@ -12,6 +12,7 @@ use super::preset::{Preset, default_failure_radius_m};
 use super::protocol::{Protocol, known};
 use super::scene_pair::{QueryCamera, ScenePair};
 use super::scene_paths;
+use super::survey_file::SurveyFrom;
 use crate::describe::ParamError;
 use crate::localize::{QueryResult, References, Request, Setting};
 use crate::method::Method;
@@ -265,6 +266,9 @@ impl RunFile {
         protocol.matches = protocol.matches.as_ref().map(path);
         for file in &mut protocol.estimates {
             file.path = path(&file.path);
+        }
+        if let Some(SurveyFrom::Folder(folder)) = &mut protocol.survey {
+            *folder = path(folder);
         }
         let name = |name: String| match name.strip_prefix(CONTENT_OF) {
             Some(argument) => format!("{CONTENT_OF}{}", change(argument)),

@@ -20,6 +20,22 @@ use posescope_street::user_cache_folder;
 /// The extension of the files.
 const EXTENSION: &str = "posescope-index";
 
+/// A file about a scene in this folder of the user's cache, named after the scene and the folder of the argument. `None`
+/// if there is no cache or it is turned off.
+pub fn cache_file(
+    folder: &str,
+    extension: &str,
+    scene: &dyn Scene,
+    argument: &str,
+) -> Option<PathBuf> {
+    let mut name = scene.name().replace(|c: char| !c.is_alphanumeric(), "-");
+    if let Ok(folder) = Path::new(argument).canonicalize() {
+        let hash = xxh3_64(folder.as_os_str().as_encoded_bytes());
+        name.push_str(&format!("-{hash:016x}"));
+    }
+    Some(user_cache_folder(folder)?.join(name).with_extension(extension))
+}
+
 /// The options of an index besides the parameters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct IndexOptions {
@@ -61,13 +77,7 @@ impl Retriever {
     /// The default file of a scene's index: in the user's cache directory, named after the scene and the folder of the
     /// argument. `None` if there is no such directory or it is turned off.
     pub fn default_path(scene: &dyn Scene, argument: &str) -> Option<PathBuf> {
-        let mut name = scene.name().replace(|c: char| !c.is_alphanumeric(), "-");
-        if let Ok(folder) = Path::new(argument).canonicalize() {
-            let hash = xxh3_64(folder.as_os_str().as_encoded_bytes());
-            name.push_str(&format!("-{hash:016x}"));
-        }
-        let folder = user_cache_folder("index")?;
-        Some(folder.join(name).with_extension(EXTENSION))
+        cache_file("index", EXTENSION, scene, argument)
     }
 
     /// The request for an index of a scene `without` some frames: they are not found, and do not contribute to the

@@ -191,6 +191,7 @@ mod tests {
                 right: "0.5m,2deg".parse().expect("a tolerance"),
                 failure_radius_m: Some(20.0),
                 min_confidence: Some(0.75),
+                survey: Some("my survey".parse().expect("a folder")),
                 explain: 4,
                 format: Some("street".to_owned()),
             },
@@ -213,7 +214,7 @@ mod tests {
              --failure-radius 20 --format street --fusion avg,r-wavg --gps gps.csv --index 'my index' --limit '10%' \
              --matches hloc --method fb,mi,other --min-confidence 0.75 --preset single --prior 80 \
              --query-scene street:night --radius 12.5 --reference retrieve:3 --right 0.5m,2deg --seed 9 \
-             --set fb.ratio=0.75 --break 'inliers < 10'"
+             --survey 'my survey' --set fb.ratio=0.75 --break 'inliers < 10'"
         );
         assert!(
             task()

@@ -25,8 +25,8 @@ const BEFORE: [(&str, &[&str]); 2] = [
     ),
 ];
 
-/// The page whose commands build an index.
-const INDEXED: [&str; 1] = ["retrieval.md"];
+/// The pages whose commands build an index or survey a map.
+const KEEPING: [&str; 2] = ["retrieval.md", "trust.md"];
 
 /// What is too long for a test, or wants what is not at hand, with the tests that do it otherwise.
 const NOT_HERE: [(&str, &str); 10] = [
@@ -65,6 +65,7 @@ fn adapted(own: &[String], sequences: Option<&Path>) -> Option<Vec<String>> {
     let briefer: &[&str] = match (has("index"), has("eval") && has("large")) {
         (true, _) => &["--set", "index.words=100", "--every", "100"],
         (_, true) => &["--limit", "1", "--method", "fb"],
+        _ if has("survey") => &["--method", "fb"],
         _ if has("--limit") => &["--limit", "1"],
         _ if has("--surface") => &["--set", "surface.step=2", "--set", "surface.yaw_step=10"],
         _ => &[],
@@ -73,9 +74,9 @@ fn adapted(own: &[String], sequences: Option<&Path>) -> Option<Vec<String>> {
     Some(words)
 }
 
-fn run(folder: &Path, words: &[String], has_index: bool) {
+fn run(folder: &Path, words: &[String], keeps: bool) {
     let mut command: Command = posescope();
-    if has_index {
+    if keeps {
         // It is none of other tests' business.
         command.env("POSESCOPE_CACHE", folder.join("cache"));
     }
@@ -96,12 +97,12 @@ fn go_through(page: &str) {
     let path = documents().into_iter().find(|path| path.ends_with(page));
     let path = path.unwrap_or_else(|| panic!("{page} is a page"));
     let folder = TempDir::new().expect("a folder");
-    let has_index = INDEXED.contains(&page);
+    let keeps = KEEPING.contains(&page);
     for (_, before) in BEFORE.iter().filter(|(name, _)| *name == page) {
         for line in *before {
             let words = shlex::split(line).expect("words");
             if let Some(words) = adapted(&words, sequences.as_deref()) {
-                run(folder.path(), &words, has_index);
+                run(folder.path(), &words, keeps);
             }
         }
     }
@@ -114,14 +115,14 @@ fn go_through(page: &str) {
             println!("skipped: {}", words.join(" "));
             continue;
         };
-        run(folder.path(), &words, has_index);
+        run(folder.path(), &words, keeps);
         done += 1;
     }
     assert!(done > 0 || sequences.is_none(), "{page} has no command that could be run");
 }
 
 /// The pages with commands of ours. Those with many have a test of their own, so that they run side by side.
-const PAGES: [&str; 15] = [
+const PAGES: [&str; 16] = [
     "README.md",
     "calibration.md",
     "ci.md",
@@ -137,6 +138,7 @@ const PAGES: [&str; 15] = [
     "retrieval.md",
     "scenes.md",
     "street.md",
+    "trust.md",
 ];
 
 #[test]
@@ -188,6 +190,12 @@ fn the_page_on_other_systems_can_be_followed() {
 #[ignore = "runs every command of a page; .ci/nightly runs it"]
 fn the_page_on_retrieval_can_be_followed() {
     go_through("retrieval.md");
+}
+
+#[test]
+#[ignore = "runs every command of a page; .ci/nightly runs it"]
+fn the_page_on_trust_can_be_followed() {
+    go_through("trust.md");
 }
 
 #[test]

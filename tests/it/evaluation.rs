@@ -434,6 +434,7 @@ fn a_query_that_panics_is_a_failed_result_and_the_rest_goes_on() {
         scenes,
         params: Params::default(),
         indices: Vec::new(),
+        survey: None,
         size: SceneSize::PAPER,
     };
     Evaluation::run(&plan, &mut folder, &mut NoRunObserver(NoObserver))

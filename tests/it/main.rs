@@ -63,6 +63,7 @@ mod stored;
 mod storyboard;
 #[cfg(unix)]
 mod strangers;
+mod survey;
 mod sweep;
 mod synth;
 mod text_clouds;

@@ -216,6 +216,8 @@ pub mod scene;
 #[doc(hidden)]
 pub mod search;
 #[doc(hidden)]
+pub mod survey;
+#[doc(hidden)]
 pub mod text;
 #[doc(hidden)]
 pub mod trace;

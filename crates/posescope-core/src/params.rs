@@ -11,6 +11,7 @@ use crate::features::SurfParams;
 use crate::grid::{GridParams, SurfaceParams};
 use crate::retrieval::{IndexParams, RetrievalParams};
 use crate::scale::Scale;
+use crate::survey::{Survey, Surveyed};
 
 pub use crate::describe::{About, Described, Domain, ParamError, Value};
 pub use crate::estimator::{
@@ -26,6 +27,9 @@ pub use crate::search::descent::DescentParams;
 pub struct Params {
     /// How large the scene is.
     pub scale: Scale,
+    /// What the map shows about confidence; it changes no pose.
+    #[doc(hidden)]
+    pub survey: Survey,
     /// `surf`: detector and descriptor.
     pub surf: SurfParams,
     /// `fb`: matching, depth lift, consensus, acceptance.
@@ -59,6 +63,8 @@ pub struct Params {
 
 /// The table of the scale in a configuration.
 const SCALE: &str = "scale";
+/// The table of the survey in a configuration.
+const SURVEY: &str = "survey";
 
 /// Reads a configuration over the defaults, as [`Params::merge_toml`] does.
 impl FromStr for Params {
@@ -198,6 +204,16 @@ impl Params {
                 })?;
                 continue;
             }
+            if group == SURVEY {
+                let survey = entries.clone().try_into().ok().filter(Survey::is_sound);
+                self.survey = survey.ok_or_else(|| ParamError::BadValue {
+                    key: group.clone(),
+                    expected: "a table of shift, slope, position and rotation for each method"
+                        .to_owned(),
+                    given: entries.to_string(),
+                })?;
+                continue;
+            }
             let Some(entries) = entries.as_table() else {
                 return Err(ParamError::Syntax(format!(
                     "`{group}` is outside a group; parameters belong to tables such as [fb]"
@@ -220,6 +236,12 @@ impl Params {
         if !self.scale.is_paper() {
             let (metre, is_metric) = (self.scale.metre(), self.scale.is_metric());
             text += &format!("[{SCALE}]\nmetre = {metre:?}\nis_metric = {is_metric}\n\n");
+        }
+        for (method, one) in self.survey.methods() {
+            let Surveyed { shift, slope, position, rotation } = one;
+            text += &format!(
+                "[{SURVEY}.{method}]\nshift = {shift:?}\nslope = {slope:?}\nposition = {position:?}\nrotation = {rotation:?}\n\n"
+            );
         }
         let mut group = String::new();
         for row in self.list() {
@@ -338,6 +360,23 @@ mod tests {
             assert_eq!(extreme.to_toml().parse(), Ok(extreme), "{depth}");
         }
         for wrong in ["scale = 1.0", "[scale]\nmetre = -1.0\nis_metric = true"] {
+            assert!(wrong.parse::<Params>().is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn a_survey_is_read_as_it_was_written_and_is_no_change() {
+        let surveyed = Surveyed { shift: -0.25, slope: 0.75, position: 2.0, rotation: 1.5 };
+        let survey: Survey = [(crate::method::Method::FB, surveyed)].into_iter().collect();
+        let params = Params { survey, ..Params::at_scale(Scale::of_depth(1.8, true)) };
+        assert_eq!(params.changes(), [""; 0]);
+        assert_eq!(params.to_toml().parse(), Ok(params));
+        for wrong in [
+            "survey = 1.0",
+            "[survey.fb]\nshift = 0.0",
+            "[survey.fb]\nshift = 0.0\nslope = 0.0\nposition = 1.0\nrotation = 1.0",
+            "[survey.fb]\nshift = nan\nslope = 1.0\nposition = 1.0\nrotation = 1.0",
+        ] {
             assert!(wrong.parse::<Params>().is_err(), "{wrong}");
         }
     }

@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 
 use posescope::localize::{ChoiceError, LocalizeError};
-use posescope::run::{ConfigError, DrawError, FolderError, PlanError, RunError};
+use posescope::run::{ConfigError, DrawError, FolderError, PlanError, RunError, SurveyError};
 use posescope::scene::{NoIndex, SceneError};
 use posescope_core::InputError;
 use pyo3::exceptions::{PyKeyboardInterrupt, PyValueError};
@@ -120,6 +120,8 @@ pub fn plan(error: &PlanError) -> PyErr {
             "a frame with a known pose expected; `posescope.doctor` says what is missing",
         ),
         PlanError::Index(error @ NoIndex::Unusable { .. }) => input("", "", &error.to_string()),
+        PlanError::Survey(error @ SurveyError::Scenes(_)) => value(error),
+        PlanError::Survey(error) => input("", "", &error.to_string()),
         PlanError::Protocol(_)
         | PlanError::Config(ConfigError::Param(_))
         | PlanError::Draw(DrawError::NotDrawn { .. })

@@ -123,6 +123,7 @@ impl Request {
             shard: self.shard,
             rerun_failed: None,
             judging: &self.judging,
+            is_survey: false,
             folder: &self.folder,
             events: self.events.as_deref(),
         });

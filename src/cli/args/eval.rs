@@ -133,7 +133,7 @@ impl EvalArgs {
 }
 
 /// A scene's argument as the name of a folder. `.` and `..` have the names of their folders.
-fn plain_name(argument: &str) -> String {
+pub(super) fn plain_name(argument: &str) -> String {
     let path = Path::new(argument);
     let folder = path.canonicalize().ok().filter(|_| path.file_name().is_none());
     let own = folder.as_deref().and_then(Path::file_name).map(|name| name.to_string_lossy());

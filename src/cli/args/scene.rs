@@ -1,14 +1,18 @@
-//! The arguments of the commands on whole scenes: `doctor`, `index` and `synth`.
+//! The arguments of the commands on whole scenes: `doctor`, `survey`, `index` and `synth`.
 
 use std::num::NonZeroUsize;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser as _};
+use posescope::image::{Degradation, DegradationError};
+use posescope::method::Method;
 use posescope::scene::layout::LAYOUTS;
 use posescope::scene::street::{Size, Street};
+use posescope::survey::SurveyRequest;
 
 use super::ConfigArgs;
+use super::eval::plain_name;
 
 #[derive(Debug, Args)]
 pub struct SynthArgs {
@@ -73,6 +77,74 @@ pub struct DoctorArgs {
     /// raw, or scene.toml. The scene itself is not changed. Nothing is written if the calibration is consistent.
     #[arg(long, value_name = "FILE", requires = "calibration")]
     pub out: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub struct SurveyArgs {
+    /// The scene, as for `run`
+    pub scene: String,
+    /// The methods; a hybrid stands for the two that it runs
+    #[arg(long = "method", value_name = "fb,fb2,robust", value_delimiter = ',')]
+    #[arg(value_parser = posescope::run::method, default_value = "fb,fb2,robust")]
+    pub methods: Vec<Method>,
+    /// Localise this many photos near a reference
+    ///
+    /// They are spread over the map. A fifth as many are localised from a reference that is far away, and as many
+    /// mirrored.
+    #[arg(long, value_name = "N", default_value_t = SurveyRequest::QUERIES)]
+    #[arg(value_parser = clap::value_parser!(usize))]
+    pub queries: usize,
+    /// How far from the reference to search, in metres [default: as `run`]
+    #[arg(long, value_name = "METRES", value_parser = posescope::run::positive)]
+    pub radius: Option<f64>,
+    /// Localise each photo by the nearest reference that is at least this far away, in metres
+    ///
+    /// [default: any reference within the radius]
+    #[arg(long, value_name = "METRES", value_parser = posescope::run::positive)]
+    pub spacing: Option<f64>,
+    /// Localise the photos near a reference once more, degraded, for example exposure=-2,noise=8
+    #[arg(long, value_name = "STEP=STRENGTH,…", default_value = "")]
+    #[arg(value_parser = degradation, hide_default_value = true)]
+    pub degrade: Degradation,
+    /// The format of the scene [default: detected]
+    #[arg(long, value_name = "NAME")]
+    pub format: Option<String>,
+    /// The folder of the survey [default: runs/SCENE-survey]
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Continue the survey in the folder --out
+    #[arg(long)]
+    pub resume: bool,
+    /// The seed of every random choice
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub seed: u64,
+    #[command(flatten)]
+    pub config: ConfigArgs,
+}
+
+/// A degradation, or none.
+fn degradation(text: &str) -> Result<Degradation, DegradationError> {
+    if text.is_empty() { Ok(Degradation::default()) } else { text.parse() }
+}
+
+impl SurveyArgs {
+    /// What is surveyed.
+    pub fn request(&self) -> SurveyRequest {
+        let default = || Path::new("runs").join(format!("{}-survey", plain_name(&self.scene)));
+        SurveyRequest {
+            scene: self.scene.clone(),
+            format: self.format.clone(),
+            methods: self.methods.clone(),
+            radius_m: self.radius,
+            spacing_m: self.spacing,
+            queries: self.queries,
+            degrade: self.degrade,
+            seed: self.seed,
+            config: self.config.config.clone(),
+            assignments: self.config.assignments.clone(),
+            out: self.out.clone().unwrap_or_else(default),
+        }
+    }
 }
 
 #[derive(Debug, Args)]

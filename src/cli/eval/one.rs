@@ -8,7 +8,7 @@ use std::sync::atomic::AtomicBool;
 use indicatif::ProgressBar;
 use posescope::run::{
     Evaluation, EvaluationRequest, Judgement, Judging, Plan, Protocol, ProtocolError, RunError,
-    RunFile, RunFolder, Sweep, examine,
+    RunFile, RunFolder, Sweep, examine, survey_line,
 };
 use posescope::session::command_line;
 use posescope::sink::{EventExport, Follower, KEPT_FAILURES, RunRecords};
@@ -40,6 +40,9 @@ pub fn evaluate(
     let Plan { run, params, .. } = &plan;
     if let Some(line) = opened::size_line(&plan.size, &run.protocol, params) {
         terminal.say(|| line);
+    }
+    if let Some(file) = &plan.survey {
+        terminal.say(|| survey_line(file));
     }
     let first = plan.scenes.references.first().filter(|scene| !scene.frames().is_empty());
     let camera = first.map(|scene| scene.intrinsics(0));
@@ -103,13 +106,14 @@ fn plan(
         shard: args.shard,
         rerun_failed: args.rerun_failed.as_deref(),
         judging,
+        is_survey: false,
         folder,
         events: args.events.as_deref(),
     })?)
 }
 
 /// The command line that continues this run.
-fn resuming() -> String {
+pub fn resuming() -> String {
     let words = std::env::args_os().skip(1);
     let mut words: Vec<String> = words.map(|word| word.to_string_lossy().into_owned()).collect();
     if !words.iter().any(|word| word == "--resume") {
@@ -119,9 +123,9 @@ fn resuming() -> String {
 }
 
 /// The user before the terminal, who sees a progress bar and presses Ctrl-C.
-struct User {
-    bar: ProgressBar,
-    interrupt: Interrupt,
+pub struct User {
+    pub bar: ProgressBar,
+    pub interrupt: Interrupt,
 }
 
 impl Follower for User {

@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector, Matrix3, Vector3, Vector6};
 use posescope::diagnosis::confidence::{Fitted, units};
 use posescope::scale::Scale;
 
-use super::trials::{Sample, Shown};
+use super::trials::Sample;
 use crate::numbers::{mean, percentile};
 
 /// What a query that does not show its place counts beside one that does: there are more of them than anybody would
@@ -40,10 +40,8 @@ pub fn fitted(samples: &[&Sample]) -> Option<Fitted> {
     };
     let rows: Vec<Vec<f64>> = samples.iter().map(|s| s.values.clone()).collect();
     let labels: Vec<f64> = samples.iter().map(|s| f64::from(u8::from(s.is_near()))).collect();
-    let counts: Vec<f64> = samples
-        .iter()
-        .map(|s| if s.shown == Shown::Nothing { NOTHING_COUNTS } else { 1.0 })
-        .collect();
+    let counts: Vec<f64> =
+        samples.iter().map(|s| if s.shown.is_nothing() { NOTHING_COUNTS } else { 1.0 }).collect();
     let near = Design::of(&rows).logistic(&labels, &counts)?;
 
     let usable: Vec<(&Sample, [f64; 6], Vec<f64>)> = samples

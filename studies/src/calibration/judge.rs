@@ -35,7 +35,7 @@ pub fn judge(title: &str, samples: &[Sample], fitted: &BTreeMap<String, Fitted>)
         }
     }
     groups.push(("all".to_owned(), of(&|_| true)));
-    groups.push(("nothing is shown".to_owned(), of(&|s| s.shown == Shown::Nothing)));
+    groups.push(("nothing is shown".to_owned(), of(&|s| s.shown.is_nothing())));
     let mut likely = Vec::new();
     let mut intervals = Vec::new();
     for (name, own) in &groups {

@@ -66,8 +66,21 @@ pub enum Shown {
     Same,
     /// It, in others.
     Other,
-    /// Another street, another town, or the query is mirrored.
-    Nothing,
+    /// It, mirrored.
+    Mirrored,
+    /// Another town.
+    Town,
+    /// Another street of the town.
+    Street,
+    /// Noise.
+    Noise,
+}
+
+impl Shown {
+    /// Whether no pose is right.
+    pub fn is_nothing(self) -> bool {
+        !matches!(self, Self::Same | Self::Other)
+    }
 }
 
 impl Sample {
@@ -222,9 +235,18 @@ fn at(
     let elsewhere = Traversal::new(WORLD_SEED + town + 1000, Condition::Overcast, Size::Full);
     let of_another_town = elsewhere.image(7 * place % elsewhere.frame_count());
     let camera: Intrinsics = *query.intrinsics();
-    for photo in [image::imageops::flip_horizontal(color), of_another_town] {
+    let mut noise = color.clone();
+    for pixel in noise.pixels_mut() {
+        pixel.0 = [rng.random(); 3];
+    }
+    let unknowable = [
+        (image::imageops::flip_horizontal(color), Shown::Mirrored),
+        (of_another_town, Shown::Town),
+        (noise, Shown::Noise),
+    ];
+    for (photo, shown) in unknowable {
         let query = Arc::new(Query::new("unknowable", Photo::from_color(photo), camera)?);
-        trials.push(trial(&query, reference, None, Shown::Nothing));
+        trials.push(trial(&query, reference, None, shown));
     }
     let is_other_street = |frame: &usize| {
         let between = PoseError::between(truth, &day.world_from_camera(*frame));
@@ -233,7 +255,7 @@ fn at(
     let others: Vec<usize> = (0..frames).filter(is_other_street).collect();
     for &frame in others.sample(&mut rng, OTHER_STREETS) {
         let reference = Frame::of(day, frame).named(&format!("{frame:06}")).reference(0)?;
-        trials.push(trial(query, &reference, None, Shown::Nothing));
+        trials.push(trial(query, &reference, None, Shown::Street));
     }
     Ok(trials)
 }

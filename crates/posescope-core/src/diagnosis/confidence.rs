@@ -19,7 +19,7 @@ mod settled;
 
 use serde::{Deserialize, Serialize};
 
-pub use coefficients::{Fitted, fitted, units};
+pub use coefficients::{Fitted, fit, fitted, units};
 
 use super::numbers::with_digits;
 use super::{Family, Subject, Tolerance};
@@ -29,6 +29,7 @@ use crate::grid::ScoredLattice;
 use crate::method::Method;
 use crate::params::Params;
 use crate::stats::median_and_deviation;
+use crate::survey::Surveyed;
 use crate::text::words;
 use appearance::Look;
 
@@ -82,6 +83,8 @@ pub enum Calibration {
     #[default]
     #[serde(alias = "street")]
     Generated,
+    /// Generated towns, and then a survey of the map.
+    Map,
 }
 
 /// A distance and an angle.
@@ -210,23 +213,36 @@ pub(super) struct Trust {
     spread: Option<(PoseCovariance, f64)>,
     /// What near is at the scale of the scene.
     is_near: Tolerance,
+    calibrated_on: Calibration,
 }
 
 impl Trust {
     /// That of a subject's pose; `None` without a pose, for a method for which nothing was fitted, and for a scene of
-    /// another scale than those that it was fitted on: in rooms, poses that are wrong would be trusted.
+    /// another scale than those that it was fitted on, unless its map was surveyed: in rooms, poses that are wrong
+    /// would be trusted.
     pub(super) fn of(subject: &Subject<'_>) -> Option<Self> {
-        if !subject.params.scale.is_paper() {
+        let method = responsible(subject.method, subject.outcome);
+        let (scale, survey) = (subject.params.scale, subject.params.survey.of(method));
+        if !scale.is_paper() && survey.is_none() {
             return None;
         }
         let evidenced = evidenced(subject)?;
-        let fitted = fitted(responsible(subject.method, subject.outcome))?;
-        let scale = subject.params.scale;
+        let fitted = fitted(method)?;
+        let surveyed = survey.copied().unwrap_or(Surveyed::UNCHANGED);
         let values: Vec<f64> = evidenced.signals.iter().map(|(_, value)| *value).collect();
-        let spread =
-            evidenced.alone.map(|alone| (fitted.covariance(&alone, &values, scale), fitted.tail));
-        let near = fitted.probability(&values);
-        Some(Self { near, spread, is_near: NEAR.at(scale), evidenced })
+        let spread = evidenced.alone.map(|alone| {
+            let spread = fitted.covariance(&alone, &values, scale);
+            (surveyed.covariance(&spread), fitted.tail)
+        });
+        let is_moved = surveyed != Surveyed::UNCHANGED;
+        let calibrated_on = if is_moved { Calibration::Map } else { Calibration::Generated };
+        Some(Self {
+            near: surveyed.probability(fitted.probability(&values)),
+            spread,
+            is_near: NEAR.at(scale),
+            evidenced,
+            calibrated_on,
+        })
     }
 
     /// The confidence that a pose is right, where a pose within this tolerance is.
@@ -248,6 +264,7 @@ impl Trust {
             inlier_spread,
             runner_up_margin,
             chance_level,
+            calibrated_on: self.calibrated_on,
             ..PoseConfidence::new(probability, right.into())
         }
     }

@@ -75,6 +75,7 @@ pub fn fused_confidence(
     let alone = PoseConfidence::new(probability, right.into());
     Some(match of_heaviest {
         Some(one) => PoseConfidence {
+            calibrated_on: one.calibrated_on,
             within_95: one.within_95,
             covariance: one.covariance,
             position_std_m: one.position_std_m,

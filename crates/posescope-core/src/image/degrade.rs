@@ -10,7 +10,8 @@
 //!    the stored values by 2^(1/2.2); what exceeds white is lost, as on a sensor;
 //! 4. `gamma`: another tone curve;
 //! 5. `noise`: the same amount everywhere, independent from pixel to pixel;
-//! 6. `invert`: the negative.
+//! 6. `invert`: the negative;
+//! 7. `mirror`: left and right exchanged, a photo of no place at all.
 //!
 //! Estimators see grey values, which are degraded as grey; the colours of a photo, for display, take the
 //! same steps and the same noise.
@@ -18,7 +19,7 @@
 use std::fmt;
 use std::str::FromStr;
 
-use image::imageops::blur;
+use image::imageops::{blur, flip_horizontal_in_place};
 use image::{ImageBuffer, Luma, Pixel};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_pcg::Pcg64;
@@ -48,6 +49,8 @@ parameters! {
         pub noise_levels: f64 = 0.0 => number("noise", "grey levels", 0.0..=128.0),
         /// Invert: the negative of the photo.
         pub invert: bool = false => flag("invert"),
+        /// Mirror: left and right exchanged; no pose of such a photo is right.
+        pub mirror: bool = false => flag("mirror"),
     }
 }
 
@@ -174,7 +177,11 @@ impl Degradation {
             let value = value.round().clamp(0.0, 255.0) as u8;
             if self.invert { 255 - value } else { value }
         });
-        of_as_many(photo.dimensions(), finished.collect())
+        let mut degraded = of_as_many(photo.dimensions(), finished.collect());
+        if self.mirror {
+            flip_horizontal_in_place(&mut degraded);
+        }
+        degraded
     }
 }
 
@@ -265,14 +272,15 @@ mod tests {
     fn degradations() -> impl Strategy<Value = Degradation> {
         let strengths =
             (0.0..=1.0_f64, 0.0..=3.0_f64, -3.0..=3.0_f64, 0.05..=10.0_f64, 0.0..=40.0_f64);
-        (strengths, any::<bool>()).prop_map(
-            |((fog, blur_px, exposure_stops, gamma, noise_levels), invert)| Degradation {
+        (strengths, any::<bool>(), any::<bool>()).prop_map(
+            |((fog, blur_px, exposure_stops, gamma, noise_levels), invert, mirror)| Degradation {
                 fog,
                 blur_px,
                 exposure_stops,
                 gamma,
                 noise_levels,
                 invert,
+                mirror,
             },
         )
     }
@@ -319,9 +327,11 @@ mod tests {
             assert_eq!(same.gray, photo.gray);
             assert_eq!(same.color, photo.color);
         }
-        let invert = read("invert");
-        let twice = invert.of(&invert.of(&photo, 0, "a"), 0, "a");
-        assert_eq!((twice.gray, twice.color), (photo.gray, photo.color));
+        for text in ["invert", "mirror"] {
+            let step = read(text);
+            let twice = step.of(&step.of(&photo, 0, "a"), 0, "a");
+            assert_eq!((twice.gray, twice.color), (photo.gray.clone(), photo.color.clone()));
+        }
     }
 
     #[test]
@@ -335,6 +345,7 @@ mod tests {
         assert_eq!(gray("fog=0.5", &ramp())[0], 102);
         assert!(gray("fog=1", &ramp()).iter().all(|&value| value == 204));
         assert_eq!(gray("invert", &ramp())[7], 248);
+        assert_eq!(gray("mirror", &ramp())[..3], [15, 14, 13]);
         let flat = Photo::from_gray_values(8, 8, vec![77; 64]).expect("as many");
         assert_eq!(gray("blur=3", &flat), vec![77; 64]);
         let sharp = read("blur=2").of(&ramp(), 0, "a").gray;
@@ -373,7 +384,7 @@ mod tests {
         let said = |text: &str| text.parse::<Degradation>().expect_err(text).to_string();
         assert_eq!(
             said("gama=0.4"),
-            "`gama` is not a degradation; fog, blur, exposure, gamma, noise, invert expected"
+            "`gama` is not a degradation; fog, blur, exposure, gamma, noise, invert, mirror expected"
         );
         assert_eq!(said("gamma=0"), "`gamma` takes 0.05 … 10, not `0`");
         assert_eq!(said("blur=-1"), "`blur` takes 0 … 20 px, not `-1`");

@@ -9,6 +9,7 @@ use std::sync::LazyLock;
 
 use nalgebra::Vector6;
 use serde::{Deserialize, Serialize};
+use xxhash_rust::xxh3::xxh3_64;
 
 use crate::covariance::PoseCovariance;
 use crate::method::Method;
@@ -34,11 +35,20 @@ pub struct Fitted {
 /// No freedom is more uncertain than that: rotation \[rad\], and position at the scale of the paper \[m\].
 const MOST: [f64; 2] = [1.0, 20.0];
 
+/// What was fitted, by method.
+const NUMBERS: &str = include_str!("fitted.json");
+
+/// What tells one fit from another.
+pub fn fit() -> &'static str {
+    static FIT: LazyLock<String> =
+        LazyLock::new(|| format!("{:016x}", xxh3_64(NUMBERS.as_bytes())));
+    &FIT
+}
+
 /// The fitted numbers of a method's poses; `None` for a method without.
 pub fn fitted(method: Method) -> Option<&'static Fitted> {
-    static FITTED: LazyLock<BTreeMap<String, Fitted>> = LazyLock::new(|| {
-        serde_json::from_str(include_str!("fitted.json")).expect("a test reads it")
-    });
+    static FITTED: LazyLock<BTreeMap<String, Fitted>> =
+        LazyLock::new(|| serde_json::from_str(NUMBERS).expect("a test reads it"));
     FITTED.get(method.name())
 }
 
