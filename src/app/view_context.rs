@@ -8,9 +8,11 @@ use super::setup::Setup;
 use super::shown::{ShownReason, ShownView};
 use super::state::AppState;
 use super::view_options::ViewOptions;
+use crate::diagnosis::PoseConfidence;
 use crate::estimator::{self, Entry};
 use crate::event::{DebugEvent, MinimumAssessed, ReferencesFused, ViewRendered};
 use crate::geometry::Pose;
+use crate::localize::QueryResult;
 use crate::method::Method;
 use crate::problem::Problem;
 use crate::session::{Part, Run, Span};
@@ -173,9 +175,19 @@ impl<'a> ViewContext<'a> {
         if self.span()?.part == Part::Fusion(method) {
             return self.latest::<ReferencesFused>()?.pose;
         }
+        self.finished(method)?.pose.as_ref()?.to_pose()
+    }
+
+    /// How far the pose of a method can be trusted.
+    pub fn confidence(&self, method: Method) -> Option<&'a PoseConfidence> {
+        self.finished(method)?.confidence.as_ref()
+    }
+
+    /// The result of a method that has ended at the cursor.
+    fn finished(&self, method: Method) -> Option<&'a QueryResult> {
         let (span, _) = self.part_of(method)?;
         let span = Some(span).filter(|span| self.state.is_finished_at_cursor(span))?;
-        span.result.as_ref()?.pose.as_ref()?.to_pose()
+        span.result.as_ref()
     }
 
     /// Costs of a direct method that a cost can be placed between: with shuffled pixels and at the

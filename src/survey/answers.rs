@@ -157,9 +157,10 @@ impl Reliability {
         let mut found = Self::default();
         for (probability, is_right) in poses {
             let is_trusted = usize::from(Confidence::of(probability) == Confidence::Trusted);
-            let (all, trusted) = match is_right {
-                true => (&mut found.right, &mut found.right_trusted),
-                false => (&mut found.wrong, &mut found.wrong_trusted),
+            let (all, trusted) = if is_right {
+                (&mut found.right, &mut found.right_trusted)
+            } else {
+                (&mut found.wrong, &mut found.wrong_trusted)
             };
             *all += 1;
             *trusted += is_trusted;

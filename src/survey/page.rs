@@ -63,7 +63,9 @@ pub(super) fn page(
                 p { "Each dot is a photo of the map, localised from a reference within " (unit.words(&format!("{radius_m} m")))
                     ", seen from above. Rest the pointer on it for the methods." }
                 @if let Some(chart) = route(&photos, scene) {
-                    figure.plot { (chart.in_words_of(unit).svg(None)) figcaption { "The map from above" } }
+                    figure.plot style="max-width:48rem" {
+                        (chart.in_words_of(unit).svg(None)) figcaption { "The map from above" }
+                    }
                 }
                 (further(&photos, radius_m, unit))
             }

@@ -119,6 +119,8 @@ fn text_of(fitted: &BTreeMap<String, Fitted>) -> Result<String, Failure> {
             signals: one.signals.clone(),
             seen: one.seen.iter().map(|range| range.map(rounded)).collect(),
             near: short(&one.near),
+            shown: short(&one.shown),
+            shown_from: rounded(one.shown_from),
             deviations: one.deviations.each_ref().map(|weights| short(weights)),
             tail: rounded(one.tail),
         };

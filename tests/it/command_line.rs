@@ -52,7 +52,7 @@ fn usage_errors_have_exit_code_2_and_name_the_next_step() {
         --query 5 --right 1,5 | --right
         --query 5 --min-confidence 1.5 | --min-confidence
         --query 5 --explain many | --explain
-        --query 70 --degrade gama=0.4 | fog, blur, exposure, gamma, noise, invert expected
+        --query 70 --degrade gama=0.4 | fog, blur, exposure, gamma, noise, invert, mirror expected
         --query 70 --degrade gamma=0.01 | `gamma` takes 0.05 … 10, not `0.01`
         --query 70 --degrade noise=8,noise=9 | `noise` is given twice
         --query 70 --degrade '' | such as gamma=0.4,noise=8,invert

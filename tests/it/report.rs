@@ -112,7 +112,7 @@ fn eval_leaves_a_report_that_needs_nothing_else() {
     assert!((1..=3).contains(&open.matches(" open>").count()), "{open}");
     has(open, "class=\"sentence\" ~ class=\"code\"");
     // Every column has a box, and the first ones are chosen.
-    assert_eq!(page.matches("<input type=\"checkbox\"").count(), 10);
+    assert_eq!(page.matches("<input type=\"checkbox\"").count(), 11);
     assert_eq!(page.matches(" checked autocomplete").count(), 5);
 
     // From the folder alone, on any number of threads: the same bytes.

@@ -2,7 +2,7 @@
 //!
 //! How far a pose may be off, and how its errors go together.
 
-use nalgebra::{Matrix3, Matrix6, UnitQuaternion, Vector3, Vector6};
+use nalgebra::{Matrix2, Matrix3, Matrix6, UnitQuaternion, Vector2, Vector3, Vector6};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_pcg::Pcg64;
 use serde::{Deserialize, Serialize};
@@ -74,6 +74,40 @@ impl PoseCovariance {
     /// The covariance of the position alone.
     pub fn of_position(&self) -> Matrix3<f64> {
         self.0.fixed_view::<3, 3>(3, 3).into_owned()
+    }
+
+    /// The ellipsoid around the camera's centre that holds 95 % of normally distributed errors: its axes as a turn in
+    /// the camera's frame, and half its lengths along them \[m\].
+    pub fn ellipsoid(&self) -> (UnitQuaternion<f64>, Vector3<f64>) {
+        /// Below this, 95 % of the squares of a normally distributed vector in space are.
+        const NINETY_FIVE_OF_THREE: f64 = 7.814_728;
+        let parts = self.of_position().symmetric_eigen();
+        let mut axes = parts.eigenvectors;
+        if axes.determinant() < 0.0 {
+            axes.column_mut(0).neg_mut();
+        }
+        let turn = UnitQuaternion::from_matrix(&axes);
+        (turn, parts.eigenvalues.map(|square| (NINETY_FIVE_OF_THREE * square.max(0.0)).sqrt()))
+    }
+
+    /// The outline of what holds 95 % of the errors to the right and forward in another frame: points around the camera's
+    /// centre, right and forward \[m\]. `turn` leads from the camera's frame to the other.
+    pub fn outline(&self, turn: &UnitQuaternion<f64>) -> Vec<[f64; 2]> {
+        /// Below this, 95 % of the squares of a normally distributed vector in a plane are.
+        const NINETY_FIVE_OF_TWO: f64 = 5.991_465;
+        const POINTS: u32 = 48;
+        let turn = turn.to_rotation_matrix();
+        let position = turn.matrix() * self.of_position() * turn.matrix().transpose();
+        let across =
+            Matrix2::new(position[(0, 0)], position[(0, 2)], position[(2, 0)], position[(2, 2)]);
+        let Some(factor) = (across * NINETY_FIVE_OF_TWO).cholesky() else {
+            return Vec::new();
+        };
+        let point = |at: u32| {
+            let angle = std::f64::consts::TAU * f64::from(at) / f64::from(POINTS);
+            (factor.l() * Vector2::new(angle.cos(), angle.sin())).into()
+        };
+        (0..POINTS).map(point).collect()
     }
 
     /// Distances \[m\] and angles \[rad\] of errors that are drawn from it, always the same.
@@ -208,6 +242,41 @@ mod tests {
         });
         let expected = some().of_camera_from_world(&estimate);
         assert!(is_like(&of_camera_from_world, &expected), "{of_camera_from_world} {expected}");
+    }
+
+    /// The share of drawn positions for which this holds.
+    fn share_of_positions(is_in: impl Fn(&Vector3<f64>) -> bool) -> f64 {
+        let factor = some().matrix().cholesky().expect("positive");
+        let mut rng = Pcg64::seed_from_u64(3);
+        let count = 20_000;
+        let held = (0..count).filter(|_| {
+            let error = factor.l() * Vector6::from_fn(|_, _| normal(&mut rng));
+            is_in(&error.fixed_rows::<3>(3).into_owned())
+        });
+        held.count() as f64 / f64::from(count)
+    }
+
+    #[test]
+    fn an_ellipsoid_and_its_outline_hold_nineteen_of_twenty_errors() {
+        let (turn, half) = some().ellipsoid();
+        let share = share_of_positions(|position| {
+            (turn.inverse() * position).component_div(&half).norm() <= 1.0
+        });
+        assert!((share - 0.95).abs() < 0.006, "{share}");
+
+        let turn = pose().rotation;
+        let outline = some().outline(&turn);
+        let share = share_of_positions(|position| {
+            let seen = turn * position;
+            // Inside of an outline that goes around anticlockwise, every edge has the point at its left.
+            let next = outline.iter().cycle().skip(1);
+            outline.iter().zip(next).all(|(from, to)| {
+                let (along, to_point) =
+                    ([to[0] - from[0], to[1] - from[1]], [seen.x - from[0], seen.z - from[1]]);
+                along[0] * to_point[1] - along[1] * to_point[0] >= 0.0
+            })
+        });
+        assert!((share - 0.95).abs() < 0.006, "{share}");
     }
 
     #[test]

@@ -173,9 +173,10 @@ pub fn diagnose(subject: &Subject<'_>) -> Vec<Diagnosis> {
         estimator.as_ref().and_then(|one| FinishedSearch::of(subject, family, one.as_ref()));
     let mut found = tried(&Case::new(subject, family, search.as_ref()), grade);
     // A method's own failure, unless a rule says more than that something else is suspect.
-    let is_explained = found.iter().any(|one| one.code.is_failure() && one.code != Code::X1);
+    let is_suspicion = |one: &Diagnosis| matches!(one.code, Code::X1 | Code::N1);
+    let is_explained = found.iter().any(|one| one.code.is_failure() && !is_suspicion(one));
     if let (Err(failure), false) = (&subject.outcome.pose, is_explained) {
-        let place = found.iter().take_while(|one| one.code == Code::X1).count();
+        let place = found.iter().take_while(|one| is_suspicion(one)).count();
         let reported = Diagnosis::of_failure(failure);
         found.retain(|one| one.code != reported.code);
         found.insert(place, reported);

@@ -31,11 +31,44 @@ def test_a_result_has_a_pose_that_is_graded(right: posescope.Result, street: pos
     assert (right.query, right.references, right.method) == ("000070", ["000062"], "fb")
 
 
+def moved(pose: np.ndarray, freedom: int, by: float) -> np.ndarray:
+    """The pose with one small error: about the camera's axes, or along them."""
+    error = np.zeros(6)
+    error[freedom] = by
+    x, y, z = error[:3]
+    small = np.eye(4)
+    small[:3, :3] += [[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]]
+    small[:3, 3] = error[3:]
+    return pose @ small
+
+
+def test_a_covariance_can_be_that_of_pycolmaps_pose(right: posescope.Result) -> None:
+    assert right.pose is not None and right.confidence is not None
+    own = right.covariance()
+    assert own is not None and np.array_equal(own, right.confidence.covariance)
+    # What each freedom does to cam_from_world: a rotation that is applied last, and what is added to the translation.
+    stated, by = np.linalg.inv(right.pose), 1e-6
+    columns = []
+    for freedom in range(6):
+        cam_from_world = np.linalg.inv(moved(right.pose, freedom, by))
+        turn = cam_from_world[:3, :3] @ stated[:3, :3].T
+        turned = [turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]]
+        columns.append([*np.array(turned) / 2, *(cam_from_world[:3, 3] - stated[:3, 3])])
+    moves = np.array(columns).T / by
+    expected = moves @ own @ moves.T
+    found = right.covariance(of="cam_from_world")
+    assert found is not None
+    assert np.allclose(found, expected, rtol=1e-3, atol=1e-4 * np.abs(expected).max())
+    with pytest.raises(ValueError, match="cam_from_world expected"):
+        right.covariance(of="map")
+
+
 def test_no_pose_is_a_failure_and_no_exception(
     query: posescope.Query, reference: posescope.Reference
 ) -> None:
     result = posescope.localize(query, reference, method="fb")
     assert result.pose is None and result.confidence is None and result.grade == "no pose"
+    assert result.covariance() is None
     assert result.failure is not None and result.failure.code == "R2"
     assert result.failure.numbers["query_keypoints"] == 0
     assert result.verdicts[0].code == "R2"

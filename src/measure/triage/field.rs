@@ -109,6 +109,9 @@ impl Field {
         })
         .called("confidence")
         .wide(76.0),
+        number("interval", "distance that 95 % of such poses stay within, if right", "m", 3, |r| {
+            Some(r.confidence.as_ref()?.within_95?.m)
+        }),
         number("keypoints", "keypoints of the query", "", 0, |r| {
             Some(r.counts?.query_keypoints as f64)
         }),

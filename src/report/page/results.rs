@@ -21,7 +21,7 @@ pub(super) enum Column {
 }
 
 /// The columns; the first of them are shown at first.
-const COLUMNS: [Column; 12] = [
+const COLUMNS: [Column; 13] = [
     Column::Field(Field::named("query")),
     Column::Field(Field::named("method")),
     Column::Where,
@@ -31,6 +31,7 @@ const COLUMNS: [Column; 12] = [
     Column::Change,
     Column::Field(Field::named("rotation")),
     Column::Field(Field::named("probability")),
+    Column::Field(Field::named("interval")),
     Column::Field(Field::named("start")),
     Column::Field(Field::named("reference")),
     Column::Photo,

@@ -75,6 +75,11 @@ pub fn truth() -> String {
     format!("{WORLD}/truth")
 }
 
+/// What holds 95 % of the errors of a method's position, if its pose is right.
+pub fn interval(method: Method) -> String {
+    format!("{}/interval", estimate(method))
+}
+
 /// The root of a method's estimate.
 pub fn estimate(method: Method) -> String {
     format!("{WORLD}/estimate/{}", method.name())

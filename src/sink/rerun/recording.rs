@@ -229,6 +229,13 @@ impl Recording {
                     label: method.name().to_owned(),
                 };
                 camera.log(&mut self.stream, origin);
+                let path = entities::interval(method);
+                match result.confidence.as_ref().and_then(|one| one.covariance) {
+                    Some(covariance) => {
+                        scene::log_interval(&mut self.stream, &path, &pose, &covariance, origin);
+                    }
+                    None => self.stream.log(&path, &rerun::Clear::flat()),
+                }
             }
             // The estimate of an earlier query must not stay visible.
             None => self.stream.log(&owner, &rerun::Clear::recursive()),

@@ -73,8 +73,9 @@ fn story(results: &[QueryResult]) -> String {
 }
 
 fn errors(results: &[QueryResult]) -> String {
-    let header = ["method", "error", "rotation", "max Euler", "grade", "confidence", "reference"];
-    let mut table = Table::with_notes(header, &[1, 2, 3, 5], 0);
+    let header =
+        ["method", "error", "rotation", "max Euler", "grade", "confidence", "95 %", "reference"];
+    let mut table = Table::with_notes(header, &[1, 2, 3, 5, 6], 0);
     for result in results {
         let grade = match (result.grade, &result.reason) {
             (Grade::NoPose, Some(reason)) => format!("{}, **{}**", result.grade, reason.code),
@@ -85,8 +86,10 @@ fn errors(results: &[QueryResult]) -> String {
             let error = result.error.as_ref();
             error.map_or("–".to_owned(), |error| result.unit.words(&part(error)))
         };
-        let confidence = result.confidence.as_ref();
-        let confidence = confidence.map(PoseConfidence::likely);
+        let known = result.confidence.as_ref();
+        let confidence = known.map(PoseConfidence::likely);
+        let within = known.and_then(|known| known.within_95);
+        let within = within.map(|within| result.unit.words(&within.to_string()));
         table.push([
             result.method_name(),
             part(PoseError::translation),
@@ -94,6 +97,7 @@ fn errors(results: &[QueryResult]) -> String {
             part(PoseError::max_euler),
             grade,
             confidence.unwrap_or("–".to_owned()),
+            within.unwrap_or("–".to_owned()),
             result.references.join(", "),
         ]);
     }

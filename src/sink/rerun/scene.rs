@@ -4,12 +4,13 @@ use std::sync::Arc;
 
 use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
-use rerun::{LineStrips3D, Pinhole, Points3D, Quaternion, Transform3D};
+use rerun::{Ellipsoids3D, LineStrips3D, Pinhole, Points3D, Quaternion, Transform3D};
 
 use super::encode::{Encoded, jpeg};
 use super::entities;
 use super::stream::Stream;
 use crate::camera::Intrinsics;
+use crate::covariance::PoseCovariance;
 use crate::geometry::Pose;
 use crate::image::Photo;
 use crate::method::Method;
@@ -125,6 +126,24 @@ impl PlacedCamera<'_> {
             .with_show_labels(true);
         stream.log(&format!("{}/label", self.owner), &label);
     }
+}
+
+/// Records the ellipsoid that holds 95 % of the errors of a position, if its pose is right.
+pub(super) fn log_interval(
+    stream: &mut Stream,
+    path: &str,
+    world_from_camera: &Pose,
+    covariance: &PoseCovariance,
+    origin: Origin,
+) {
+    let (turn, half) = covariance.ellipsoid();
+    let turn: [f32; 4] = (world_from_camera.rotation * turn).coords.cast::<f32>().into();
+    let half: [f32; 3] = half.cast::<f32>().into();
+    let centre = origin.place(&world_from_camera.translation.vector);
+    let ellipsoid = Ellipsoids3D::from_centers_and_half_sizes([centre], [half])
+        .with_quaternions([Quaternion::from_xyzw(turn)])
+        .with_colors([super::color(palette::ESTIMATE)]);
+    stream.log(path, &ellipsoid);
 }
 
 /// Rerun's pixel (0, 0) is the corner of the image, ours the centre of its first pixel.

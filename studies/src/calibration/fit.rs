@@ -9,7 +9,7 @@ use crate::numbers::{mean, percentile};
 
 /// What a query that does not show its place counts beside one that does: there are more of them than anybody would
 /// ask.
-const NOTHING_COUNTS: f64 = 0.25;
+const NOTHING_COUNTS: f64 = 0.5;
 
 /// What is added to the squares of the slopes, so that separable samples have a fit.
 const RIDGE: f64 = 1.0;
@@ -19,6 +19,9 @@ const UNSEEN: f64 = 0.005;
 
 /// The natural logarithm of the size of a number of the standard normal distribution, on average.
 const LN_SIZE: f64 = -0.635_181_4;
+
+/// The share of poses that are near of which it is said that the query may not show the place.
+const ACCUSED: f64 = 0.005;
 
 /// Smaller errors are not told apart.
 const LEAST_ERROR: f64 = 1e-5;
@@ -43,6 +46,7 @@ pub fn fitted(samples: &[&Sample]) -> Option<Fitted> {
     let counts: Vec<f64> =
         samples.iter().map(|s| if s.shown.is_nothing() { NOTHING_COUNTS } else { 1.0 }).collect();
     let near = Design::of(&rows).logistic(&labels, &counts)?;
+    let (shown, shown_from) = told_apart(samples)?;
 
     let usable: Vec<(&Sample, [f64; 6], Vec<f64>)> = samples
         .iter()
@@ -64,7 +68,7 @@ pub fn fitted(samples: &[&Sample]) -> Option<Fitted> {
         Design::of(&rows).linear(&sizes)
     };
     let deviations = (0..6).map(deviation).collect::<Option<Vec<_>>>()?.try_into().ok()?;
-    let mut fitted = Fitted { signals, seen, near, deviations, tail: 1.0 };
+    let mut fitted = Fitted { signals, seen, near, shown, shown_from, deviations, tail: 1.0 };
 
     // So that 90 % of the errors of rotation and of position are within the ellipsoids that say so.
     for first in [0, 3] {
@@ -79,6 +83,25 @@ pub fn fitted(samples: &[&Sample]) -> Option<Fitted> {
         usable.iter().flat_map(|(sample, ..)| beyond(&fitted, sample)).collect();
     fitted.tail = percentile(&mut ratios, 0.95);
     Some(fitted)
+}
+
+/// The logistic function that tells poses that are near from those of queries that do not show the place, and what all
+/// but [`ACCUSED`] of the poses that are near have of it.
+fn told_apart(samples: &[&Sample]) -> Option<(Vec<f64>, f64)> {
+    let known: Vec<&&Sample> =
+        samples.iter().filter(|s| s.is_near() || s.shown.is_nothing()).collect();
+    let rows: Vec<Vec<f64>> = known.iter().map(|s| s.values.clone()).collect();
+    let labels: Vec<f64> = known.iter().map(|s| f64::from(u8::from(s.is_near()))).collect();
+    let weights = Design::of(&rows).logistic(&labels, &vec![1.0; known.len()])?;
+    let score = |sample: &Sample| {
+        let weighted =
+            weights[1..].iter().zip(&sample.values).map(|(weight, value)| weight * value);
+        1.0 / (1.0 + (-weights[0] - weighted.sum::<f64>()).exp())
+    };
+    let near = known.iter().filter(|s| s.is_near());
+    let mut near: Vec<f64> = near.map(|sample| score(sample)).collect();
+    let from = percentile(&mut near, ACCUSED);
+    Some((weights, from))
 }
 
 /// The scale of the scene of a sample.

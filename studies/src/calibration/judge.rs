@@ -54,6 +54,39 @@ pub fn judge(title: &str, samples: &[Sample], fitted: &BTreeMap<String, Fitted>)
          in 95 %",
         &intervals,
     );
+    elsewhere(&all, fitted);
+}
+
+/// Prints how many poses are said to be of another place, by what the reference shows of the query.
+fn elsewhere(samples: &[&Sample], fitted: &BTreeMap<String, Fitted>) {
+    let is_named = |sample: &&&Sample| {
+        let fitted = &fitted[&sample.method];
+        fitted.shown(&sample.values) < fitted.shown_from
+    };
+    let mut rows = Vec::new();
+    for name in fitted.keys() {
+        let own: Vec<&Sample> = samples.iter().copied().filter(|s| s.method == *name).collect();
+        let share = |is_one: &dyn Fn(&Sample) -> bool| {
+            let group: Vec<&&Sample> = own.iter().filter(|s| is_one(s)).collect();
+            let named = group.iter().filter(|s| is_named(s)).count();
+            format!("{named} of {}", group.len())
+        };
+        let of = |shown: Shown| share(&|s| s.shown == shown);
+        rows.push(vec![
+            name.clone(),
+            of(Shown::Town),
+            of(Shown::Noise),
+            of(Shown::Mirrored),
+            of(Shown::Street),
+            share(&|s| s.is_near() && s.shown == Shown::Same),
+            share(&|s| s.is_near() && s.shown == Shown::Other),
+            share(&|s| !s.is_near() && !s.shown.is_nothing()),
+        ]);
+    }
+    print_table(
+        "said to be elsewhere,another town,noise,mirrored,another street,near in one condition,near between,far",
+        &rows,
+    );
 }
 
 fn probabilities(

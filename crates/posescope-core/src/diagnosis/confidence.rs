@@ -17,6 +17,8 @@ mod inliers;
 mod minimum;
 mod settled;
 
+use std::fmt;
+
 use serde::{Deserialize, Serialize};
 
 pub use coefficients::{Fitted, fit, fitted, units};
@@ -96,6 +98,13 @@ pub struct Within {
     pub deg: f64,
 }
 
+/// As people read it.
+impl fmt::Display for Within {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} m and {}°", with_digits(self.m, 2), with_digits(self.deg, 2))
+    }
+}
+
 impl From<Tolerance> for Within {
     fn from(tolerance: Tolerance) -> Self {
         Self { m: tolerance.translation_m, deg: tolerance.rotation_deg }
@@ -172,12 +181,7 @@ impl PoseConfidence {
 
     /// How far such poses are off, as people read it; lengths in metres.
     pub fn interval(&self) -> Option<String> {
-        let Within { m, deg } = self.within_95?;
-        Some(format!(
-            "95 % of such poses within {} m and {}°",
-            with_digits(m, 2),
-            with_digits(deg, 2)
-        ))
+        Some(format!("95 % of such poses within {}", self.within_95?))
     }
 
     /// The probability as people read it, with the glyph of a low one before it.
@@ -214,6 +218,7 @@ pub(super) struct Trust {
     /// What near is at the scale of the scene.
     is_near: Tolerance,
     calibrated_on: Calibration,
+    elsewhere: Option<f64>,
 }
 
 impl Trust {
@@ -236,7 +241,9 @@ impl Trust {
         });
         let is_moved = surveyed != Surveyed::UNCHANGED;
         let calibrated_on = if is_moved { Calibration::Map } else { Calibration::Generated };
+        let shown = fitted.shown(&values);
         Some(Self {
+            elsewhere: Some(shown).filter(|shown| *shown < fitted.shown_from),
             near: surveyed.probability(fitted.probability(&values)),
             spread,
             is_near: NEAR.at(scale),
@@ -267,6 +274,12 @@ impl Trust {
             calibrated_on: self.calibrated_on,
             ..PoseConfidence::new(probability, right.into())
         }
+    }
+
+    /// How likely the pose is near beside one of a query that shows another place, where that is less than of nearly
+    /// all poses that are near.
+    pub(super) fn elsewhere(&self) -> Option<f64> {
+        self.elsewhere
     }
 
     /// How many of the poses that are near are right. Where more than near is right, all are.
@@ -400,6 +413,8 @@ mod tests {
             let fitted = fitted(Method::named(method)).expect(method);
             let signals = fitted.signals.len();
             assert_eq!((fitted.seen.len(), fitted.near.len()), (signals, signals + 1), "{method}");
+            assert_eq!(fitted.shown.len(), signals + 1, "{method}");
+            assert!((0.0..0.9).contains(&fitted.shown_from), "{method}: {}", fitted.shown_from);
             for weights in &fitted.deviations {
                 assert_eq!(weights.len(), signals + 2, "{method}");
             }

@@ -90,6 +90,7 @@ verdicts! {
     E2 in e2,
     D9 in d9,
     D5 in d5,
+    N1 in n1,
     H1 in h1,
     R1 in r1,
     R2 in r2,

@@ -229,7 +229,8 @@ fn poses_that_are_read_the_wrong_way_round_are_suspect() {
     let from_query = Pose::translation(0.0, 0.0, 1.0);
     // As stated, the query is elsewhere; with both poses inverted it is where it is.
     let stated = from_query.inverse() * reference;
-    for method in [Method::FB, Method::PM, Method::MI] {
+    // PM says of two walls that its pose is hardly likely, and then a reading is none.
+    for method in [Method::FB, Method::MI] {
         let found = verdicts(&problem, method, &Params::default(), Some(&stated));
         assert_eq!(primary(&found), Some(Code::X1), "{method}: {found:?}");
         let reading = found[0].evidence["reading"].as_str();

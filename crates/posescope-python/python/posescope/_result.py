@@ -179,6 +179,26 @@ class Result:
         details = {key: value for key, value in known.items() if key not in ("probability", "word")}
         return Confidence(known["probability"], known["word"], details)
 
+    def covariance(self, of: str = "world_from_camera") -> Optional["NDArray[np.float64]"]:
+        """The covariance of the pose, 6 x 6, if it is right; None where none is known.
+
+        Args:
+            of: ``world_from_camera``: rotation about the camera's axes x, y, z [rad], then the position of its centre
+                along them [m]. ``cam_from_world``: as pycolmap defines it, a small rotation that is applied after that
+                of ``cam_from_world`` [rad], then what is added to its translation [m].
+        """
+        if of not in ("world_from_camera", "cam_from_world"):
+            raise ValueError(f"of: world_from_camera or cam_from_world expected, {of!r} given")
+        known, pose = self.confidence, self.pose
+        own = None if known is None else known.covariance
+        if own is None or pose is None or of == "world_from_camera":
+            return own
+        x, y, z = -pose[:3, :3].T @ pose[:3, 3]
+        moves = np.eye(6)
+        moves[3:, :3] = [[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]]
+        moved: "NDArray[np.float64]" = moves @ own @ moves.T
+        return moved
+
     @property
     def verdicts(self) -> List[Verdict]:
         """Why the pose is wrong, missing or uncertain, the most likely cause first."""

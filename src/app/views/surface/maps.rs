@@ -352,6 +352,16 @@ fn overlay(ui: &Ui, shown: &MapContent<'_>, transform: &PlotTransform, pointed_a
             painter.extend(egui::Shape::dashed_line(&ends, stroke, 6.0, 4.0));
         }
     }
+    for mark in shown.marks.iter().filter(|mark| !mark.outline.is_empty()) {
+        let around = mark.outline.iter().map(|[right, forward]| {
+            let (right, forward) = (mark.offset.right_m + right, mark.offset.forward_m + forward);
+            transform.position_from_point(&PlotPoint::new(right, forward))
+        });
+        let around: Vec<Pos2> = around.collect();
+        for (width, color) in [(3.0, Color32::BLACK), (1.5, mark.kind.color())] {
+            painter.add(egui::Shape::closed_line(around.clone(), Stroke::new(width, color)));
+        }
+    }
     // Marks must not cover a small map.
     let reach = (transform.frame().width() / 40.0).clamp(3.0, 8.0);
     let places: Vec<Pos2> = shown.marks.iter().map(|mark| screen(&mark.offset)).collect();

@@ -8,6 +8,7 @@ use super::scale::number;
 use super::search::{Minimum, Search};
 use crate::app::views::legend;
 use crate::app::{ViewContext, theme};
+use crate::diagnosis::PoseConfidence;
 use crate::geometry::Pose;
 use crate::grid::{DenseSurface, Offset, Phase};
 use crate::method::Method;
@@ -36,6 +37,8 @@ pub(super) struct MapMark {
     pub(super) offset: Offset,
     pub(super) pose: Pose,
     pub(super) words: String,
+    /// The outline of the places where it may be, if it is right: right and forward of it \[m\].
+    pub(super) outline: Vec<[f64; 2]>,
 }
 
 impl MapMark {
@@ -46,10 +49,10 @@ impl MapMark {
         dense: Option<&DenseSurface>,
     ) -> Vec<Self> {
         let mut marks = Vec::new();
-        let mut add = |kind, pose: Pose, name: &str, note: String| {
+        let mark = |kind, pose: Pose, name: &str, note: String| {
             let offset = search.offset(&pose);
             let words = context.in_unit(&format!("{name} {}{note}", place(&offset)));
-            marks.push(Self { kind, offset, pose, words });
+            Self { kind, offset, pose, words, outline: Vec::new() }
         };
         let noted = |cost: Option<f64>| cost.map_or(String::new(), |c| format!(", {}", number(c)));
         // The cost of the cell that a pose lies in, where none is known at the pose itself.
@@ -59,39 +62,46 @@ impl MapMark {
         };
         let reference = search.pose(&Offset::default());
         let kind = MarkKind::Thing(Thing::Reference);
-        add(kind, reference, "reference", near(&reference));
+        marks.push(mark(kind, reference, "reference", near(&reference)));
         for (number, (minimum, note)) in minima(search).into_iter().enumerate() {
             let (kind, pose) = (MarkKind::Minimum(number + 1), search.pose(&minimum.offset));
-            add(kind, pose, "minimum", note);
+            marks.push(mark(kind, pose, "minimum", note));
         }
         if let Some((offset, score)) = dense.and_then(DenseSurface::minimum) {
             let note = format!(", {}{}", heading(&offset), noted(score.cost));
             let pose = search.pose(&offset);
-            add(MarkKind::Lowest, pose, "lowest of all", note);
+            marks.push(mark(MarkKind::Lowest, pose, "lowest of all", note));
         }
         if let Some(pose) = context.estimate(Method::FB) {
             let kind = MarkKind::Thing(legend::result(context, &pose));
-            add(kind, pose, "FB's result", near(&pose));
+            marks.push(mark(kind, pose, "FB's result", near(&pose)));
         }
         if let Some(pose) = context.state.camera {
             let kind = MarkKind::Thing(Thing::Dot(palette::UNDECIDED));
-            add(kind, pose, "trial camera", near(&pose));
+            marks.push(mark(kind, pose, "trial camera", near(&pose)));
         }
         let method = search.span.part.method();
         if let Some(pose) = method.and_then(|method| context.estimate(method)) {
             let kind = MarkKind::Thing(legend::result(context, &pose));
             let cost = search.assessed.map(|assessed| assessed.best);
-            add(kind, pose, "result", noted(cost));
+            let known = method.and_then(|method| context.confidence(method));
+            let spread = known.and_then(|known| known.covariance);
+            let turn = search.problem.reference_from_query(&pose).rotation;
+            let outline = spread.map(|spread| spread.outline(&turn)).unwrap_or_default();
+            let interval = known.and_then(PoseConfidence::interval);
+            let note = interval.map_or(String::new(), |words| format!(", {words}"));
+            let note = noted(cost) + &note;
+            marks.push(Self { outline, ..mark(kind, pose, "result", note) });
         } else if let Some((pose, cost, note)) = best_so_far(search) {
             let kind = MarkKind::Thing(Thing::Result(palette::NO_POSE));
-            add(kind, pose, "best so far", noted(cost) + &note);
+            marks.push(mark(kind, pose, "best so far", noted(cost) + &note));
         }
         // Last, so that nothing hides it.
         if let Some(pose) = context.truth() {
             let kind = MarkKind::Thing(Thing::Truth);
             let cost = context.cost_bounds(search.method).truth;
             let note = cost.map_or_else(|| near(pose), |cost| noted(Some(cost)));
-            add(kind, *pose, "truth", note);
+            marks.push(mark(kind, *pose, "truth", note));
         }
         marks
     }
@@ -203,7 +213,7 @@ pub(super) fn heading(offset: &Offset) -> String {
 }
 
 impl MarkKind {
-    fn color(self) -> Color32 {
+    pub(super) fn color(self) -> Color32 {
         match self {
             Self::Thing(thing) => theme::rgb(thing.color()),
             Self::Minimum(_) | Self::Lowest => Color32::WHITE,

@@ -25,6 +25,11 @@ pub struct Fitted {
     pub seen: Vec<[f64; 2]>,
     /// Of the logistic function that says how likely a pose is near: the constant, then a weight for each signal.
     pub near: Vec<f64>,
+    /// Of the logistic function that tells poses that are near from those of queries that do not show the place: the
+    /// constant, then a weight for each signal.
+    pub shown: Vec<f64>,
+    /// What but one in two hundred poses that are near have at least of it.
+    pub shown_from: f64,
     /// The natural logarithm of the standard deviation of each freedom, in the order of a [`PoseCovariance`]: a
     /// constant, the weight of its logarithm as the photo alone gives it, and a weight for each signal.
     pub deviations: [Vec<f64>; 6],
@@ -56,6 +61,11 @@ impl Fitted {
     /// The probability that a pose of these signals is near.
     pub fn probability(&self, signals: &[f64]) -> f64 {
         1.0 / (1.0 + (-weighted_sum(&self.near, signals)).exp())
+    }
+
+    /// How likely a pose of these signals is near, beside one of a query that does not show the place.
+    pub fn shown(&self, signals: &[f64]) -> f64 {
+        1.0 / (1.0 + (-weighted_sum(&self.shown, signals)).exp())
     }
 
     /// The covariance of a pose of these signals, if it is near, from what the photo alone gives.
