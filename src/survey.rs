@@ -3,7 +3,7 @@
 //!
 //! A survey is a few evaluations, each in a run folder of its own, so that it can be resumed, and every photo can be
 //! looked at: photos near a reference, the same in worse light if asked for, photos far from their reference, and
-//! mirrored ones, which no pose fits. [`Survey`](posescope_core::survey::Survey) says what is fitted to them.
+//! mirrored ones, which no pose fits. [`Survey`] says what is fitted to them.
 
 mod answers;
 mod fit;

@@ -139,7 +139,7 @@ impl Surveyed {
         };
         let (even, odd) = (half(0), half(1));
         let by = |fitted: &[Judged], judged: &[Judged]| -> Vec<(f64, bool)> {
-            let numbers = fit::fitted(fitted, self.is_paper).unwrap_or(Numbers::UNCHANGED);
+            let numbers = fit::numbers(fitted, self.is_paper);
             let moved = judged.iter();
             moved.map(|pose| (numbers.probability(pose.probability), pose.is_right)).collect()
         };

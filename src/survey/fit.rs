@@ -24,15 +24,18 @@ const LEAST_RIGHT: usize = 5;
 /// another scale it is a weaker one.
 pub(super) fn fitted(poses: &[Judged], is_paper: bool) -> Option<Surveyed> {
     let right = poses.iter().filter(|pose| pose.is_right).count();
-    if poses.len() < LEAST || right < LEAST_RIGHT {
-        return None;
-    }
+    let are_enough = poses.len() >= LEAST && right >= LEAST_RIGHT;
+    are_enough.then(|| numbers(poses, is_paper))
+}
+
+/// The numbers of a method, however few its poses are.
+pub(super) fn numbers(poses: &[Judged], is_paper: bool) -> Surveyed {
     let (shift, slope) = moved_odds(poses, is_paper);
     let factor = |axis: usize| {
         let errors = poses.iter().filter_map(|pose| Some(pose.over_95?[axis]));
         upper(errors.collect())
     };
-    Some(Surveyed { shift, slope, position: factor(0), rotation: factor(1) })
+    Surveyed { shift, slope, position: factor(0), rotation: factor(1) }
 }
 
 /// Shift and slope of the logarithm of the odds that are most likely, with normal priors around 0 and 1.

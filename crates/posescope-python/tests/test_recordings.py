@@ -133,6 +133,22 @@ def test_matches_of_some_queries_alone_are_a_run_too(street: posescope.Scene, tm
     assert "live is right for 3 of 3 queries." in (tmp_path / "live" / "report.html").read_text()
 
 
+@pytest.mark.filterwarnings("error")
+def test_a_localiser_that_finds_nothing_is_recorded_like_any_other(
+    street: posescope.Scene, tmp_path: Path
+) -> None:
+    query, none = street.query("70"), np.empty((0, 2), np.float32)
+    with posescope.record(tmp_path / "live", street, name="mine") as log:
+        log.query(
+            query.photo, query.camera, None, matches=(none, none), reference="62", truth=query.truth, name="cam0/70"
+        )
+        with pytest.raises(ValueError, match="`cam0/70` is recorded already"):
+            log.query(query.photo, query.camera, None, name="cam0/70")
+    assert {row["method"]: row["grade"] for row in rows_of(tmp_path / "live")} == {"mine": "no pose", "fb": "no pose"}
+    with pytest.raises(FileExistsError, match="resume=True"):
+        posescope.record(tmp_path / "live", street, name="mine")
+
+
 def test_cameras_folders_times_and_truth_are_stored(street: posescope.Scene, tmp_path: Path) -> None:
     query = street.query("70")
     half = posescope.Camera(

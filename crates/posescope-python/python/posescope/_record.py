@@ -83,7 +83,7 @@ def record(
     known = Settings.read(folder) if resume else None
     if known is None:
         if folder.exists() and any(folder.iterdir()):
-            raise FileExistsError(f"{folder}: a new or empty folder expected")
+            raise FileExistsError(f"{folder}: a new or empty folder expected; resume=True goes on with a recording")
         settings = Settings(name or "live", None if scene is None else scene.path, judging)
     else:
         settings = _same(known, name, scene, judging)
@@ -450,9 +450,10 @@ def _check_name(name: Any, used: "set[str]", what: str = "name") -> None:
         raise TypeError(f"{what}: a name expected, {type(name).__name__} given")
     parts = name.split("/")
     is_safe = not _UNSAFE & set(name) and not any(letter.isspace() or not letter.isprintable() for letter in name)
-    if not is_safe or any(part in ("", ".", "..") for part in parts) or name in used:
-        kind = "a new name" if name in used else "a name"
-        raise ValueError(f"{what}: {kind} that a file can have expected, without white space, `{name}` given")
+    if not is_safe or any(part in ("", ".", "..") for part in parts):
+        raise ValueError(f"{what}: a name that a file can have expected, without white space, `{name}` given")
+    if name in used:
+        raise ValueError(f"{what}: a new name expected, `{name}` is recorded already")
 
 
 def _given(matches: Any, inliers: "Optional[ArrayLike]") -> Tuple[Optional[Triple], Optional[Triple]]:

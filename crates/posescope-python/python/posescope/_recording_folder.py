@@ -302,7 +302,10 @@ class Folder:
     def saved_matches(self, query: str, reference: str) -> Triple:
         """The matches of a query as they were saved."""
         file = f"{query}_{reference}_matches.txt".replace("/", "-")
-        found = np.loadtxt(self.path / "matches" / file, np.float32, ndmin=2).reshape(-1, 4)
+        lines = (self.path / "matches" / file).read_text(encoding="utf-8").split("\n")
+        # numpy warns of a file without numbers, and a query without matches is nothing unusual.
+        numbers = [line for line in lines if line and not line.startswith("#")]
+        found = np.loadtxt(numbers, np.float32, ndmin=2).reshape(-1, 4) if numbers else np.empty((0, 4), np.float32)
         return found[:, :2], found[:, 2:], None
 
     def rows(self) -> Iterator[Dict[str, Any]]:
