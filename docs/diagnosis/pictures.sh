@@ -46,4 +46,4 @@ picture F2 street street 589 583 end --method mi6 --reference 595 --fusion joint
 picture V1 street street:snow 75 retrieved end --method fb --reference retrieve:1 --prior 100 \
     --index "$made/street.index"
 picture E1 street street 589 583 end --method other,mi --estimates other="$made/poses.txt"
-picture L1 street:snow street:night 719 709 mi --method mi
+picture L1 street:snow street:night 406 397 mi --method mi
