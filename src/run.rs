@@ -50,7 +50,5 @@ pub use run_folder::{
 pub use scene_pair::{QueryCamera, ScenePair, is_called};
 pub use scene_paths::{is_same, labels};
 pub use scenes::Scenes;
-pub use survey_file::{
-    Poses, SURVEY_FILE, SurveyError, SurveyFile, SurveyFrom, survey_line, survey_of,
-};
+pub use survey_file::{Poses, SurveyError, SurveyFile, SurveyFrom, survey_line, survey_of};
 pub use sweep::{Sweep, SweepError};

@@ -11,7 +11,7 @@ mod page;
 mod parts;
 
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use posescope_core::files::write_whole;
 use posescope_core::survey::Survey;
@@ -256,9 +256,4 @@ impl SurveyRequest {
             events: None,
         })
     }
-}
-
-/// Whether a folder holds a survey, or one that was begun.
-pub fn is_begun(folder: &Path) -> bool {
-    folder.join(Part::Near.name()).join("run.toml").is_file()
 }

@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 use crate::scene::{Scene, cache_file};
 
 /// The name of the file in the folder of a survey.
-pub const SURVEY_FILE: &str = "survey.toml";
+const SURVEY_FILE: &str = "survey.toml";
 
 /// The version of its format.
 const SCHEMA: &str = "posescope.survey/1";
