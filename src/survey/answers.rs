@@ -43,7 +43,7 @@ pub(super) struct Answer {
     pub start_m: Option<f64>,
     /// The cause of a failure.
     pub code: Option<Code>,
-    /// What is said of its pose, and what is true.
+    /// The stated probability of its pose, and the truth.
     pub judged: Option<Judged>,
 }
 

@@ -3,7 +3,7 @@
 use nalgebra::{Matrix2, Vector2};
 use posescope_core::survey::{Surveyed, log_odds};
 
-/// A pose of the map's own frames: what is said of it, and what is true.
+/// A pose of the map's own frames: the stated probability, and the truth.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Judged {
     /// The probability of being near, as it was fitted.

@@ -381,15 +381,18 @@ fn reliability(one: &Surveyed) -> Chart {
             let (low, high) = interval(share, count);
             let x = 100.0 * said;
             let bar = vec![(x, 100.0 * low), (x, 100.0 * high)];
-            let words = format!("{name}: {right} of {} right, {x:.0} % said", group.len());
+            let words = format!("{name}: {right} of {} right, {x:.0} % stated", group.len());
             marks.push(Mark::new(Shape::Line(bar), *color).titled(words.clone()));
             let dot = Shape::Dot { at: (x, 100.0 * share), filled: true };
             marks.push(Mark::new(dot, *color).titled(words));
         }
     }
     Chart {
-        title: format!("How many poses of {} are right that are said to be", one.method.label()),
-        x: Axis::percent("probability that is said (%)"),
+        title: format!(
+            "How many poses of {} are right, over the stated probability",
+            one.method.label()
+        ),
+        x: Axis::percent("stated probability (%)"),
         y: Axis::percent("poses that are right (%)"),
         marks,
         legend: kinds.into_iter().map(|(name, _, color)| (name.to_owned(), color)).collect(),
