@@ -20,7 +20,7 @@ const UNSEEN: f64 = 0.005;
 /// The natural logarithm of the size of a number of the standard normal distribution, on average.
 const LN_SIZE: f64 = -0.635_181_4;
 
-/// The share of poses that are near of which it is said that the query may not show the place.
+/// The share of near poses that N1 wrongly accuses.
 const ACCUSED: f64 = 0.005;
 
 /// Smaller errors are not told apart.
