@@ -10,6 +10,7 @@ mod inputs;
 #[cfg(feature = "rerun")]
 mod judge;
 mod limit;
+mod map_check;
 mod outputs;
 mod plan;
 mod preset;
@@ -35,6 +36,7 @@ pub use inputs::{content, inputs};
 #[cfg(feature = "rerun")]
 pub use judge::{Judgement, examine, warn_of_unseen_map};
 pub use limit::Limit;
+pub use map_check::{mistake_line, mistake_of_map};
 pub use outputs::{JSON_LINES, OutputError, refuse_in_folder, refuse_to_replace};
 pub use plan::{EvaluationRequest, Judging, Plan, PlanError, Refusal, failed_queries};
 pub use preset::{Preset, default_failure_radius_m};

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use posescope::camera::Intrinsics;
 use posescope::localize::Selection;
 use posescope::params::Params;
-use posescope::run::{Protocol, SurveyFile, survey_of};
+use posescope::run::{Protocol, SurveyFile, mistake_of_map, survey_of};
 use posescope::scene::{LoosePhotos, Scene, SceneError, SceneSize};
 use posescope::session::{Task, TaskScenes};
 
@@ -91,8 +91,14 @@ pub struct OpenedTask {
 }
 
 /// Opens the scenes and queries of the arguments. A query that is a file and not a frame of its scene is a
-/// loose photo; either all queries are frames or all are photos.
-pub fn open(args: &TaskArgs, scene: &str, queries: &[String]) -> Result<OpenedTask, CliError> {
+/// loose photo; either all queries are frames or all are photos. Whether a map is examined
+/// that was not before, which takes seconds, `examines_map` says.
+pub fn open(
+    args: &TaskArgs,
+    scene: &str,
+    queries: &[String],
+    examines_map: &dyn Fn() -> bool,
+) -> Result<OpenedTask, CliError> {
     let mut task = args.task(scene, &SceneSize::PAPER)?;
     let mut first: Option<Arc<dyn Scene>> = None;
     if args.camera.is_none() && queries.iter().any(|query| Path::new(query).is_file()) {
@@ -145,6 +151,7 @@ pub fn open(args: &TaskArgs, scene: &str, queries: &[String]) -> Result<OpenedTa
     if let Some(file) = &survey {
         task.params.survey = file.survey.clone();
     }
+    task.params.mistake_of_map = mistake_of_map(scenes.references.as_ref(), scene, examines_map);
     let queries = match &task.photos {
         Some(photos) => (0..photos.paths.len()).collect(),
         None => queries

@@ -1,5 +1,6 @@
 //! `posescope run`: localises queries and prints the results.
 
+use std::cell::OnceCell;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -8,7 +9,9 @@ use posescope::localize::{
     ChoiceError, Chooser, Localizer, QueryResult, Ranking, References, Request, Selection,
 };
 use posescope::method::Method;
-use posescope::run::{JSON_LINES, refuse_to_replace, survey_line, warn_of_unseen_map};
+use posescope::run::{
+    JSON_LINES, mistake_line, refuse_to_replace, survey_line, warn_of_unseen_map,
+};
 use posescope::scene::{Retriever, Scene, frame_range, why_no_cloud};
 use posescope::session::{Breakpoints, StopAtBreakpoint, Task, none_near};
 use posescope::sink::rerun::{Identity, Recorder, Targets};
@@ -37,8 +40,16 @@ struct Plan<'a> {
 type PlannedQuery = (usize, References);
 
 pub fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), CliError> {
-    let OpenedTask { task, scenes, queries: wanted, size, survey } =
-        opened::open(&args.task, &args.scene, &args.query)?;
+    let comparing = OnceCell::new();
+    let opened = opened::open(&args.task, &args.scene, &args.query, &|| {
+        let bar = comparing.get_or_init(|| terminal.bar(1));
+        bar.set_message("Comparing clouds and photos of this map, once");
+        true
+    });
+    if let Some(bar) = comparing.get() {
+        bar.finish_and_clear();
+    }
+    let OpenedTask { task, scenes, queries: wanted, size, survey } = opened?;
     let queries = scenes.queries.as_ref();
     if wanted.is_empty() && !args.all {
         return Err(CliError::Usage(format!(
@@ -66,6 +77,9 @@ pub fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), CliError> {
     };
     if let Some(line) = opened::size_line(&size, &task.protocol, &task.params) {
         terminal.say(|| line);
+    }
+    if let Some(mistake) = &task.params.mistake_of_map {
+        log::warn!("{}", mistake_line(references, mistake));
     }
     if let Some(file) = &survey {
         terminal.say(|| survey_line(file));

@@ -30,7 +30,7 @@ pub fn surface(args: &RunArgs, out: &Path, terminal: &Terminal) -> Result<(), Cl
     let is_table = is_table(out)?;
     refuse_to_replace("--surface", out, &["png", "csv"], [args.scene.as_str()])?;
     let OpenedTask { task, scenes, queries, .. } =
-        opened::open(&args.task, &args.scene, &args.query)?;
+        opened::open(&args.task, &args.scene, &args.query, &|| false)?;
     let method = method(args.task.protocol.has("methods"), &task.protocol.methods)?;
     let (references, queried) = (scenes.references.as_ref(), scenes.queries.as_ref());
     let named: Vec<&str> = task.protocol.named_references().collect();

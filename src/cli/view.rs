@@ -80,7 +80,7 @@ fn results_of(
 fn of_a_scene(args: &ViewArgs) -> Result<Setup, CliError> {
     let named: Vec<String> = args.query.iter().cloned().collect();
     let OpenedTask { task, scenes, queries: named, .. } =
-        opened::open(&args.task, &args.scene, &named)?;
+        opened::open(&args.task, &args.scene, &named, &|| false)?;
     let offered = (0..scenes.queries.frames().len()).collect();
     let references = task.protocol.named_references();
     let references = references.map(|name| scenes.references.find(name));

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use super::config::{ConfigError, with_config};
 use super::draw::{Draw, DrawError};
 use super::inputs::{content, inputs};
+use super::map_check::{mistake_line, mistake_of_map};
 use super::outputs::{JSON_LINES, OutputError, refuse_in_folder, refuse_to_replace};
 use super::preset::Preset;
 use super::protocol::{Protocol, ProtocolError, defaults, known};
@@ -182,6 +183,7 @@ impl EvaluationRequest<'_> {
         };
         let mut params = Params::at_scale(size.scale);
         params.survey = numbers;
+        params.mistake_of_map = self.mistake_of_map(&scenes);
         let params = with_config(params, self.config, self.assignments)?;
         let defaults =
             defaults(given.preset, first.map_or("", |scene| scene.name())).at_size(&size);
@@ -226,6 +228,22 @@ impl EvaluationRequest<'_> {
             }
             _ => Ok(None),
         }
+    }
+
+    /// What is wrong with the map, or with the first of several that has a mistake. A run that goes on keeps what it
+    /// began with.
+    fn mistake_of_map(&self, scenes: &Scenes) -> Option<String> {
+        let begun = read_run(self.folder).ok().and_then(|run| run.params().ok());
+        if let Some(params) = begun {
+            return params.mistake_of_map;
+        }
+        let maps = scenes.references.iter().zip(self.scenes);
+        let mut maps = maps.filter(|_| !self.is_survey);
+        maps.find_map(|(scene, argument)| {
+            let mistake = mistake_of_map(scene.as_ref(), argument, || true)?;
+            log::warn!("{}", mistake_line(scene.as_ref(), &mistake));
+            Some(mistake)
+        })
     }
 
     /// Gives each query of a pair its own references, and checks those that are named for all.

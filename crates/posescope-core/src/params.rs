@@ -30,6 +30,9 @@ pub struct Params {
     /// What the map shows about confidence; it changes no pose.
     #[doc(hidden)]
     pub survey: Survey,
+    /// What is wrong with the map, if anything is known to be: its poses have no confidence then. It changes no pose.
+    #[doc(hidden)]
+    pub mistake_of_map: Option<String>,
     /// `surf`: detector and descriptor.
     pub surf: SurfParams,
     /// `fb`: matching, depth lift, consensus, acceptance.
@@ -65,6 +68,8 @@ pub struct Params {
 const SCALE: &str = "scale";
 /// The table of the survey in a configuration.
 const SURVEY: &str = "survey";
+/// The key of the map's mistake in a configuration.
+const MISTAKE_OF_MAP: &str = "mistake_of_map";
 
 /// Reads a configuration over the defaults, as [`Params::merge_toml`] does.
 impl FromStr for Params {
@@ -214,6 +219,15 @@ impl Params {
                 })?;
                 continue;
             }
+            if group == MISTAKE_OF_MAP {
+                let mistake = entries.as_str().map(str::to_owned);
+                self.mistake_of_map = Some(mistake.ok_or_else(|| ParamError::BadValue {
+                    key: group.clone(),
+                    expected: "a sentence".to_owned(),
+                    given: entries.to_string(),
+                })?);
+                continue;
+            }
             let Some(entries) = entries.as_table() else {
                 return Err(ParamError::Syntax(format!(
                     "`{group}` is outside a group; parameters belong to tables such as [fb]"
@@ -233,6 +247,9 @@ impl Params {
     /// The configuration that [`Self::merge_toml`] reads back to these parameters.
     pub fn to_toml(&self) -> String {
         let mut text = String::new();
+        if let Some(mistake) = &self.mistake_of_map {
+            text += &format!("{MISTAKE_OF_MAP} = {}\n\n", toml::Value::from(mistake.as_str()));
+        }
         if !self.scale.is_paper() {
             let (metre, is_metric) = (self.scale.metre(), self.scale.is_metric());
             text += &format!("[{SCALE}]\nmetre = {metre:?}\nis_metric = {is_metric}\n\n");
@@ -368,10 +385,13 @@ mod tests {
     fn a_survey_is_read_as_it_was_written_and_is_no_change() {
         let surveyed = Surveyed { shift: -0.25, slope: 0.75, position: 2.0, rotation: 1.5 };
         let survey: Survey = [(crate::method::Method::FB, surveyed)].into_iter().collect();
-        let params = Params { survey, ..Params::at_scale(Scale::of_depth(1.8, true)) };
+        let mistake_of_map = Some("a \"mistake\"".to_owned());
+        let params =
+            Params { survey, mistake_of_map, ..Params::at_scale(Scale::of_depth(1.8, true)) };
         assert_eq!(params.changes(), [""; 0]);
         assert_eq!(params.to_toml().parse(), Ok(params));
         for wrong in [
+            "mistake_of_map = 1.0",
             "survey = 1.0",
             "[survey.fb]\nshift = 0.0",
             "[survey.fb]\nshift = 0.0\nslope = 0.0\nposition = 1.0\nrotation = 1.0",

@@ -223,12 +223,13 @@ pub(super) struct Trust {
 
 impl Trust {
     /// That of a subject's pose; `None` without a pose, for a method for which nothing was fitted, and for a scene of
-    /// another scale than those that it was fitted on, unless its map was surveyed: in rooms, poses that are wrong
-    /// would be trusted.
+    /// another scale than those that it was fitted on, or whose map has a mistake, unless the map was surveyed: there,
+    /// poses that are wrong would be trusted.
     pub(super) fn of(subject: &Subject<'_>) -> Option<Self> {
         let method = responsible(subject.method, subject.outcome);
         let (scale, survey) = (subject.params.scale, subject.params.survey.of(method));
-        if !scale.is_paper() && survey.is_none() {
+        let is_as_fitted = scale.is_paper() && subject.params.mistake_of_map.is_none();
+        if !is_as_fitted && survey.is_none() {
             return None;
         }
         let evidenced = evidenced(subject)?;
