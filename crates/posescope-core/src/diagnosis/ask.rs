@@ -70,7 +70,7 @@ impl Ask<'_> {
         Change::Set(format!("grid.rounds={}", (self.params.grid.rounds + 1).min(10)))
     }
 
-    /// The searches of a cost that compare more than one place, in place of a descent.
+    /// The searches of a cost that compare more than one place.
     pub(super) fn other_searches(&self) -> Vec<Remedy> {
         let set = |search: SearchRule| self.word(&format!("{}.search", self.method), search.name());
         [SearchRule::Grid, SearchRule::MultiStart].map(|search| vec![set(search)]).into()

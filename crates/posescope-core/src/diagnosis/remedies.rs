@@ -143,6 +143,14 @@ mod tests {
     }
 
     #[test]
+    fn a_grid_that_missed_a_minimum_is_offered_a_search_from_many_starts() {
+        for method in ["pm", "mi", "nid"] {
+            let tried = remedies(Code::D3, Method::named(method), false, &Params::default(), 10.0);
+            assert_eq!(tried[0], [Change::Set(format!("{method}.search=starts"))]);
+        }
+    }
+
+    #[test]
     fn a_descent_is_offered_another_search_and_none_that_it_does_not_do() {
         let mut params = Params::default();
         params.assign("pm.search=descent").expect("a parameter");

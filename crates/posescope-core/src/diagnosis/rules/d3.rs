@@ -8,7 +8,7 @@ pub(super) const RULE: Rule = Rule {
     title: "the search missed a lower cost near the truth",
     advice: "raise grid.rounds or mi6.starts, or lower grid.coarse_step; instead of search=descent, use search=grid",
     advice_of: |family| match family {
-        Family::Grid => Some("raise grid.rounds or lower grid.coarse_step"),
+        Family::Grid => Some("use search=starts, raise grid.rounds or lower grid.coarse_step"),
         Family::Descent => {
             Some("use search=grid or search=starts; a descent stops in the first minimum")
         }
@@ -228,16 +228,17 @@ fn remedies(ask: &Ask<'_>) -> Vec<Remedy> {
             let grid = &ask.params.grid;
             let is_narrow = 2.0 * grid.fine_range_m < grid.coarse_step_m;
             let wide = is_narrow.then(|| vec![ask.set("grid.fine_range", grid.coarse_step_m)]);
+            // Many starts follow many minima where the grid follows one.
+            let starts = ask.other_searches();
             let others = vec![
                 vec![rounds.clone()],
                 vec![dense.clone()],
-                vec![dense.clone(), rounds.clone()],
-                vec![floor.clone()],
+                vec![dense, rounds.clone()],
+                vec![floor],
                 vec![splat],
                 vec![ask.wide_yaw(), rounds],
-                vec![dense, floor],
             ];
-            wide.into_iter().chain(others).collect()
+            wide.into_iter().chain(starts).chain(others).collect()
         }
     }
 }
