@@ -28,7 +28,9 @@ mod timings;
 mod triage;
 
 pub use crate::relation::Relation;
-pub use diff::{Change, Difference, Migration, RunComparison, migrations, verdict_name};
+pub use diff::{
+    Change, Difference, Migration, NOTHING_FOUND, RunComparison, migrations, verdict_name,
+};
 #[cfg(feature = "cli")]
 pub use export::{Export, ExportError, ExportedFile, Format, export};
 pub use findings::{Finding, failing_scenes, of_examination};

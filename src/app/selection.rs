@@ -6,7 +6,6 @@ use std::ops::Deref;
 use std::rc::Rc;
 
 use super::memo::Memo;
-use crate::diagnosis::Code;
 use crate::localize::QueryResult;
 use crate::measure::{
     Condition, ConditionError, Finding, Migration, Overview, migrations, verdict_name,
@@ -136,8 +135,8 @@ impl BatchResults {
     }
 
     /// The primary verdicts of a result, before and now; nothing where there was none before.
-    fn verdicts(&self, query: usize, now: &QueryResult) -> Option<[Option<Code>; 2]> {
-        Some([self.before(query, now)?, now].map(primary))
+    fn verdicts(&self, query: usize, now: &QueryResult) -> Option<[&'static str; 2]> {
+        Some([self.before(query, now)?, now].map(verdict_name))
     }
 
     /// The results that are wanted, in the order of the queries.
@@ -167,10 +166,6 @@ impl BatchResults {
     }
 }
 
-fn primary(result: &QueryResult) -> Option<Code> {
-    Some(result.diagnosis.first()?.code)
-}
-
 impl Wanted {
     fn find(&self, known: &BatchResults) -> Found {
         let condition: Option<Condition> = match self.condition.trim() {
@@ -181,11 +176,11 @@ impl Wanted {
             let mut changes = self.change.iter();
             let has_become = changes.all(|change| {
                 change.method == result.method
-                    && known.verdicts(row.query, result).is_some_and(|codes| {
-                        codes.map(verdict_name) == [&*change.before, &*change.after]
-                    })
+                    && known
+                        .verdicts(row.query, result)
+                        .is_some_and(|names| names == [&*change.before, &*change.after])
             });
-            let is_other = |[before, now]: [Option<Code>; 2]| before != now;
+            let is_other = |[before, now]: [&str; 2]| before != now;
             has_become
                 && (!self.only_changed || known.verdicts(row.query, result).is_some_and(is_other))
                 && condition.as_ref().is_none_or(|condition| condition.is_met(result))

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use std::fmt;
 
 use super::metrics::Group;
-use crate::diagnosis::{Code, Tolerance};
+use crate::diagnosis::{Grade, Tolerance};
 use crate::localize::QueryResult;
 use crate::method::Method;
 use crate::table::Table;
@@ -77,7 +77,7 @@ impl RunComparison {
                 continue;
             };
             comparison.common += 1;
-            pairs.push((row.method, [row, other].map(primary)));
+            pairs.push((row.method, [row, other].map(verdict_name)));
             if let Some(change) = change(row, other, tolerance) {
                 let (before, after) = (row.clone(), other.clone());
                 comparison.differences.push(Difference { change, before, after });
@@ -148,10 +148,6 @@ impl RunComparison {
 }
 
 /// The primary verdict of a result.
-fn primary(row: &QueryResult) -> Option<Code> {
-    Some(row.diagnosis.first()?.code)
-}
-
 fn change(before: &QueryResult, after: &QueryResult, tolerance: &Tolerance) -> Option<Change> {
     match (before.grade.is_failure(), after.grade.is_failure()) {
         (false, true) => return Some(Change::Broken),
@@ -172,17 +168,17 @@ fn change(before: &QueryResult, after: &QueryResult, tolerance: &Tolerance) -> O
     }
 }
 
-/// The name for results without a verdict.
-const NOTHING_FOUND: &str = "ok";
+/// The name for right results without a verdict.
+pub const NOTHING_FOUND: &str = "ok";
 
 /// The number of a method's results that changed from one primary verdict to another, or kept it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Migration {
     /// The method.
     pub method: Method,
-    /// The code in the first run, `ok` without a verdict.
+    /// The name of the verdict in the first run.
     pub before: String,
-    /// The code in the second run.
+    /// The name in the second run.
     pub after: String,
     /// The number of results.
     pub count: usize,
@@ -207,16 +203,20 @@ impl fmt::Display for Migration {
     }
 }
 
-/// The name of a primary verdict: its code, or `ok` without one.
-pub fn verdict_name(primary: Option<Code>) -> &'static str {
-    primary.map_or(NOTHING_FOUND, Code::name)
+/// The name of a primary verdict: its code. Without one a right result is `ok`, and a pose that nobody measured is not.
+pub fn verdict_name(result: &QueryResult) -> &'static str {
+    match (result.diagnosis.first(), result.grade) {
+        (Some(primary), _) => primary.code.name(),
+        (None, Grade::Right) => NOTHING_FOUND,
+        (None, grade) => grade.word(),
+    }
 }
 
 /// Counts the changes of common results by method and primary verdicts, the most frequent first.
-pub fn migrations(common: impl IntoIterator<Item = (Method, [Option<Code>; 2])>) -> Vec<Migration> {
+pub fn migrations(common: impl IntoIterator<Item = (Method, [&'static str; 2])>) -> Vec<Migration> {
     let mut counts: BTreeMap<(Method, &str, &str), usize> = BTreeMap::new();
     for (method, [before, after]) in common {
-        let key = (method, verdict_name(before), verdict_name(after));
+        let key = (method, before, after);
         *counts.entry(key).or_default() += 1;
     }
     let counts = counts.into_iter();
@@ -236,6 +236,7 @@ pub fn migrations(common: impl IntoIterator<Item = (Method, [Option<Code>; 2])>)
 mod tests {
     use super::super::metrics::tests::{finding, row, rows};
     use super::*;
+    use crate::diagnosis::Code;
 
     fn compare(before: &[QueryResult], after: &[QueryResult]) -> RunComparison {
         RunComparison::of(before, after, &RunComparison::TOLERANCE)
@@ -317,13 +318,26 @@ mod tests {
     }
 
     #[test]
+    fn a_pose_that_nobody_measured_is_not_ok() {
+        let named = |grade: &str, code: Option<Code>| {
+            let mut result = row("a", "mi", Some(0.1));
+            result.grade = grade.parse().expect("a grade");
+            result.diagnosis = code.map(finding).into_iter().collect();
+            verdict_name(&result)
+        };
+        assert_eq!(named("right", None), "ok");
+        assert_eq!(named("right", Some(Code::L1)), "L1");
+        assert_eq!(named("unmeasured", None), "unmeasured");
+        assert_eq!(named("unmeasured", Some(Code::E3)), "E3");
+    }
+
+    #[test]
     fn what_stayed_is_counted_beside_what_changed() {
-        let (d2, d3) = (Some(Code::D2), Some(Code::D3));
         let common = [
-            (Method::MI, [None, None]),
-            (Method::MI, [None, d2]),
-            (Method::MI, [None, d2]),
-            (Method::FB, [d3, d3]),
+            (Method::MI, ["ok", "ok"]),
+            (Method::MI, ["ok", "D2"]),
+            (Method::MI, ["ok", "D2"]),
+            (Method::FB, ["D3", "D3"]),
         ];
         let told: Vec<_> = migrations(common)
             .into_iter()

@@ -10,7 +10,6 @@ use super::View;
 use crate::app::action::{Action, button, toggle};
 use crate::app::memo::Memo;
 use crate::app::{ResultRow, Sends, ViewContext, theme};
-use crate::localize::QueryResult;
 use crate::measure::{Field, Order, select, verdict_name};
 use crate::method::Method;
 
@@ -186,11 +185,9 @@ fn draw(row: &mut TableRow<'_, '_>, context: &ViewContext<'_>, at: ResultRow) {
         });
     }
     if context.state.results.has_before() {
-        let primary = |result: &QueryResult| Some(result.diagnosis.first()?.code);
-        let was = context.state.results.before_row(at);
-        let was = was.map(|was| verdict_name(primary(was)));
+        let was = context.state.results.before_row(at).map(verdict_name);
         let text = RichText::new(was.unwrap_or("–"));
-        let is_change = was.is_some_and(|was| was != verdict_name(primary(result)));
+        let is_change = was.is_some_and(|was| was != verdict_name(result));
         row.col(|ui| label(ui, if is_change { text.strong() } else { text }));
     }
     let mut answer = row.response();

@@ -7,9 +7,9 @@ use egui::{Button, Color32, Grid, RichText, ScrollArea, Ui};
 use super::Chosen;
 use crate::app::command::Command;
 use crate::app::{ViewContext, ViewName, theme};
-use crate::diagnosis::Code;
+use crate::diagnosis::{Code, Grade};
 use crate::localize::QueryResult;
-use crate::measure::{Migration, verdict_name};
+use crate::measure::{Migration, NOTHING_FOUND, verdict_name};
 use crate::method::Method;
 
 /// What the columns of the matrix are.
@@ -118,34 +118,37 @@ fn condition(result: &QueryResult) -> (String, String) {
     (name, filter)
 }
 
+/// What is counted together: the grade of results without a verdict, the name of the verdict, the column, the method, and
+/// the filter for the column.
+type Counted = ((Option<Grade>, &'static str), String, Method, String);
+
 /// Counts the verdicts of each column; `column` gives its name and the filter for it.
 fn tally<'a>(
     results: impl Iterator<Item = &'a QueryResult>,
     column: impl Fn(&QueryResult) -> (String, String),
     ok: Color32,
 ) -> Cells {
-    let mut counts: BTreeMap<_, usize> = BTreeMap::new();
+    let mut counts: BTreeMap<Counted, usize> = BTreeMap::new();
     let mut sums: BTreeMap<String, usize> = BTreeMap::new();
     for result in results {
-        let code = result.diagnosis.first().map(|finding| finding.code);
         let (name, filter) = column(result);
         *sums.entry(name.clone()).or_default() += 1;
-        *counts.entry((code, name, result.method, filter)).or_default() += 1;
+        let verdict = (result.diagnosis.is_empty().then_some(result.grade), verdict_name(result));
+        *counts.entry((verdict, name, result.method, filter)).or_default() += 1;
     }
     let cells = counts.into_iter();
-    let cell = |((code, column, method, scenes), count): (
-        (Option<Code>, String, Method, String),
-        usize,
-    )| {
-        let row = verdict_name(code);
+    let cell = |(((without, row), column, method, scenes), count): (Counted, usize)| {
         let all = sums[&column];
         let text = format!("{count} ({:.0} %)", 100.0 * count as f64 / all as f64);
         let text = RichText::new(text);
-        let filter = code.map_or("\"\"", Code::name);
+        let filter = match without {
+            Some(grade) => format!("\"\" and grade = \"{grade}\""),
+            None => row.to_owned(),
+        };
         let place = if scenes.is_empty() { String::new() } else { format!(", {column}") };
         let cell = Cell {
             words: format!("{} {row}{place}: {count} of {all}", method.label()),
-            text: if code.is_none() { text.color(ok) } else { text },
+            text: if without == Some(Grade::Right) { text.color(ok) } else { text },
             is_chosen: false,
             command: Box::new(move |app| {
                 app.state.options.results_filter =
@@ -164,7 +167,7 @@ fn migration(
 ) -> ((Name, Name), Cell) {
     let is_chosen = context.options.verdict_change.as_ref().is_some_and(|other| one.is_like(other));
     let change = one.clone();
-    let name = verdict_name(None);
+    let name = NOTHING_FOUND;
     let text = RichText::new(one.count.to_string());
     let text = match (one.is_change(), is_chosen) {
         (_, true) => text,
