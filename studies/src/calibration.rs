@@ -3,6 +3,7 @@
 mod fit;
 mod judge;
 mod trials;
+mod wrong_inputs;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -13,7 +14,7 @@ use posescope::scene;
 
 use crate::Failure;
 use judge::judge;
-use trials::Sample;
+use trials::{Inputs, Sample};
 
 /// The methods whose poses have a probability of their own.
 const JUDGED: &str = "fb,pm,mi,fb2,mi6,robust";
@@ -65,6 +66,9 @@ pub struct Options {
     /// Judge pairs of frames of these scenes, --places of each.
     #[arg(long)]
     scene: Vec<String>,
+    /// Plant mistakes in the inputs, each alone.
+    #[arg(long)]
+    wrong_inputs: bool,
 }
 
 pub fn run(options: &Options) -> Result<(), Failure> {
@@ -75,6 +79,9 @@ pub fn run(options: &Options) -> Result<(), Failure> {
     if let Some(path) = &options.dump {
         let lines: Result<Vec<_>, _> = samples.iter().map(serde_json::to_string).collect();
         std::fs::write(path, lines?.join("\n"))?;
+    }
+    if options.wrong_inputs {
+        wrong_inputs::examine(&trials::maps(options.real, &options.towns, &options.scene)?);
     }
     let now: BTreeMap<String, Fitted> = options
         .methods
@@ -146,16 +153,17 @@ fn read(files: &[PathBuf]) -> Result<Vec<Sample>, Failure> {
 
 fn collected(options: &Options) -> Result<Vec<Sample>, Failure> {
     let Options { places, seed, towns, radii, methods, .. } = options;
+    let inputs = if options.wrong_inputs { Inputs::Wrong } else { Inputs::Sound };
     if options.real {
-        return trials::of_real_streets(radii[0], methods);
+        return trials::of_real_streets(radii[0], inputs, methods);
     }
     if options.scene.is_empty() {
-        return trials::of_towns(towns, *places, radii, *seed, methods);
+        return trials::of_towns(towns, *places, radii, *seed, inputs, methods);
     }
     let mut samples = Vec::new();
     for argument in &options.scene {
         let scene = scene::open(argument, None)?;
-        samples.extend(trials::of_scene(scene.as_ref(), *places, *seed, methods)?);
+        samples.extend(trials::of_scene(scene.as_ref(), *places, *seed, inputs, methods)?);
     }
     Ok(samples)
 }

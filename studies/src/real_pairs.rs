@@ -59,6 +59,13 @@ pub fn all() -> Result<Vec<RealPair>, Failure> {
     Ok(pairs.collect())
 }
 
+/// The frames of the drive with most registered poses.
+pub fn drive() -> Result<Vec<Frame>, Failure> {
+    let root = std::env::var_os("POSESCOPE_DATA").ok_or("POSESCOPE_DATA expected")?;
+    let [_, (folder, poses)] = SOURCES;
+    frames(&Path::new(&root).join(folder), &Path::new(&root).join(poses))
+}
+
 /// The frames that have a registered pose, in the order of the file.
 fn frames(folder: &Path, poses: &Path) -> Result<Vec<Frame>, Failure> {
     let scene = truth::open(&folder.to_string_lossy(), Some(poses))?;

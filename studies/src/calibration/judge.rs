@@ -20,6 +20,14 @@ pub fn judge(title: &str, samples: &[Sample], fitted: &BTreeMap<String, Fitted>)
     let radii: BTreeSet<u64> = samples.iter().map(|s| s.radius_m.to_bits()).collect();
     let mut groups: Vec<(String, Vec<&Sample>)> = Vec::new();
     let all: Vec<&Sample> = samples.iter().filter(|s| fitted.contains_key(&s.method)).collect();
+    let (faulty, all): (Vec<&Sample>, Vec<&Sample>) =
+        all.into_iter().partition(|s| s.fault.is_some());
+    if !faulty.is_empty() {
+        wrong_inputs(&faulty, fitted);
+    }
+    if all.is_empty() {
+        return;
+    }
     let names: BTreeSet<&str> = all.iter().map(|s| s.method.as_str()).collect();
     let of = |keep: &dyn Fn(&Sample) -> bool| -> Vec<&Sample> {
         all.iter().copied().filter(|sample| keep(sample)).collect()
@@ -55,6 +63,29 @@ pub fn judge(title: &str, samples: &[Sample], fitted: &BTreeMap<String, Fitted>)
         &intervals,
     );
     elsewhere(&all, fitted);
+}
+
+/// Prints how many poses are trusted, by what is wrong with the inputs.
+fn wrong_inputs(samples: &[&Sample], fitted: &BTreeMap<String, Fitted>) {
+    let is_trusted = |sample: &&&Sample| {
+        let probability = fitted[&sample.method].probability(&sample.values);
+        Confidence::of(probability) == Confidence::Trusted
+    };
+    let row = |name: &str, of: &dyn Fn(&Sample) -> bool| {
+        let (right, wrong): (Vec<&Sample>, Vec<&Sample>) =
+            samples.iter().copied().filter(|s| of(s)).partition(|s| s.is_near());
+        let cells = [right, wrong]
+            .map(|group| format!("{} of {}", group.iter().filter(is_trusted).count(), group.len()));
+        [vec![name.to_owned()], cells.to_vec()].concat()
+    };
+    let faults: BTreeSet<&str> = samples.iter().filter_map(|s| s.fault.as_deref()).collect();
+    let mut rows: Vec<Vec<String>> =
+        faults.iter().map(|fault| row(fault, &|s| s.fault.as_deref() == Some(fault))).collect();
+    for name in fitted.keys() {
+        rows.push(row(name, &|s| s.method == *name));
+    }
+    rows.push(row("all", &|_| true));
+    print_table("wrong inputs,trusted of near,trusted of wrong", &rows);
 }
 
 /// Prints how many poses are said to be of another place, by what the reference shows of the query.

@@ -12,13 +12,14 @@ use posescope::method::Method;
 use posescope::params::Params;
 use posescope::problem::{Problem, Query, ReferenceTuple};
 use posescope::scene::street::{Condition, Size, Traversal, WORLD_SEED};
-use posescope::scene::{Scene, SceneSize};
+use posescope::scene::{self, Scene, SceneSize};
 use posescope::trace::Trace;
 use rand::seq::IndexedRandom as _;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_pcg::Pcg64;
 use serde::{Deserialize, Serialize};
 
+use super::wrong_inputs;
 use crate::Failure;
 use crate::frames::Frame;
 use crate::numbers::at_places;
@@ -39,6 +40,14 @@ const OTHER_STREET_DEG: f64 = 60.0;
 /// References are up to this share of the search radius away.
 const REACH: f64 = 0.9;
 
+/// Whether the inputs are as they should be.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Inputs {
+    Sound,
+    /// Each pair of frames once with each mistake.
+    Wrong,
+}
+
 /// One pose with what is known of it.
 #[derive(Clone, Serialize, Deserialize)]
 pub struct Sample {
@@ -47,6 +56,9 @@ pub struct Sample {
     pub of: String,
     /// What the reference shows of the query.
     pub shown: Shown,
+    /// What is wrong with the inputs.
+    #[serde(default)]
+    pub fault: Option<String>,
     pub radius_m: f64,
     /// The length that stands for a metre.
     pub metre: f64,
@@ -102,6 +114,7 @@ struct Trial {
     /// Without a truth no pose is near.
     truth: Option<Pose>,
     shown: Shown,
+    fault: Option<&'static str>,
 }
 
 /// The poses of queries in generated towns; places take turns in towns and radii.
@@ -110,6 +123,7 @@ pub fn of_towns(
     places: usize,
     radii: &[f64],
     seed: u64,
+    inputs: Inputs,
     methods: &[Method],
 ) -> Result<Vec<Sample>, Failure> {
     let drives: Vec<[Traversal; 5]> = towns
@@ -119,27 +133,32 @@ pub fn of_towns(
     let samples = at_places(places, |place| {
         let (town, radius_m) = (place % towns.len(), radii[place / towns.len() % radii.len()]);
         let of = towns[town].to_string();
-        let mut samples = Vec::new();
-        for trial in at(&drives[town], towns[town], place, radius_m, seed)? {
-            samples.extend(trial.samples(&of, radius_m, &Params::default(), methods)?);
-        }
-        Ok(samples)
+        let trials = match inputs {
+            Inputs::Sound => at(&drives[town], towns[town], place, radius_m, seed)?,
+            Inputs::Wrong => {
+                let (query, reference) = pair_at(&drives[town], place, radius_m, seed);
+                wrong(&query, &reference)?
+            }
+        };
+        samples_of(&trials, &of, radius_m, &Params::default(), methods)
     })?;
     Ok(samples.concat())
 }
 
 /// The poses of pairs of registered real photos of the street.
-pub fn of_real_streets(radius_m: f64, methods: &[Method]) -> Result<Vec<Sample>, Failure> {
+pub fn of_real_streets(
+    radius_m: f64,
+    inputs: Inputs,
+    methods: &[Method],
+) -> Result<Vec<Sample>, Failure> {
     let pairs = real_pairs::all()?;
     let samples = at_places(pairs.len(), |number| {
         let pair = &pairs[number];
-        let trial = Trial {
-            query: pair.query.clone().named("query").query(0)?,
-            reference: pair.reference.clone().named("reference").reference(0)?,
-            truth: pair.query.pose,
-            shown: Shown::Same,
+        let trials = match inputs {
+            Inputs::Sound => vec![Trial::of(&pair.query, &pair.reference, None)?],
+            Inputs::Wrong => wrong(&pair.query, &pair.reference)?,
         };
-        trial.samples("real streets", radius_m, &Params::default(), methods)
+        samples_of(&trials, "real streets", radius_m, &Params::default(), methods)
     })?;
     Ok(samples.concat())
 }
@@ -149,6 +168,7 @@ pub fn of_scene(
     scene: &dyn Scene,
     pairs: usize,
     seed: u64,
+    inputs: Inputs,
     methods: &[Method],
 ) -> Result<Vec<Sample>, Failure> {
     let scale = SceneSize::of(scene).scale;
@@ -169,15 +189,79 @@ pub fn of_scene(
     let chosen: Vec<(usize, usize)> = all.sample(&mut rng, pairs).copied().collect();
     let samples = at_places(chosen.len(), |number| {
         let (query, reference) = chosen[number];
-        let trial = Trial {
-            query: scene.query(query)?,
-            reference: scene.reference(reference)?,
-            truth: scene.pose(query),
-            shown: Shown::Same,
+        let trials = match inputs {
+            Inputs::Sound => vec![Trial {
+                query: scene.query(query)?,
+                reference: scene.reference(reference)?,
+                truth: scene.pose(query),
+                shown: Shown::Same,
+                fault: None,
+            }],
+            Inputs::Wrong => wrong(&Frame::read(scene, query)?, &Frame::read(scene, reference)?)?,
         };
-        trial.samples(scene.name(), radius_m, &params, methods)
+        samples_of(&trials, scene.name(), radius_m, &params, methods)
     })?;
     Ok(samples.concat())
+}
+
+/// The samples of all of these.
+fn samples_of(
+    trials: &[Trial],
+    of: &str,
+    radius_m: f64,
+    params: &Params,
+    methods: &[Method],
+) -> Result<Vec<Sample>, Failure> {
+    let samples: Result<Vec<_>, _> =
+        trials.iter().map(|trial| trial.samples(of, radius_m, params, methods)).collect();
+    Ok(samples?.concat())
+}
+
+/// A pair with each mistake in its inputs.
+fn wrong(query: &Frame, reference: &Frame) -> Result<Vec<Trial>, Failure> {
+    let planted = wrong_inputs::planted(query, reference).into_iter();
+    planted.map(|(fault, query, reference)| Trial::of(&query, &reference, Some(fault))).collect()
+}
+
+/// Maps whose frames see much of the same: of real drives or scenes, or the begin of a drive in each of two lights.
+pub fn maps(
+    is_real: bool,
+    towns: &[u64],
+    scenes: &[String],
+) -> Result<Vec<(String, Vec<Frame>)>, Failure> {
+    /// Frames of a generated drive, one metre apart.
+    const FRAMES: usize = 40;
+    if is_real {
+        return Ok(vec![("drive 0013".to_owned(), real_pairs::drive()?)]);
+    }
+    if scenes.is_empty() {
+        let drives = towns.iter().take(1).flat_map(|town| {
+            [Condition::Overcast, Condition::Night]
+                .map(|one| (one, Traversal::new(WORLD_SEED + town, one, Size::Full)))
+        });
+        let frames = drives.map(|(one, drive)| {
+            (one.name().to_owned(), (0..FRAMES).map(|frame| Frame::of(&drive, frame)).collect())
+        });
+        return Ok(frames.collect());
+    }
+    let read = |argument: &String| -> Result<(String, Vec<Frame>), Failure> {
+        let scene = scene::open(argument, None)?;
+        let frames = (0..scene.frames().len()).map(|frame| Frame::read(scene.as_ref(), frame));
+        Ok((scene.name().to_owned(), frames.collect::<Result<_, _>>()?))
+    };
+    scenes.iter().map(read).collect()
+}
+
+/// A pair of frames of one drive.
+fn pair_at(drives: &[Traversal; 5], place: usize, radius_m: f64, seed: u64) -> (Frame, Frame) {
+    let mut rng = Pcg64::seed_from_u64(seed.wrapping_mul(7919).wrapping_add(place as u64));
+    let drive = &drives[place % drives.len()];
+    let frames = drive.frame_count();
+    let query = rng.random_range(0..frames);
+    let apart: f64 = rng.random_range(1.0..REACH * radius_m);
+    let apart = if rng.random() { apart } else { -apart };
+    let reference = (query as f64 + apart).rem_euclid(frames as f64) as usize % frames;
+    (Frame::of(drive, query), Frame::of(drive, reference))
 }
 
 /// Pairs of equal and of different conditions at one place, and queries that do not show it.
@@ -215,6 +299,7 @@ fn at(
         reference: Arc::clone(reference),
         truth,
         shown,
+        fault: None,
     };
     let mut trials = Vec::new();
     for (query, truth, reference) in &sides {
@@ -261,6 +346,17 @@ fn at(
 }
 
 impl Trial {
+    /// A pair of one condition.
+    fn of(query: &Frame, reference: &Frame, fault: Option<&'static str>) -> Result<Self, Failure> {
+        Ok(Self {
+            query: query.clone().named("query").query(0)?,
+            reference: reference.clone().named("reference").reference(0)?,
+            truth: query.pose,
+            shown: Shown::Same,
+            fault,
+        })
+    }
+
     /// A sample of every method that gives a pose.
     fn samples(
         &self,
@@ -287,6 +383,7 @@ impl Trial {
                 method: method.name().to_owned(),
                 of: of.to_owned(),
                 shown: self.shown,
+                fault: self.fault.map(str::to_owned),
                 radius_m,
                 metre: params.scale.metre(),
                 error: error.map(Into::into),
