@@ -28,8 +28,8 @@ pub use posescope_core::{
 };
 pub use posescope_core::{
     camera, cloud, cost, covariance, depth, describe, diagnosis, estimator, event, features,
-    foreign, fusion, geometry, grid, history, image, localize, method, params, problem, render,
-    retrieval, robust, scale, solver, text, trace,
+    foreign, fusion, geometry, grid, history, image, localize, method, opinion, params, problem,
+    render, retrieval, robust, scale, solver, text, trace,
 };
 
 #[cfg(feature = "app")]

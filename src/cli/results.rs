@@ -105,10 +105,16 @@ fn graded(args: &ResultsArgs, run: &RunFile) -> Result<Vec<QueryResult>, CliErro
 fn row_table<'a>(
     args: &ResultsArgs,
     form: Form,
-    results: impl Iterator<Item = &'a QueryResult>,
+    results: impl Iterator<Item = &'a QueryResult> + Clone,
 ) -> Table {
     let is_text = form == Form::Text;
+    let has_opinions = results.clone().any(|result| result.opinion.is_some());
     let columns: Vec<&Field> = match args.columns.as_slice() {
+        [] if is_text && has_opinions => {
+            let own = ["opinion", "off"].map(Field::named);
+            let (before, behind) = COLUMNS.split_at(4);
+            before.iter().copied().chain(own).chain(behind.iter().copied()).collect()
+        }
         [] if is_text => COLUMNS.to_vec(),
         [] => Field::ALL.iter().chain(Field::POSE).collect(),
         named => named.to_vec(),

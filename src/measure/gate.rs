@@ -26,14 +26,16 @@ impl Metric {
     /// Whether its values are shares or probabilities.
     fn is_share(self) -> bool {
         match self {
-            Self::Figure(name) => ["right", "success", "median(confidence)"].contains(&name),
+            Self::Figure(name) => {
+                !name.ends_with("_m") && !name.ends_with("_deg") && name != "median(time)"
+            }
             Self::Recall(_) | Self::Share(_) => true,
         }
     }
 }
 
 /// The names of [`Measures::figure`] that gates may use.
-const FIGURES: [&str; 8] = [
+const FIGURES: [&str; 11] = [
     "right",
     "success",
     "median_m",
@@ -42,6 +44,9 @@ const FIGURES: [&str; 8] = [
     "rmse_deg",
     "median(confidence)",
     "median(time)",
+    "confirmed",
+    "contradicted",
+    "undecided",
 ];
 
 /// A condition such as `success@mi >= 0.9`, `recall@0.5m,5deg@fb >= 0.8` or `share(D3)@mi <= 0.05`.
@@ -94,7 +99,8 @@ impl FromStr for Gate {
             format!(
                 "`{text}`: METRIC@METHOD >= NUMBER expected. METRIC is right, success, \
                  recall@0.5m,5deg, median_m, median_deg, rmse_m, rmse_deg, share(CODE) of a verdict, \
-                 median(confidence) or median(time) in seconds; the comparison is >=, >, <= or <"
+                 median(confidence), median(time) in seconds, or, of another system's poses, confirmed, \
+                 contradicted or undecided; the comparison is >=, >, <= or <"
             )
         };
         let (left, relation, right) = Relation::split(text).ok_or_else(expected)?;

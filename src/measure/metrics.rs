@@ -16,6 +16,7 @@ use crate::fusion::Fusion;
 use crate::geometry::PoseError;
 use crate::localize::{QueryResult, Setting, Status};
 use crate::method::Method;
+use crate::opinion::Standing;
 
 /// The limits of the recall: metres and degrees.
 pub const RECALL_LIMITS: [(f64, f64); 3] = [(0.25, 2.0), (0.5, 5.0), (5.0, 10.0)];
@@ -167,6 +168,9 @@ pub struct Measures {
     /// Median probability of being right, over poses with a confidence.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub median_confidence: Option<f64>,
+    /// How many poses of another system an opinion comes to; empty for posescope's own.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub opinions: BTreeMap<Standing, usize>,
     /// Median time of the method \[s\]; not in summaries, which contain no times.
     #[serde(skip)]
     pub median_s: Option<f64>,
@@ -215,8 +219,17 @@ impl Measures {
             "recall_500" => Some(self.recall?[2]),
             "median(confidence)" => self.median_confidence,
             "median(time)" => self.median_s,
+            "confirmed" => self.share_of_opinion(Standing::Confirmed),
+            "contradicted" => self.share_of_opinion(Standing::Contradicted),
+            "undecided" => self.share_of_opinion(Standing::Undecided),
             _ => None,
         }
+    }
+
+    /// The share of poses with an opinion that it comes to; `None` without any.
+    fn share_of_opinion(&self, standing: Standing) -> Option<f64> {
+        let all: usize = self.opinions.values().sum();
+        (all > 0).then(|| share(self.opinions.get(&standing).copied().unwrap_or(0), all))
     }
 
     /// Share of the queries within limits \[m, °\], with failures counted as infinite.
@@ -290,9 +303,13 @@ fn measure_group(group: &Group, rows: &[&QueryResult], failure_radius_m: f64) ->
                 failure_radius_m,
             ),
             median_confidence: median(&confidences),
+            opinions: BTreeMap::new(),
             median_s: None,
             errors: has_truth.then(|| rows.iter().map(error).collect()),
         };
+        for opinion in rows.iter().filter_map(|row| row.opinion.as_ref()) {
+            *measures.opinions.entry(opinion.standing).or_default() += 1;
+        }
         for primary in rows.iter().filter_map(|row| row.diagnosis.first()) {
             *measures.verdicts.entry(primary.code).or_default() += 1;
         }

@@ -15,6 +15,7 @@ mod index;
 mod map_size;
 mod methods;
 mod numbers;
+mod opinions;
 mod peers;
 mod places;
 mod places_found;
@@ -49,6 +50,7 @@ enum Study {
     MapSize(map_size::Options),
     Places(places_found::Options),
     Index(index::Options),
+    Opinions(opinions::Options),
     Growth(growth::Options),
     Peers(peers::Options),
     SameResults(same_results::Options),
@@ -68,6 +70,7 @@ fn main() -> ExitCode {
         Study::MapSize(options) => map_size::run(&options),
         Study::Places(options) => places_found::run(&options),
         Study::Index(options) => index::run(&options),
+        Study::Opinions(options) => opinions::run(&options),
         Study::Growth(options) => growth::run(&options),
         Study::Peers(options) => peers::run(&options),
         Study::SameResults(options) => match same_results::run(&options) {

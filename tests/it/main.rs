@@ -35,6 +35,7 @@ mod lessons;
 mod looks;
 mod loose_photo;
 mod mutations;
+mod opinions;
 mod painted;
 mod pair_matches;
 mod photo_files;

@@ -30,7 +30,7 @@ pub(crate) use joint::{JointReference, estimate_jointly};
 pub use mi6::Mi6;
 use multi_start::Level;
 pub use multi_start::MultiStartParams;
-pub(crate) use multi_start::prior_penalty;
+pub(crate) use multi_start::{cost_deviation, prior_penalty};
 pub use robust::{Robust, RobustParams};
 
 use std::str::FromStr;

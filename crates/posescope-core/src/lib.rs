@@ -204,6 +204,8 @@ pub mod localize;
 #[doc(hidden)]
 pub mod method;
 #[doc(hidden)]
+pub mod opinion;
+#[doc(hidden)]
 pub mod problem;
 #[doc(hidden)]
 pub mod recent;

@@ -99,6 +99,13 @@ fn why(ui: &mut Ui, context: &ViewContext<'_>) {
         ui.weak(words)
             .on_hover_text("Computed without the truth, from what the method itself leaves behind");
     }
+    if let Some(opinion) = &result.opinion {
+        ui.add_space(8.0);
+        ui.label(format!("Opinion: {}", context.in_unit(&opinion.words())));
+        ui.weak(&opinion.because).on_hover_text(
+            "Posescope localises the query itself, without the truth, and compares the poses",
+        );
+    }
     if !result.agreement.is_empty() {
         heading(ui, "Poses of the other methods");
         for one in &result.agreement {

@@ -123,7 +123,10 @@ fn worth(ui: &Ui, result: &QueryResult) -> (String, egui::Color32) {
             let low = if known.word == Confidence::Low { "◆ " } else { "" };
             format!("{low}{} likely right", confidence::percent(known.probability))
         }
-        _ => format!("{} {}", result.grade.glyph(), result.grade),
+        _ => match &result.opinion {
+            Some(opinion) => format!("{} {}", opinion.standing.glyph(), opinion.standing),
+            None => format!("{} {}", result.grade.glyph(), result.grade),
+        },
     };
     (words, color)
 }

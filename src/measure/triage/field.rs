@@ -4,6 +4,7 @@ use std::cmp::Ordering;
 
 use crate::diagnosis::{Code, Confidence, Grade};
 use crate::localize::QueryResult;
+use crate::opinion::Standing;
 use crate::table::Align;
 use crate::text::UnknownWord;
 
@@ -84,6 +85,11 @@ impl Field {
             r.confidence_word().map_or(String::new(), |word| word.to_string())
         })
         .only(|word| word.parse::<Confidence>().map(drop)),
+        words("opinion", "confirmed, contradicted or undecided, of another system's pose", |r| {
+            r.opinion.as_ref().map_or(String::new(), |opinion| opinion.standing.to_string())
+        })
+        .only(|word| word.parse::<Standing>().map(drop))
+        .wide(84.0),
         words("code", "the primary verdict", |r| {
             r.diagnosis.first().map_or(String::new(), |d| d.code.to_string())
         })
@@ -112,6 +118,16 @@ impl Field {
         number("interval", "distance that 95 % of such poses stay within, if right", "m", 3, |r| {
             Some(r.confidence.as_ref()?.within_95?.m)
         }),
+        number(
+            "off",
+            "distance of another system's pose from where posescope has it",
+            "m",
+            3,
+            |r| {
+                let offset = r.opinion.as_ref()?.offset_m?;
+                Some(offset.iter().map(|part| part * part).sum::<f64>().sqrt())
+            },
+        ),
         number("keypoints", "keypoints of the query", "", 0, |r| {
             Some(r.counts?.query_keypoints as f64)
         }),

@@ -55,6 +55,9 @@ fn failure(report: &RunReport, one: &ReportedResult, is_open: bool) -> Markup {
                     @if let Some(known) = result.confidence.as_ref().filter(|_| result.pose.is_some()) {
                         " · " (known.likely()) " likely right"
                     }
+                    @if let Some(opinion) = &result.opinion {
+                        " · " (result.unit.words(&opinion.words()))
+                    }
                     @if let Some(change) = one.change { " · " (change.name()) " since the baseline" }
                 }
                 " "

@@ -21,12 +21,14 @@ pub(super) enum Column {
 }
 
 /// The columns; the first of them are shown at first.
-const COLUMNS: [Column; 13] = [
+const COLUMNS: [Column; 15] = [
     Column::Field(Field::named("query")),
     Column::Field(Field::named("method")),
     Column::Where,
     Column::Field(Field::named("grade")),
     Column::Field(Field::named("error")),
+    Column::Field(Field::named("opinion")),
+    Column::Field(Field::named("off")),
     Column::Field(Field::named("cause")),
     Column::Change,
     Column::Field(Field::named("rotation")),
@@ -38,7 +40,7 @@ const COLUMNS: [Column; 13] = [
 ];
 
 /// How many columns are shown at first.
-const SHOWN: usize = 7;
+const SHOWN: usize = 9;
 
 impl Column {
     fn heading(self) -> String {
@@ -66,6 +68,9 @@ pub(super) fn columns(report: &RunReport) -> Vec<(Column, bool)> {
         Column::Where => report.has_several_groups(),
         Column::Change => report.baseline.is_some(),
         Column::Photo => !report.thumbnails.is_empty(),
+        Column::Field(field) if ["opinion", "off"].contains(&field.name) => {
+            report.results.iter().any(|one| one.result.opinion.is_some())
+        }
         Column::Field(_) => true,
     };
     let columns = COLUMNS.into_iter().enumerate().map(|(at, column)| (column, at < SHOWN));
@@ -186,6 +191,13 @@ fn cell(report: &RunReport, one: &ReportedResult, column: Column) -> Markup {
         "method" => html! { td { (result.method_name()) } },
         "grade" => html! {
             td class=(class_of(result.grade)) { (result.grade.glyph()) " " (result.grade) }
+        },
+        "opinion" => html! {
+            td {
+                @if let Some(opinion) = &result.opinion {
+                    (opinion.standing.glyph()) " " (opinion.standing)
+                }
+            }
         },
         "cause" => html! {
             td class=[class] {

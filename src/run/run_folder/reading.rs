@@ -71,7 +71,7 @@ fn expect_numbers(result: &QueryResult) -> Result<(), String> {
     /// The square of a number is one, too.
     const LARGEST: f64 = 1e150;
     let all = std::iter::once(result).chain(result.per_reference.iter().flatten());
-    for QueryResult { pose, error, initial_error, confidence, .. } in all {
+    for QueryResult { pose, error, initial_error, confidence, opinion, .. } in all {
         let mut lengths = Vec::new();
         for error in [error, initial_error].into_iter().flatten() {
             lengths.push(error.translation_m);
@@ -85,10 +85,16 @@ fn expect_numbers(result: &QueryResult) -> Result<(), String> {
                 ));
             }
         }
-        let probability = confidence.as_ref().map_or(0.0, |confidence| confidence.probability);
-        if !(0.0..=1.0).contains(&probability) {
-            return Err(format!("a probability from 0 to 1 expected, {probability:e} found"));
+        let probabilities = [
+            confidence.as_ref().map(|confidence| confidence.probability),
+            opinion.as_ref().map(|opinion| opinion.probability),
+        ];
+        for probability in probabilities.into_iter().flatten() {
+            if !(0.0..=1.0).contains(&probability) {
+                return Err(format!("a probability from 0 to 1 expected, {probability:e} found"));
+            }
         }
+        lengths.extend(opinion.iter().filter_map(|opinion| opinion.offset_m).flatten());
         if let Some(pose) = pose {
             lengths.extend(pose.position_m);
             let length = pose.quaternion_xyzw.map(|part| part * part).iter().sum::<f64>().sqrt();

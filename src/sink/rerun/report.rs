@@ -87,7 +87,8 @@ fn errors(results: &[QueryResult]) -> String {
             error.map_or("–".to_owned(), |error| result.unit.words(&part(error)))
         };
         let known = result.confidence.as_ref();
-        let confidence = known.map(PoseConfidence::likely);
+        let opinion = result.opinion.as_ref().map(|opinion| result.unit.words(&opinion.words()));
+        let confidence = known.map(PoseConfidence::likely).or(opinion);
         let within = known.and_then(|known| known.within_95);
         let within = within.map(|within| result.unit.words(&within.to_string()));
         table.push([

@@ -88,6 +88,8 @@ verdicts! {
     F2 in f2,
     E1 in e1,
     E2 in e2,
+    E3 in e3,
+    E4 in e4,
     D9 in d9,
     D5 in d5,
     N1 in n1,
@@ -229,9 +231,10 @@ impl Code {
         (rule.advice_on)(evidence).or(of_matches).or_else(of_family).unwrap_or(rule.advice)
     }
 
-    /// Whether it says that something failed: all but [`Code::L1`], which says that the pose is uncertain.
+    /// Whether it says that something failed: all but [`Code::L1`] and [`Code::E4`], which say that the pose is
+    /// uncertain.
     pub fn is_failure(self) -> bool {
-        self != Self::L1
+        !matches!(self, Self::L1 | Self::E4)
     }
 }
 

@@ -89,6 +89,11 @@ pub(crate) fn prior_penalty(params: &Params, coarse: &[Arc<ScoredLattice>], pose
     MultiStart::new(params).map_cost(&Spread::of(coarse), pose, 0.0)
 }
 
+/// How far the costs of the coarse positions of a multi-start search are spread: their robust standard deviation.
+pub(crate) fn cost_deviation(coarse: &[Arc<ScoredLattice>]) -> f64 {
+    Spread::of(coarse).deviation()
+}
+
 impl MultiStart {
     /// The search with these parameters.
     pub(super) fn new(params: &Params) -> Self {

@@ -4,6 +4,7 @@
 mod assess;
 mod explain;
 mod fuse;
+mod opinion;
 mod work;
 
 use std::collections::BTreeMap;
@@ -212,6 +213,7 @@ impl<'a> Localizer<'a> {
             query: &loaded,
             truth: self.queries.pose(query),
             matches: vec![None; problems.len()],
+            own: vec![None; problems.len()],
             candidates: BTreeMap::new(),
             problems,
             frame: query,
@@ -375,7 +377,7 @@ impl<'a> Localizer<'a> {
             return Ok(());
         }
         observer.begin_method(problem, method);
-        let candidate = match work.hybrid_parts(problem, method) {
+        let mut candidate = match work.hybrid_parts(problem, method) {
             Some((feature, direct)) => {
                 let runs = [&feature.times, &direct.times];
                 let used = if feature.outcome.pose.is_ok() { 1 } else { 2 };
@@ -401,6 +403,10 @@ impl<'a> Localizer<'a> {
             }
             None => self.estimate(work, problem, method, observer)?,
         };
+        if self.foreign.estimates(method).is_some() && candidate.outcome.pose.is_ok() {
+            let (own, times) = self.own_answers(work, problem, observer)?;
+            candidate = self.with_opinion(&work.problems[problem], candidate, own, &times);
+        }
         let mut reported =
             self.with_ranking_assessed(candidate.result.clone(), request, work.truth.as_ref());
         reported.put_into_words_of(self.params.scale.unit());

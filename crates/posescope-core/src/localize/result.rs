@@ -15,6 +15,7 @@ use crate::grid::GridParams;
 use crate::grid::{Basin, Offset, Phase};
 use crate::image::Degradation;
 use crate::method::Method;
+use crate::opinion::{Opinion, Standing};
 use crate::params::Params;
 use crate::scale::LengthUnit;
 use crate::text::words;
@@ -83,6 +84,9 @@ pub struct QueryResult {
     pub explanation: Option<Explanation>,
     /// How likely the pose is right, by what the method itself leaves behind.
     pub confidence: Option<PoseConfidence>,
+    /// What posescope thinks of a pose that another system found, without the truth.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub opinion: Option<Opinion>,
     /// How far the poses of the methods that ran before on the same reference are from this one. The
     /// confidence does not know of them, so that it depends on no other method.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -389,6 +393,7 @@ impl QueryResult {
             diagnosis: pose.err().map(Diagnosis::of_failure).into_iter().collect(),
             explanation: None,
             confidence: None,
+            opinion: None,
             agreement: Vec::new(),
             per_reference: Some(Vec::new()),
         }
@@ -453,6 +458,25 @@ impl QueryResult {
     pub fn fell_back(&self) -> bool {
         let is_hybrid = estimator::find(self.method).is_some_and(|entry| entry.hybrid().is_some());
         is_hybrid && (self.cost.is_some() || self.status == Status::Failed)
+    }
+
+    /// Takes the opinion on its pose. Where no truth says more, what speaks against the pose is a verdict.
+    pub(super) fn take_opinion(&mut self, opinion: Option<Opinion>) {
+        if self.grade == Grade::Unmeasured {
+            let verdict = opinion.as_ref().and_then(|opinion| {
+                let code = match opinion.standing {
+                    Standing::Confirmed => return None,
+                    Standing::Contradicted => Code::E3,
+                    Standing::Undecided => Code::E4,
+                };
+                let (text, evidence) = (opinion.because.clone(), serde_json::json!({}));
+                Some(Diagnosis { code, text, evidence })
+            });
+            // The convention of a file explains why its poses are contradicted.
+            let place = self.diagnosis.iter().take_while(|one| one.code == Code::X1).count();
+            verdict.into_iter().for_each(|verdict| self.diagnosis.insert(place, verdict));
+        }
+        self.opinion = opinion;
     }
 
     /// The same, as it stands in the list of another result.

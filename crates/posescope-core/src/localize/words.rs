@@ -28,6 +28,9 @@ impl QueryResult {
         for text in reason.chain(verdicts) {
             *text = unit.words(text);
         }
+        if let Some(opinion) = &mut self.opinion {
+            opinion.because = unit.words(&opinion.because);
+        }
         for one in self.per_reference.iter_mut().flatten() {
             one.put_into_words_of(unit);
         }
@@ -104,7 +107,10 @@ impl QueryResult {
                 );
                 self.unit.words(&words)
             }
-            _ => rests_on,
+            _ => match &self.opinion {
+                Some(opinion) => self.unit.words(&format!("{}; {rests_on}", opinion.words())),
+                None => rests_on,
+            },
         }
     }
 

@@ -16,7 +16,7 @@ from ._localize import diagnose, localize
 from ._main import main
 from ._posescope import Camera, Query, Reference, Scene, __version__, methods
 from ._record import Recording, record
-from ._result import Confidence, Failure, PoseError, Result, Verdict
+from ._result import Confidence, Failure, Opinion, PoseError, Result, Verdict
 from ._run import GateError, Run
 
 __all__ = [
@@ -28,6 +28,7 @@ __all__ = [
     "GateError",
     "InputError",
     "InternalError",
+    "Opinion",
     "PoseError",
     "Query",
     "Recording",

@@ -96,6 +96,25 @@ class Confidence:
         return f"{self.word}, {f'{percent} %' if percent else 'under 1 %'} likely within {self.within[0]:g} m"
 
 
+@dataclass(frozen=True)
+class Opinion:
+    """A second opinion on the pose of another system. It needs no truth."""
+
+    standing: str
+    """``confirmed``, ``contradicted`` or ``undecided``."""
+    probability: float
+    """Probability that the given pose is right."""
+    because: str
+    """Why, in a sentence."""
+    offset_m: "Optional[NDArray[np.float64]]"
+    """Where the given camera is, seen from where posescope has it: right, down, forward [m]."""
+    details: Dict[str, Any] = field(default_factory=dict)
+    """The further fields of ``opinion`` in a results file."""
+
+    def __str__(self) -> str:
+        return f"{self.standing}: {self.because}"
+
+
 def _length_and_angle(held: Dict[str, float]) -> Tuple[float, float]:
     return held["m"], held["deg"]
 
@@ -178,6 +197,22 @@ class Result:
             return None
         details = {key: value for key, value in known.items() if key not in ("probability", "word")}
         return Confidence(known["probability"], known["word"], details)
+
+    @property
+    def opinion(self) -> Optional[Opinion]:
+        """What posescope thinks of a pose that another system found; None of posescope's own."""
+        known = self._row.get("opinion")
+        if known is None:
+            return None
+        details = {key: value for key, value in known.items() if key not in Opinion.__dataclass_fields__}
+        offset = known["offset_m"]
+        return Opinion(
+            known["standing"],
+            known["probability"],
+            known["because"],
+            None if offset is None else np.asarray(offset, dtype=np.float64),
+            details,
+        )
 
     def covariance(self, of: str = "world_from_camera") -> Optional["NDArray[np.float64]"]:
         """The covariance of the pose, 6 x 6, if it is right; None where none is known.

@@ -66,6 +66,8 @@ COLUMNS: Dict[str, Tuple[str, Callable[[Row], Any]]] = {
     "verdict": ("text", _primary("text")),
     "confidence.probability": ("number", _at("confidence", "probability")),
     "confidence.word": ("text", _at("confidence", "word")),
+    "opinion.standing": ("text", _at("opinion", "standing")),
+    "opinion.probability": ("number", _at("opinion", "probability")),
     "position.x_m": ("number", _element("position_m", 0)),
     "position.y_m": ("number", _element("position_m", 1)),
     "position.z_m": ("number", _element("position_m", 2)),

@@ -52,6 +52,6 @@ impl Localizer<'_> {
         if let Ok(pose) = &outcome.pose {
             result.agreement = work.agreement(problem, method, pose);
         }
-        MethodOutcome { estimated, outcome, evidence, result, times }
+        MethodOutcome { estimated, outcome, evidence, result, times, own: None }
     }
 }

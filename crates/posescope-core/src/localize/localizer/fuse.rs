@@ -72,13 +72,13 @@ impl Localizer<'_> {
             })
             .collect();
         observer.begin_fusion(method);
-        let mut own = StageTimings::default();
+        let mut own_timings = StageTimings::default();
         let (pose, shares) = match fusion.way {
             Way::Weighed(weigh) => {
                 let sink: &mut dyn Sink = observer;
                 fusion::fuse(fusion.name, weigh, &candidates, &mut Trace::to(sink))?
             }
-            Way::Joint => self.estimate_jointly(&solved, method, &mut own, observer)?,
+            Way::Joint => self.estimate_jointly(&solved, method, &mut own_timings, observer)?,
         };
         let fused_members: Vec<Member<'_>> = shares
             .iter()
@@ -113,12 +113,19 @@ impl Localizer<'_> {
             ),
             ..self.of_pose(work, method, Some(fusion), pose.as_ref())
         };
+        let own = solved.iter();
+        let own =
+            own.filter_map(|(problem, _, candidate)| Some((*problem, candidate.own.as_deref()?)));
+        let own: Vec<_> = own.collect();
+        let opinion = pose.as_ref().ok().filter(|_| !own.is_empty());
+        let opinion = opinion.map(|pose| self.opinion(pose, &own));
         let mut result = self.with_ranking_assessed(result, request, truth);
+        result.take_opinion(opinion);
         result.put_into_words_of(self.params.scale.unit());
         observer.end_fusion(&result);
-        let own = own.into_times();
+        let own_times = own_timings.into_times();
         let runs = solved.iter().map(|(.., candidate)| &candidate.times);
-        let times = StageTimes::sum(runs.chain(std::iter::once(&own)));
+        let times = StageTimes::sum(runs.chain(std::iter::once(&own_times)));
         Ok((result, times))
     }
 

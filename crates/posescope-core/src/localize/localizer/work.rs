@@ -1,6 +1,7 @@
 //! A query at work: what was asked of it and what every method made of it so far.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use super::Request;
 use crate::diagnosis::{Diagnosis, Evidence};
@@ -8,6 +9,7 @@ use crate::estimator::{self, Failure, Outcome};
 use crate::geometry::{Pose, PoseError};
 use crate::localize::{Agreement, QueryResult, References, StageTimes};
 use crate::method::Method;
+use crate::opinion::OwnAnswer;
 use crate::problem::{Problem, Query};
 
 /// What an estimator answered, before it is assessed.
@@ -34,6 +36,19 @@ pub(super) struct MethodOutcome {
     pub(super) result: QueryResult,
     /// How long its stages took.
     pub(super) times: StageTimes,
+    /// What posescope answers itself, beside the pose of another system.
+    pub(super) own: Option<Arc<OwnAnswers>>,
+}
+
+/// What posescope's own methods answered to a problem.
+#[derive(Debug, Default)]
+pub(super) struct OwnAnswers {
+    /// The poses, in the order in which the methods were asked.
+    pub(super) found: Vec<OwnAnswer>,
+    /// What the search's answer costs, and how far the costs around the reference are spread.
+    pub(super) searched: Option<(f64, f64)>,
+    /// Why the last method without a pose has none; empty where each has one.
+    pub(super) missing: String,
 }
 
 /// A query at work, with all that was found out about it.
@@ -50,6 +65,8 @@ pub(super) struct QueryWork<'a> {
     pub(super) places: Vec<ReferencePlace>,
     /// Feature matches by problem, once they are known.
     pub(super) matches: Vec<Option<usize>>,
+    /// What posescope's own methods answered to each problem, where another system's pose was compared with that.
+    pub(super) own: Vec<Option<Arc<OwnAnswers>>>,
     /// What each method made of each problem.
     pub(super) candidates: BTreeMap<Method, Vec<Option<MethodOutcome>>>,
 }

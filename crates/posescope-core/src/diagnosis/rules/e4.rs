@@ -1,0 +1,10 @@
+//! E4: whether another system's pose is right stays open.
+
+use super::*;
+
+pub(super) const RULE: Rule = Rule {
+    title: "whether another system's pose is right stays open",
+    advice: "compare it with more references (--reference nearest:3), or survey the map",
+    needs_truth: false,
+    ..Rule::new(Code::E4)
+};

@@ -1,0 +1,159 @@
+//! Localising a query anew, for a second opinion on the pose of another system.
+
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+use super::Localizer;
+use super::work::{MethodOutcome, OwnAnswers, QueryWork};
+use crate::diagnosis::{Evidence, Subject};
+use crate::estimator::{self, Outcome};
+use crate::event::KindSet;
+use crate::geometry::{Pose, PoseError};
+use crate::grid::{Phase, ScoredLattice};
+use crate::localize::{LocalizeObserver, StageTimes, StageTimings};
+use crate::method::Method;
+use crate::opinion::{Opinion, OwnAnswer};
+use crate::problem::Problem;
+use crate::trace::{Cancelled, Fanout, Record, Sink, Trace};
+
+/// The methods that are asked, until one has a pose that can be trusted; the quick one first.
+const ASKED: [Method; 2] = [Method::named("fb2"), SEARCHING];
+
+/// The one of them that searches a cost.
+const SEARCHING: Method = Method::named("robust");
+
+/// Keeps the events of another method's search from an observer, which may still stop it.
+struct Quiet<'a>(&'a mut dyn LocalizeObserver);
+
+impl Sink for Quiet<'_> {
+    fn wanted(&self) -> KindSet {
+        KindSet::NONE
+    }
+
+    fn accept(&mut self, _record: &Record) -> Result<(), Cancelled> {
+        Ok(())
+    }
+
+    fn attend(&mut self) -> Result<(), Cancelled> {
+        self.0.attend()
+    }
+}
+
+impl Localizer<'_> {
+    /// The own answers to a problem, each found once for all given poses, and how long that took.
+    pub(super) fn own_answers(
+        &self,
+        work: &mut QueryWork<'_>,
+        problem: usize,
+        observer: &mut dyn LocalizeObserver,
+    ) -> Result<(Arc<OwnAnswers>, StageTimes), Cancelled> {
+        if let Some(known) = &work.own[problem] {
+            return Ok((Arc::clone(known), StageTimes::default()));
+        }
+        let mut timings = StageTimings::default();
+        let mut own = OwnAnswers::default();
+        let solved = &work.problems[problem];
+        for method in ASKED {
+            // What the run asks for anyway is not done twice.
+            let (outcome, evidence) = match work.candidate(problem, method) {
+                Some(known) => (known.estimated.clone(), known.evidence.clone()),
+                None => self.asked(solved, method, &mut timings, observer)?,
+            };
+            let subject = Subject::new(solved, method, self.params, &outcome, &evidence)
+                .against(None, self.tolerance);
+            match &outcome.pose {
+                Ok(pose) => own.found.push(OwnAnswer {
+                    method,
+                    pose: *pose,
+                    confidence: subject.confidence.clone(),
+                    given_costs_more: None,
+                }),
+                Err(failure) => {
+                    own.missing = format!("Posescope has no pose of its own: {failure}");
+                }
+            }
+            if let Some(cost) = outcome.cost.filter(|_| method == SEARCHING) {
+                let of_disc =
+                    |one: &&Arc<ScoredLattice>| one.lattice.phase == Phase::PositionCoarse;
+                let coarse: Vec<_> = evidence.surfaces.iter().filter(of_disc).cloned().collect();
+                own.searched = Some((cost.best, estimator::cost_deviation(&coarse)));
+            }
+            if own.found.last().is_some_and(OwnAnswer::is_trusted) {
+                break;
+            }
+        }
+        let own = Arc::new(own);
+        work.own[problem] = Some(Arc::clone(&own));
+        Ok((own, timings.into_times()))
+    }
+
+    fn asked(
+        &self,
+        problem: &Problem,
+        method: Method,
+        timings: &mut StageTimings,
+        observer: &mut dyn LocalizeObserver,
+    ) -> Result<(Outcome, Evidence), Cancelled> {
+        let mut evidence = Evidence::default();
+        let attention = observer.attention();
+        let attention: Option<&AtomicBool> = attention.as_deref();
+        let mut quiet = Quiet(observer);
+        let mut fanout = Fanout::new(vec![timings, &mut evidence, &mut quiet]);
+        let mut trace = Trace::watched(&mut fanout, attention);
+        let outcome = self.ask(problem, method, &mut trace)?;
+        Ok((outcome, evidence))
+    }
+
+    /// What was made of a given pose, with the opinion on it.
+    pub(super) fn with_opinion(
+        &self,
+        problem: &Problem,
+        candidate: MethodOutcome,
+        own: Arc<OwnAnswers>,
+        took: &StageTimes,
+    ) -> MethodOutcome {
+        let mut result = candidate.result;
+        let pose = candidate.outcome.pose.as_ref().ok();
+        result.take_opinion(pose.map(|pose| self.opinion(pose, &[(problem, &*own)])));
+        let times = StageTimes::inside(result.method.name(), [&candidate.times, took]);
+        MethodOutcome { result, times, own: Some(own), ..candidate }
+    }
+
+    /// The opinion on a given pose by the own answers to some problems.
+    pub(super) fn opinion(&self, given: &Pose, own: &[(&Problem, &OwnAnswers)]) -> Opinion {
+        let answers = own.iter().flat_map(|(problem, own)| {
+            own.found.iter().map(|answer| {
+                let more = || self.given_costs_more(problem, own, answer, given);
+                let is_needed = answer.needs_costs(given, self.tolerance);
+                OwnAnswer { given_costs_more: is_needed.then(more).flatten(), ..answer.clone() }
+            })
+        });
+        let answers: Vec<OwnAnswer> = answers.collect();
+        let missing = own.iter().map(|(_, own)| own.missing.as_str());
+        let missing = missing.into_iter().find(|words| !words.is_empty());
+        Opinion::of(given, self.tolerance, &answers, missing.unwrap_or_default())
+    }
+
+    /// How much more the minimum costs that a given pose leads to than an own answer, in standard deviations. Where it
+    /// leads elsewhere, the cost at the pose counts.
+    fn given_costs_more(
+        &self,
+        problem: &Problem,
+        own: &OwnAnswers,
+        answer: &OwnAnswer,
+        given: &Pose,
+    ) -> Option<f64> {
+        let (best, deviation) = own.searched.filter(|_| answer.method == SEARCHING)?;
+        let estimator = estimator::find(SEARCHING)?.make(self.params);
+        let led = estimator.led_from(problem, &problem.reference_from_query(given));
+        let near = led.filter(|led| {
+            let moved = PoseError::between(given, &problem.world_from_query(&led.pose));
+            self.tolerance.contains(&moved)
+        });
+        let cost = match near {
+            Some(near) => near.cost,
+            None => estimator.compare_at(problem, given)?.score.cost?,
+        };
+        Some((cost - best) / deviation)
+    }
+}

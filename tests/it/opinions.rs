@@ -1,0 +1,182 @@
+//! Second opinions on the poses of other systems, and maps that cannot be believed.
+
+use std::fs;
+use std::path::Path;
+
+use posescope::diagnosis::{Code, Grade};
+use posescope::foreign::Foreign;
+use posescope::fusion::Fusion;
+use posescope::geometry::Pose;
+use posescope::localize::{LocalizeError, Localizer, NoObserver, QueryResult, Request};
+use posescope::method::Method;
+use posescope::opinion::{Opinion, Standing};
+use posescope::params::Params;
+use posescope::scene::Scene;
+use posescope::scene::street::{Size, Street};
+use tempfile::TempDir;
+
+use crate::binary::{Said, command_in, has, text, write};
+use crate::data;
+
+/// The results for a pose beside the true one of a frame of the street. The truth is withheld unless `truth_is_known`.
+fn results(
+    off: Pose,
+    references: &[usize],
+    fusions: Vec<Fusion>,
+    truth_is_known: bool,
+) -> Vec<QueryResult> {
+    const QUERY: usize = 70;
+    let street = street();
+    let truth = street.pose(QUERY).expect("a pose");
+    let other = Method::called("other").expect("a plain name");
+    let name = street.frames()[QUERY].clone();
+    let foreign = Foreign::default().with_estimates(other, [(name, truth * off)].into());
+    let hidden = Hidden { scene: &street, shows_truth: truth_is_known };
+    let params = Params::default();
+    let localizer = Localizer::new(&street, &hidden, &params, 0).with_foreign(foreign);
+    let request =
+        Request { radius_m: 12.0, references: references.to_vec().into(), fusions, setting: None };
+    let mut results = Vec::new();
+    let keep = |result, _| {
+        results.push(result);
+        Ok::<(), LocalizeError>(())
+    };
+    localizer.localize(0, QUERY, &[request], &[other], &mut NoObserver, keep).expect("localised");
+    results
+}
+
+fn street() -> Street {
+    Street::new("overcast", Size::Half).expect("a condition")
+}
+
+/// A scene that may keep its poses to itself.
+struct Hidden<'a> {
+    scene: &'a Street,
+    shows_truth: bool,
+}
+
+impl Scene for Hidden<'_> {
+    posescope::inner_scene!(scene: name, frames, intrinsics, time_s, has_cloud, photo, cloud);
+
+    fn pose(&self, frame: usize) -> Option<Pose> {
+        self.scene.pose(frame).filter(|_| self.shows_truth)
+    }
+}
+
+fn opinion(result: &QueryResult) -> &Opinion {
+    result.opinion.as_ref().expect("an opinion of another system's pose")
+}
+
+#[test]
+fn a_right_pose_is_confirmed_and_one_elsewhere_is_contradicted_with_where_the_photos_agree() {
+    let [right] = results(Pose::identity(), &[66], vec![], false).try_into().expect("one");
+    assert_eq!(opinion(&right).standing, Standing::Confirmed, "{}", opinion(&right).because);
+    assert!(right.diagnosis.is_empty(), "{:?}", right.diagnosis);
+    assert!(right.evidence().starts_with("✓ confirmed"), "{}", right.evidence());
+
+    let off = Pose::translation(2.0, 0.0, 0.0);
+    let [wrong] = results(off, &[66], vec![], false).try_into().expect("one");
+    let found = opinion(&wrong);
+    assert_eq!((found.standing, wrong.grade), (Standing::Contradicted, Grade::Unmeasured));
+    assert_eq!(wrong.diagnosis[0].code, Code::E3);
+    let [right_m, down_m, forward_m] = found.offset_m.expect("an offset");
+    assert!((right_m - 2.0).abs() < 0.15 && down_m.abs() < 0.15 && forward_m.abs() < 0.15);
+    let [least, most] = found.interval_m.expect("an interval");
+    assert!(least <= 2.0 && 2.0 <= most, "{least} to {most}");
+    let better = found.better.as_ref().and_then(|better| better.to_pose()).expect("a pose");
+    let truth = street().pose(70).expect("a pose");
+    assert!((better.translation.vector - truth.translation.vector).norm() < 0.15);
+}
+
+#[test]
+fn the_truth_changes_no_opinion_and_a_verdict_stands_only_where_there_is_none() {
+    let off = Pose::translation(0.0, 0.0, 3.0);
+    let [hidden] = results(off, &[66], vec![], false).try_into().expect("one");
+    let [known] = results(off, &[66], vec![], true).try_into().expect("one");
+    assert_eq!(hidden.opinion, known.opinion);
+    assert_eq!(known.grade, Grade::Wrong);
+    assert!(known.diagnosis.iter().all(|one| one.code != Code::E3));
+}
+
+#[test]
+fn several_references_vote_on_a_fused_pose() {
+    let fusions = || Fusion::all().filter(|fusion| fusion.name == "r-wavg").collect();
+    let [fused] = results(Pose::translation(-3.0, 0.0, 0.0), &[66, 74], fusions(), false)
+        .try_into()
+        .expect("one");
+    assert_eq!(opinion(&fused).standing, Standing::Contradicted);
+    let alone = fused.per_reference.as_ref().expect("two references");
+    assert!(alone.iter().all(|one| one.opinion.is_some()));
+    assert_eq!(fused.diagnosis[0].code, Code::E3);
+}
+
+/// A folder with a real drive, and a cache of its own.
+struct Drive {
+    root: TempDir,
+}
+
+const DRIVE: &str = "2011_09_26/2011_09_26_drive_0013_sync";
+
+impl Drive {
+    fn copied() -> Option<Self> {
+        let from = data::sample("kitti_raw/2011_09_26")?;
+        let root = TempDir::new().expect("a folder");
+        copy(&from, &root.path().join("2011_09_26"));
+        Some(Self { root })
+    }
+
+    fn run(&self, line: &str) -> Said {
+        let cache = self.root.path().join("cache");
+        Said::by(command_in(self.root.path(), line).env("POSESCOPE_CACHE", cache)).ok()
+    }
+
+    /// Gives the camera a focal length that is a fifth too short.
+    fn spoil_camera(&self) {
+        let path = self.root.path().join("2011_09_26/calib_cam_to_cam.txt");
+        let stated = text(&path);
+        let spoilt = stated.lines().map(|line| match line.strip_prefix("P_rect_02: ") {
+            None => format!("{line}\n"),
+            Some(numbers) => {
+                let numbers = numbers.split_whitespace().enumerate().map(|(at, number)| {
+                    let number: f64 = number.parse().expect("a number");
+                    if [0, 3, 5].contains(&at) { 0.8 * number } else { number }.to_string()
+                });
+                format!("P_rect_02: {}\n", numbers.collect::<Vec<_>>().join(" "))
+            }
+        });
+        let spoilt: String = spoilt.collect();
+        write(&path, spoilt);
+    }
+}
+
+fn copy(from: &Path, to: &Path) {
+    if from.is_dir() {
+        fs::create_dir_all(to).expect("writable");
+        for entry in fs::read_dir(from).expect("readable").flatten() {
+            copy(&entry.path(), &to.join(entry.file_name()));
+        }
+    } else {
+        fs::copy(from, to).expect("writable");
+    }
+}
+
+#[test]
+fn poses_of_a_map_with_a_mistake_have_no_confidence_until_it_is_mended() {
+    let Some(drive) = Drive::copied() else { return };
+    let line = format!("run {DRIVE} --query 12 --reference 16 --method fb2 --json -");
+    let known = |said: Said| said.results()[0].confidence.clone();
+    assert!(known(drive.run(&line)).is_some());
+
+    drive.spoil_camera();
+    let said = drive.run(&line);
+    has(&said.err, "the camera parameters ~ poses have no confidence");
+    assert_eq!(known(said), None);
+    // What was found stays known, and a whole run follows it too.
+    let kept = fs::read_dir(drive.root.path().join("cache/map-check")).expect("a folder").count();
+    assert_eq!(kept, 1);
+    has(&drive.run(&line).err, "poses have no confidence");
+    let eval = format!("eval {DRIVE} --query 12 --reference nearest:1 --method fb2 --out run");
+    has(&drive.run(&eval).err, "poses have no confidence");
+    has(&text(drive.root.path().join("run/run.toml")), "mistake_of_map = ");
+    assert!(text(drive.root.path().join("run/results.jsonl")).contains("\"confidence\":null"));
+}
