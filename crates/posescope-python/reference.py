@@ -30,6 +30,7 @@ ORDER = [
     "Verdict",
     "PoseError",
     "Confidence",
+    "Opinion",
     "Run",
     "Examination",
     "Calibration",
