@@ -20,6 +20,7 @@ mod lecture;
 mod lesson;
 mod memo;
 mod navigation;
+mod opening;
 mod queries;
 mod run_pictures;
 mod save;
@@ -30,6 +31,7 @@ mod setup;
 mod shot;
 mod shown;
 mod state;
+mod text_field;
 mod textures;
 mod theme;
 mod view_context;
@@ -41,6 +43,7 @@ mod worker;
 
 pub use action::{ACTIONS, Action, Group};
 pub use camera::NamedPose;
+pub use opening::{Opener, Opening};
 pub use save::SaveTarget;
 pub use scoring::{CostAlong, CostLine, DenseAsk, DenseMap, Probe, Scoring};
 pub use selection::{KnownResults, ResultRow, Results};
@@ -51,7 +54,7 @@ pub use state::{AppState, Note};
 pub(crate) use view_context::Sends;
 pub use view_context::ViewContext;
 pub use view_name::ViewName;
-pub use view_options::{Arrangement, CompareMode, Tab, ViewOptions};
+pub use view_options::{Arrangement, CompareMode, SidePanel, Tab, ViewOptions};
 pub use window::{WindowError, has_display, open, open_lesson};
 
 use egui::{Margin, Panel};
@@ -75,6 +78,8 @@ pub struct App {
     asking: Option<save::Asking>,
     /// The lesson that is open.
     lesson: Option<OpenLesson>,
+    /// Opens other scenes, runs and lessons.
+    opener: Option<Opener>,
     /// What the window's frame says.
     title: String,
     /// Where the canvas is \[points\].
@@ -98,6 +103,7 @@ impl App {
             pictures: save::Pictures::default(),
             asking: None,
             lesson: None,
+            opener: None,
             title: String::new(),
             canvas: egui::Rect::NOTHING,
         }
@@ -154,6 +160,7 @@ impl App {
     /// Draws the window.
     fn content(&mut self, ui: &mut egui::Ui) {
         self.read_keys(ui.ctx());
+        self.take_dropped(ui.ctx());
         self.frame(ui);
         self.above(ui.ctx());
         self.state.textures.end_frame();
@@ -190,8 +197,18 @@ impl App {
         let enter = |input: &mut egui::InputState| {
             input.consume_key(egui::Modifiers::NONE, egui::Key::Enter)
         };
-        if in_batch && !ctx.egui_wants_keyboard_input() && ctx.input_mut(enter) {
-            self.open_selected();
+        if in_batch && !ctx.egui_wants_keyboard_input() {
+            if ctx.input_mut(enter) {
+                self.open_selected();
+            }
+            let pressed = |key: egui::Key| {
+                ctx.input_mut(|input| input.consume_key(egui::Modifiers::NONE, key))
+            };
+            for (key, is_back) in [(egui::Key::ArrowDown, false), (egui::Key::ArrowUp, true)] {
+                if pressed(key) {
+                    self.state.next_row(is_back);
+                }
+            }
         }
         action::read_keys(ctx, &self.commands);
     }
@@ -225,11 +242,11 @@ impl App {
                 let height = sizes.storyboard.min(frame::storyboard::height(context.setup));
                 fixed(Panel::bottom("storyboard"), height, below)
                     .show(ui, |ui| frame::storyboard::ui(ui, context));
-                if options.shows_queries && sizes.has_sides {
+                if options.shows_side(SidePanel::Queries, sizes.has_sides) {
                     fixed(Panel::left("queries"), sizes.queries, Margin::same(6))
                         .show(ui, |ui| panes.show(ui, ViewName::Queries, context));
                 }
-                if options.shows_inspector && sizes.has_sides {
+                if options.shows_side(SidePanel::Inspector, sizes.has_sides) {
                     fixed(Panel::right("inspector"), sizes.inspector, Margin::symmetric(10, 6))
                         .show(ui, |ui| frame::inspector::ui(ui, context, panes));
                 }

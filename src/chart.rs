@@ -1,6 +1,7 @@
 //! Charts as SVG: two axes, marks in their units, and a legend.
 
 use maud::{Markup, PreEscaped, html};
+use nalgebra::Point2;
 
 use crate::palette::Rgb;
 use crate::scale::LengthUnit;
@@ -165,6 +166,43 @@ impl Axis {
         let scale = |value: f64| if self.is_log { value.log10() } else { value };
         let (from, to) = (scale(self.ends.0), scale(self.ends.1));
         (scale(value) - from) / (to - from)
+    }
+}
+
+/// Axes for places on the ground, right and ahead of the first. The longer side lies across the page.
+pub(crate) struct GroundAxes {
+    pub x: Axis,
+    pub y: Axis,
+    is_long: bool,
+}
+
+impl GroundAxes {
+    /// `None` for no place.
+    pub(crate) fn of(places: &[Point2<f64>]) -> Option<Self> {
+        /// The longer side of the plot, and the least of the shorter \[px\].
+        const SIDES_PX: [f64; 2] = [700.0, 160.0];
+        let first = *places.first()?;
+        let (least, most) =
+            places.iter().fold((first, first), |(least, most), at| (least.inf(at), most.sup(at)));
+        let (middle, extent) = (nalgebra::center(&least, &most), most - least);
+        let m_per_px = (extent.max() * 1.1).max(1e-6) / SIDES_PX[0];
+        let is_long = extent.y > extent.x;
+        let axis = |at: usize| {
+            let label = if at == 0 { "right (m)" } else { "ahead (m)" };
+            let length_px = (1.1 * extent[at] / m_per_px).max(SIDES_PX[1]);
+            let half = 0.5 * length_px * m_per_px;
+            let (from, to) = (middle[at] - half, middle[at] + half);
+            // With ahead to the right, right is down.
+            let ends = if is_long && at == 0 { (to, from) } else { (from, to) };
+            Axis::between(label, ends).long(length_px)
+        };
+        let (across, up) = if is_long { (1, 0) } else { (0, 1) };
+        Some(Self { x: axis(across), y: axis(up), is_long })
+    }
+
+    /// Where a place is on the axes.
+    pub(crate) fn place(&self, at: &Point2<f64>) -> (f64, f64) {
+        if self.is_long { (at.y, at.x) } else { (at.x, at.y) }
     }
 }
 

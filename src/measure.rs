@@ -21,6 +21,7 @@ mod report;
 mod results;
 #[cfg(feature = "cli")]
 mod sweep;
+mod systematic;
 #[cfg(feature = "cli")]
 mod tables;
 #[cfg(feature = "cli")]

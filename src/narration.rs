@@ -9,6 +9,8 @@ use crate::fusion::ShareOutcome;
 use crate::geometry::PoseError;
 use crate::place::place;
 use crate::retrieval::{Criterion, Geometry, RankedReference};
+#[cfg(feature = "app")]
+use crate::trace::Record;
 
 /// One sentence for an event that is a decision; `None` for the others.
 pub(crate) fn sentence(event: &Event) -> Option<String> {
@@ -104,6 +106,24 @@ pub(crate) fn sentence(event: &Event) -> Option<String> {
         Event::ReferencesRanked(event) => ranked(event),
         _ => return None,
     })
+}
+
+/// The hypothesis that the last of these records tries, beside the best of its phase before it; `None` for another event.
+#[cfg(feature = "app")]
+pub(crate) fn tried(records: &[Record]) -> Option<String> {
+    let (last, before) = records.split_last()?;
+    let Event::PoseScored(tried) = &last.event else {
+        return None;
+    };
+    let own = format!("hypothesis {}: cost {}", tried.evaluation, cost(tried.score.cost));
+    if tried.is_best {
+        return Some(own + ", the lowest so far");
+    }
+    let best = before.iter().rev().find_map(|record| match &record.event {
+        Event::PoseScored(one) if one.phase == tried.phase && one.is_best => Some(one.score.cost),
+        _ => None,
+    });
+    Some(best.map_or(own.clone(), |best| format!("{own}; the lowest so far is {}", cost(best))))
 }
 
 /// What a stage does, for someone who sees it for the first time.

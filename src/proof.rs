@@ -155,6 +155,7 @@ impl ProofPicture {
             Proof::CloudOnPhoto => photos::cloud_on_photo(case),
             Proof::PoseMap => Some(places::pose_map(case)),
             Proof::Ranking => places::ranking(case),
+            Proof::BothPoses => maps::both_poses(case),
             Proof::DecidingStage => case.deciding_stage(),
         }
     }

@@ -12,7 +12,7 @@ use super::state::AppState;
 use super::view_context::{Sends, ViewContext};
 use super::view_name::ViewName;
 use super::view_options::Arrangement;
-use super::view_options::{CompareMode, Tab};
+use super::view_options::{CompareMode, SidePanel, Tab};
 use crate::measure::is_equal;
 use crate::session::RunMode;
 
@@ -150,8 +150,8 @@ pub const ACTIONS: &[Action] = &[
     switch(Show, &[key(Key::B)], "Blink between query and synthetic view", |app| app.state.options.blinking ^= true, |state| state.options.blinking),
     switch(Show, &[key(Key::F)], "Dense map of all positions and headings", |app| app.state.options.shows_dense_map ^= true, |state| state.options.shows_dense_map),
     switch(Show, &[key(Key::M)], "The canvas alone", |app| app.state.show_alone(None), |state| state.options.is_alone),
-    switch(Show, &[key(Key::Q)], "List of queries", |app| app.state.options.shows_queries ^= true, |state| state.options.shows_queries),
-    switch(Show, &[key(Key::T)], "Inspector", |app| app.state.options.shows_inspector ^= true, |state| state.options.shows_inspector),
+    switch(Show, &[key(Key::Q)], "List of queries", |app| app.state.toggle_side(SidePanel::Queries), |state| state.shows_side(SidePanel::Queries)),
+    switch(Show, &[key(Key::T)], "Inspector", |app| app.state.toggle_side(SidePanel::Inspector), |state| state.shows_side(SidePanel::Inspector)),
     once(Show, &[], "Inspector: why", |app| app.state.show_tab(Tab::Why)),
     once(Show, &[], "Inspector: numbers", |app| app.state.show_tab(Tab::Numbers)),
     once(Show, &[], "Inspector: parameters", |app| app.state.show_tab(Tab::Parameters)),
@@ -183,6 +183,7 @@ pub const ACTIONS: &[Action] = &[
     once(Window, &[key(Key::F2)], "Inspect one query", |app| app.arrange(Arrangement::Inspect)),
     once(Window, &[key(Key::F3)], "Lecture", |app| app.arrange(Arrangement::Lecture)),
     once(Window, &[key(Key::F4)], "Batch of results", |app| app.arrange(Arrangement::Batch)),
+    once(Window, &[ctrl(Key::O)], "Open a scene, a run or a lesson …", |app| app.ask_where(SaveTarget::Opened)),
     once(Window, &[], "Save a recording …", |app| app.ask_where(SaveTarget::Recording)),
     once(Window, &[], "Stream the run to a Rerun viewer", |app| app.state.stream_recording()),
     once(Window, &[], "Open the run in a new Rerun viewer", |app| app.state.spawn_viewer()),

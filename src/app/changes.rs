@@ -1,16 +1,17 @@
 //! How commands change the state: the run, the cursor, the query, its references, the camera.
 
 use super::camera::{NamedPose, Nudge};
+use super::frame::Sizes;
 use super::navigation::{Anchor, Navigation};
 use super::queries::Queries;
 use super::run_pictures::RunPictures;
-use super::selection::Results;
+use super::selection::{ResultRow, Results};
 use super::state::{AppState, KeptRun};
 use super::view_name::ViewName;
 use super::view_options::Arrangement;
-use super::view_options::{CompareMode, Tab};
+use super::view_options::{CompareMode, SidePanel, Tab};
 use crate::diagnosis::DecidedAt;
-use crate::event::{PhaseSearched, Stage};
+use crate::event::{PhaseSearched, Stage, ViewRendered};
 use crate::fusion::Fusion;
 use crate::geometry::Pose;
 use crate::grid::Phase;
@@ -140,7 +141,23 @@ impl AppState {
     /// Shows a tab of the inspector.
     pub fn show_tab(&mut self, tab: Tab) {
         self.options.tab = tab;
-        self.options.shows_inspector = true;
+        self.options.set_side(SidePanel::Inspector, self.has_room(), true);
+    }
+
+    /// Whether a panel beside the canvas is shown.
+    pub(super) fn shows_side(&self, panel: SidePanel) -> bool {
+        self.options.shows_side(panel, self.has_room())
+    }
+
+    /// Shows a panel beside the canvas, or hides it.
+    pub(super) fn toggle_side(&mut self, panel: SidePanel) {
+        let is_shown = !self.shows_side(panel);
+        self.options.set_side(panel, self.has_room(), is_shown);
+    }
+
+    /// Whether the window has room for both panels.
+    fn has_room(&self) -> bool {
+        Sizes::of(self.ctx.content_rect().size()).has_sides
     }
 
     /// Gives all the room to a view; without one to the canvas, or back to all parts of the window.
@@ -198,9 +215,26 @@ impl AppState {
     pub fn open_result(&mut self, query: usize, result: usize) {
         let known = self.results.get(&query).and_then(|known| known.get(result));
         let moment = known.map(deciding);
+        self.options.selected_row = Some(ResultRow { query, place: result });
         self.select_query(query);
         if let Some(moment) = moment {
             self.navigation = Navigation::towards(Anchor::Moment(moment));
+        }
+    }
+
+    /// Opens the next row of the table of results, or the one before.
+    pub(super) fn next_row(&mut self, back: bool) {
+        let Ok(rows) = self.selected_results() else { return };
+        let rows = self.results.sorted(&rows, self.options.results_order);
+        let here = self.options.selected_row;
+        let here = rows.iter().position(|row| Some(*row) == here);
+        let next = match (here, back) {
+            (Some(here), false) => (here + 1).min(rows.len().saturating_sub(1)),
+            (Some(here), true) => here.saturating_sub(1),
+            (None, _) => 0,
+        };
+        if let Some(row) = rows.get(next) {
+            self.open_result(row.query, row.place);
         }
     }
 
@@ -226,16 +260,31 @@ impl AppState {
     /// The first wrong or missing answer of a query, by its position among the query's results.
     pub(super) fn first_failure(&self, query: usize) -> Option<usize> {
         let mut known = self.results.get(&query)?.iter();
-        known.position(|result| result.grade.is_failure())
+        known.position(QueryResult::is_suspect)
     }
 
     pub(super) fn next_failure(&mut self, back: bool) {
-        if self.results.keys().any(|query| self.has_failed(*query)) {
-            self.next_query(back, Self::has_failed);
-            let failed = self.first_failure(self.setup.query);
-            if let Some(result) = failed {
+        // In the table, only what the filter shows.
+        let is_filtered = self.options.layout == Arrangement::Batch;
+        let rows = self.selected_results().ok().filter(|_| is_filtered);
+        let of_rows = |state: &Self, query: usize| {
+            let rows = rows.iter().flat_map(|rows| rows.iter());
+            let mut places = rows.filter(|row| row.query == query);
+            let is_suspect =
+                |row: &&ResultRow| state.results.result(**row).is_some_and(QueryResult::is_suspect);
+            places.find(is_suspect).map(|row| row.place)
+        };
+        let failure = |state: &Self, query: usize| match rows {
+            Some(_) => of_rows(state, query),
+            None => state.first_failure(query),
+        };
+        if self.results.keys().any(|query| failure(self, *query).is_some()) {
+            self.next_query(back, |state, query| failure(state, query).is_some());
+            if let Some(result) = failure(self, self.setup.query) {
                 self.open_result(self.setup.query, result);
             }
+        } else if is_filtered && self.results.keys().any(|query| self.has_failed(*query)) {
+            self.note("No result that the filter shows is known to be wrong", false);
         } else {
             self.note("No query is known to fail; run all of them first", false);
         }
@@ -385,10 +434,22 @@ impl AppState {
 
     /// Moves the trial camera, in its own frame.
     pub(super) fn move_camera(&mut self, nudge: Nudge) {
-        match self.camera.or_else(|| self.named_pose(NamedPose::Start)) {
+        match self.camera.or_else(|| self.pose_in_view()) {
             Some(pose) => self.camera = Some(nudge.apply(&pose)),
             None => self.note("There is no camera before the query is loaded", true),
         }
+    }
+
+    /// The pose that is shown: of the latest synthetic view, of the result, or the start.
+    fn pose_in_view(&self) -> Option<Pose> {
+        let run = self.run();
+        let rendered = || {
+            let view = run.latest::<ViewRendered>(self.cursor())?;
+            let problem = run.problem_at(self.cursor())?;
+            Some(problem.world_from_query(&view.offset.reference_from_camera()))
+        };
+        let shown = self.named_pose(NamedPose::Estimate).or_else(rendered);
+        shown.or_else(|| self.named_pose(NamedPose::Start))
     }
 
     /// Takes the camera to a place of the search.

@@ -119,6 +119,7 @@ impl App {
             SaveTarget::Canvas => self.pictures.ask(&self.state.ctx, path, Some(self.canvas)),
             SaveTarget::Session => self.save_session(&path),
             SaveTarget::Restored => self.restore_session(path),
+            SaveTarget::Opened => self.open_named(&path.display().to_string()),
         }
     }
 
@@ -158,6 +159,10 @@ impl App {
                     self.state.change_setup(setup, navigation);
                 }
             }
+            Some(Opened::Other(opened)) => match *opened {
+                Ok(opening) => self.begin(opening),
+                Err(why) => self.state.note(why, true),
+            },
             Some(Opened::Session(Err(why))) => self.state.note(why, true),
             Some(Opened::Page(_, Err(error))) => self.state.note(error.to_string(), true),
             None => self.state.note("internal error while scenes were opened", true),

@@ -81,6 +81,9 @@ fn sentences(context: &ViewContext<'_>) -> (String, String) {
 pub(super) fn latest(run: &Run, span: &Span, cursor: usize) -> Option<String> {
     let last = span.records.end.checked_sub(1)?.min(cursor);
     let records = run.records().get(span.records.start..=last)?;
+    if let Some(tried) = narration::tried(records) {
+        return Some(tried);
+    }
     let mut latest = records.iter().rev();
     let sentence = latest.find_map(|record| narration::sentence(&record.event))?;
     Some(run.params.scale.unit().words(&sentence))

@@ -23,6 +23,8 @@ pub enum SaveTarget {
     Session,
     /// Back from such a file.
     Restored,
+    /// Another scene, run or lesson.
+    Opened,
 }
 
 impl SaveTarget {
@@ -34,6 +36,7 @@ impl SaveTarget {
             Self::Canvas => "Save the canvas as a picture",
             Self::Session => "Save the session",
             Self::Restored => "Restore a session",
+            Self::Opened => "Open a scene, a run folder or a lesson",
         }
     }
 }
@@ -42,6 +45,7 @@ impl SaveTarget {
 fn offered(target: SaveTarget, setup: &Setup) -> PathBuf {
     let name = |ending: &str| format!("{}{ending}", name_of(setup));
     let file = match target {
+        SaveTarget::Opened => return setup.task.scene.clone().into(),
         SaveTarget::Recording => name(".rrd"),
         SaveTarget::Picture => name("-window.png"),
         SaveTarget::Canvas => name("-canvas.png"),
@@ -99,6 +103,7 @@ impl Asking {
                 let is_named = !self.path.trim().is_empty();
                 let does = match self.target {
                     SaveTarget::Restored => "Restore",
+                    SaveTarget::Opened => "Open",
                     _ if Path::new(self.path.trim()).exists() => "Replace the file",
                     _ => "Save it",
                 };

@@ -8,7 +8,8 @@ use std::rc::Rc;
 use super::memo::Memo;
 use crate::localize::QueryResult;
 use crate::measure::{
-    Condition, ConditionError, Finding, Migration, Overview, migrations, verdict_name,
+    Condition, ConditionError, Finding, Migration, Order, Overview, migrations, select,
+    verdict_name,
 };
 
 /// Results by query.
@@ -110,6 +111,12 @@ impl BatchResults {
     /// The result of a row.
     pub(super) fn result(&self, row: ResultRow) -> Option<&QueryResult> {
         self.now.get(&row.query)?.get(row.place)
+    }
+
+    /// Some rows in an order.
+    pub(super) fn sorted(&self, rows: &[ResultRow], order: Option<Order>) -> Vec<ResultRow> {
+        let known: Vec<&QueryResult> = rows.iter().filter_map(|row| self.result(*row)).collect();
+        select(&known, None, order).into_iter().map(|index| rows[index]).collect()
     }
 
     /// What the same method gave for the same query and setting before.

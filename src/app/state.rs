@@ -8,6 +8,7 @@ use std::time::Duration;
 use egui::TextureHandle;
 
 use super::navigation::{Anchor, Navigation};
+use super::opening::Opening;
 use super::queries::Queries;
 use super::run_pictures::RunPictures;
 use super::scoring::{CostLine, DenseAsk, Scoring};
@@ -31,8 +32,8 @@ pub struct Note {
     pub text: String,
     /// Whether something went wrong.
     pub is_error: bool,
-    /// When it goes by itself \[s of the window's clock\]; what went wrong stays until it is dismissed.
-    until_s: Option<f64>,
+    /// When it goes by itself \[s of the window's clock\]; what went wrong stays longer.
+    until_s: f64,
 }
 
 /// A run that was kept to be compared with.
@@ -91,6 +92,8 @@ pub(super) enum Opened {
     Session(Result<(Setup, usize, Arrangement), String>),
     /// Those of a page of the lesson that localises this.
     Page(String, Result<Setup, SettingError>),
+    /// Another scene, run or lesson.
+    Other(Box<Result<Opening, String>>),
 }
 
 impl AppState {
@@ -185,9 +188,9 @@ impl AppState {
     /// Lets notes go that were there long enough.
     fn forget_notes(&mut self) {
         let now_s = self.ctx.input(|input| input.time);
-        let is_over = |note: &Note| note.until_s.is_some_and(|until_s| until_s <= now_s);
+        let is_over = |note: &Note| note.until_s <= now_s;
         self.notes.retain(|note| !is_over(note));
-        let next = self.notes.iter().filter_map(|note| note.until_s);
+        let next = self.notes.iter().map(|note| note.until_s);
         if let Some(next_s) = next.min_by(f64::total_cmp) {
             let rest = Duration::from_secs_f64(next_s - now_s);
             self.ctx.request_repaint_after(rest);
@@ -341,11 +344,13 @@ impl AppState {
         const KEPT: usize = 5;
         /// Long enough to read two lines \[s\].
         const LASTING_S: f64 = 10.0;
+        /// Long enough to be found by somebody who looked elsewhere \[s\].
+        const ERROR_S: f64 = 60.0;
         let now_s = self.ctx.input(|input| input.time);
         self.notes.push(Note {
             text: text.into(),
             is_error,
-            until_s: (!is_error).then_some(now_s + LASTING_S),
+            until_s: now_s + if is_error { ERROR_S } else { LASTING_S },
         });
         let surplus = self.notes.len().saturating_sub(KEPT);
         self.notes.drain(..surplus);
@@ -374,6 +379,12 @@ impl AppState {
 
     /// Explains the results that are wrong, or no longer; what was computed is at hand.
     pub(super) fn switch_explaining(&mut self) {
+        if self.run().loaded.is_some() && self.run().truth().is_none() {
+            let words = "What would help is judged by the truth, which is not known here; the inspector says how far the pose \
+                         can be trusted";
+            self.note(words, false);
+            return;
+        }
         let explain = &mut self.setup.task.protocol.explain;
         *explain = match *explain {
             0 => Protocol::EXPLAINING_RUNS,
@@ -386,7 +397,7 @@ impl AppState {
         self.options.shows_why = shows_why;
         // What is tried, the button says.
         if is_over {
-            self.note("Nothing is explained any more", false);
+            self.note("Remedies are no longer tried", false);
         }
     }
 

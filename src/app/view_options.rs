@@ -2,9 +2,10 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::selection::ResultRow;
 use super::view_name::ViewName;
 use crate::event::Stage;
-use crate::measure::Migration;
+use crate::measure::{Migration, Order};
 
 /// What the window is arranged for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -33,6 +34,15 @@ pub enum CompareMode {
     Present,
     /// The run that was kept, A.
     Kept,
+}
+
+/// A panel beside the canvas.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SidePanel {
+    /// The list of queries.
+    Queries,
+    /// The inspector.
+    Inspector,
 }
 
 /// A tab of the inspector.
@@ -78,6 +88,8 @@ pub struct ViewOptions {
     pub shows_queries: bool,
     /// Whether the inspector is shown.
     pub shows_inspector: bool,
+    /// The panel that is shown where there is room for one beside the canvas.
+    pub narrow: Option<SidePanel>,
     /// The tab of the inspector.
     pub tab: Tab,
     /// Which of the runs is shown.
@@ -90,6 +102,10 @@ pub struct ViewOptions {
     pub lockstep: Option<usize>,
     /// Which results of queries are shown, as a condition.
     pub results_filter: String,
+    /// The order of the table of results.
+    pub results_order: Option<Order>,
+    /// The row of that table that was opened last.
+    pub selected_row: Option<ResultRow>,
     /// What the verdicts of the shown results have changed to.
     pub verdict_change: Option<Migration>,
     /// Whether only what differs is shown.
@@ -102,4 +118,24 @@ pub struct ViewOptions {
     pub wants_filter: bool,
     /// The selected query feature.
     pub selected_feature: Option<usize>,
+}
+
+impl ViewOptions {
+    /// Whether a panel is shown. Without room for both, only the one that was asked for is.
+    pub(super) fn shows_side(&self, panel: SidePanel, has_room: bool) -> bool {
+        match panel {
+            _ if !has_room => self.narrow == Some(panel),
+            SidePanel::Queries => self.shows_queries,
+            SidePanel::Inspector => self.shows_inspector,
+        }
+    }
+
+    /// Shows a panel, or hides it.
+    pub(super) fn set_side(&mut self, panel: SidePanel, has_room: bool, is_shown: bool) {
+        match panel {
+            _ if !has_room => self.narrow = is_shown.then_some(panel),
+            SidePanel::Queries => self.shows_queries = is_shown,
+            SidePanel::Inspector => self.shows_inspector = is_shown,
+        }
+    }
 }

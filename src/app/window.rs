@@ -4,6 +4,7 @@ use egui::ViewportBuilder;
 
 use super::App;
 use super::adapter;
+use super::opening::Opener;
 use super::selection::KnownResults;
 use super::setup::Setup;
 use super::view_options::Arrangement;
@@ -64,10 +65,15 @@ fn window_options([width, height]: [u32; 2]) -> eframe::NativeOptions {
 ///
 /// # Errors
 /// [`WindowError`] when there is no display, or nothing to draw with.
-pub fn open(setup: Setup, results: KnownResults, size: [u32; 2]) -> Result<(), WindowError> {
+pub fn open(
+    setup: Setup,
+    results: KnownResults,
+    size: [u32; 2],
+    opener: Opener,
+) -> Result<(), WindowError> {
     open_with(setup, size, move |app| {
         let has_results = !results.now.is_empty();
-        let mut app = app.with_results(results);
+        let mut app = app.with_opener(opener).with_results(results);
         if has_results {
             app.arrange(Arrangement::Batch);
         }
@@ -79,8 +85,8 @@ pub fn open(setup: Setup, results: KnownResults, size: [u32; 2]) -> Result<(), W
 ///
 /// # Errors
 /// [`WindowError`] when there is no display, or nothing to draw with.
-pub fn open_lesson(setup: Setup, lesson: Lesson) -> Result<(), WindowError> {
-    open_with(setup, SIZE, move |app| app.with_lesson(lesson))
+pub fn open_lesson(setup: Setup, lesson: Lesson, opener: Opener) -> Result<(), WindowError> {
+    open_with(setup, SIZE, move |app| app.with_opener(opener).with_lesson(lesson))
 }
 
 fn open_with(

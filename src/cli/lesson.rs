@@ -45,15 +45,19 @@ fn list(terminal: &Terminal) -> Result<(), CliError> {
 
 #[cfg(feature = "app")]
 fn window(lesson: Lesson, terminal: &Terminal) -> Result<(), CliError> {
-    use posescope::app::{self, Setup};
-
-    let first = &lesson.pages[0].variant;
-    let open = lesson.setting(first).open(&|_| None)?;
-    let setup = Setup::of_lesson(open, defaults::FOLDER.into());
-    match app::open_lesson(setup, lesson.clone()) {
+    let setup = setup_of(&lesson)?;
+    match posescope::app::open_lesson(setup, lesson.clone(), super::view::opener()) {
         Ok(()) => Ok(()),
         Err(why) => save_instead(&lesson, &why, terminal),
     }
+}
+
+/// What the first page of a lesson localises.
+#[cfg(feature = "app")]
+pub fn setup_of(lesson: &Lesson) -> Result<posescope::app::Setup, CliError> {
+    let first = &lesson.pages[0].variant;
+    let open = lesson.setting(first).open(&|_| None)?;
+    Ok(posescope::app::Setup::of_lesson(open, defaults::FOLDER.into()))
 }
 
 /// A program without the window records the lesson instead.

@@ -3,7 +3,8 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use posescope::app::{self, KnownResults, Results, Setup, WindowError};
+use posescope::app::{self, KnownResults, Opener, Opening, Results, Setup, WindowError};
+use posescope::lesson::Lesson;
 use posescope::localize::QueryResult;
 use posescope::measure::StoredSummary;
 use posescope::run::{ConfigError, RunFile, ScenePair, read_run, results_of_pair};
@@ -22,12 +23,29 @@ use super::terminal::Terminal;
 pub fn view(args: &ViewArgs, terminal: &Terminal) -> Result<(), CliError> {
     let (setup, results) = setup(args)?;
     let headless = setup.clone();
-    match app::open(setup, results, args.screenshot.window) {
+    match app::open(setup, results, args.screenshot.window, opener()) {
         Ok(()) => Ok(()),
         Err(
             error @ (WindowError::NoDisplay | WindowError::NoAdapter(_) | WindowError::Failed(_)),
         ) => record_instead(&headless, &error, terminal),
     }
+}
+
+/// Opens what is named in a window that is open.
+pub fn opener() -> Opener {
+    Arc::new(|name| opening(name).map_err(|error| error.to_string()))
+}
+
+/// A lesson, a run folder or a scene. What is in the file system comes before a lesson of that name.
+fn opening(name: &str) -> Result<Opening, CliError> {
+    let lessons = if Path::new(name).exists() { Vec::new() } else { Lesson::all()? };
+    if let Some(lesson) = lessons.into_iter().find(|lesson| lesson.name == name) {
+        let setup = super::lesson::setup_of(&lesson)?;
+        return Ok(Opening { setup, results: KnownResults::default(), lesson: Some(lesson) });
+    }
+    let args = ViewArgs::parse(["posescope", "view", name].map(str::to_owned))?;
+    let (setup, results) = setup(&args)?;
+    Ok(Opening { setup, results, lesson: None })
 }
 
 /// Records the same run.
@@ -185,7 +203,7 @@ fn of_a_run(args: &ViewArgs, folder: &Path) -> Result<(Setup, KnownResults), Cli
     let before = args.before.as_deref().map(|before| results_of(before, &read_run(before)?));
     let before = before.transpose()?;
     let has_failed = |(_, results): &(&usize, &Vec<QueryResult>)| {
-        results.iter().any(|result| result.grade.is_failure())
+        results.iter().any(|result| result.is_suspect())
     };
     let first = results.iter().find(has_failed).or_else(|| results.iter().next());
     let query = match (&args.query, first) {

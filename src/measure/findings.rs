@@ -103,6 +103,12 @@ pub fn findings(results: &[&QueryResult], examined: &[Finding]) -> Vec<Finding> 
             }
         }
     }
+    // What the truth says of a file of poses, posescope's own poses need not say again.
+    let of_files = super::systematic::of_given_poses(results).into_iter();
+    let is_new =
+        |one: &Finding| !found.iter().any(|known| known.of == one.of && known.about == one.about);
+    let of_files: Vec<Finding> = of_files.filter(is_new).collect();
+    found.extend(of_files);
     found
 }
 

@@ -27,7 +27,7 @@ pub fn junit(
         let suite = format!("{} {}", Group::of(row).scenes(), row.method);
         let words = row.grade.words(row.error.as_ref());
         let status = match (row.diagnosis.first(), &row.reason) {
-            _ if !row.grade.is_failure() => TestCaseStatus::success(),
+            _ if !row.is_suspect() => TestCaseStatus::success(),
             _ if known.has(row) => skipped(&words),
             (Some(primary), _) => failure(primary.code.name(), &primary.text),
             (None, Some(reason)) => failure(reason.code.name(), &reason.text),

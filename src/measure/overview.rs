@@ -8,6 +8,7 @@ use super::metrics::median;
 use crate::diagnosis::{Code, Confidence, Grade};
 use crate::estimator;
 use crate::localize::QueryResult;
+use crate::opinion::Standing;
 
 /// What a run came to.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -31,6 +32,8 @@ pub struct Bar {
     pub counts: [usize; Grade::ALL.len()],
     /// How many poses are trusted.
     pub trusted: usize,
+    /// How many poses have each second opinion, in the order of [`Standing::ALL`].
+    pub opinions: [usize; Standing::ALL.len()],
     /// The median translation error of its poses \[m\].
     pub median_m: Option<f64>,
     /// The most frequent primary cause of its failures.
@@ -59,7 +62,7 @@ impl Overview {
             let errors: Vec<f64> =
                 results.iter().filter_map(|one| Some(one.error?.translation_m)).collect();
             let word = |one: &QueryResult| one.confidence.as_ref().map(|known| known.word);
-            let failed = results.iter().filter(|one| one.grade.is_failure());
+            let failed = results.iter().filter(|one| one.is_suspect());
             // Of equally frequent ones the first.
             let cause = causes(failed).into_iter().rev().max_by_key(|(_, times)| *times);
             Bar {
@@ -69,12 +72,13 @@ impl Overview {
                     .iter()
                     .filter(|one| word(one) == Some(Confidence::Trusted))
                     .count(),
+                opinions: opinions(&results),
                 median_m: median(&errors),
                 cause,
             }
         });
         let bars: Vec<Bar> = bars.collect();
-        let mut causes = causes(results.iter().filter(|result| result.grade.is_failure()));
+        let mut causes = causes(results.iter().filter(|result| result.is_suspect()));
         // A stable sort: causes that are as frequent stay in the order in which they occur.
         causes.sort_by_key(|(_, times)| std::cmp::Reverse(*times));
         let findings = findings(results, examined);
@@ -82,12 +86,15 @@ impl Overview {
     }
 }
 
-/// The positions of the failures: wrong poses by their error, then those without a pose.
+/// The positions of the failures: wrong poses by their error, those that a second opinion contradicts by how far off
+/// they seem, then those without a pose.
 pub fn worst_first(results: &[QueryResult]) -> Vec<usize> {
-    let failures = (0..results.len()).filter(|&at| results[at].grade.is_failure());
+    let failures = (0..results.len()).filter(|&at| results[at].is_suspect());
     let mut failures: Vec<usize> = failures.collect();
-    let off_m =
-        |at: usize| results[at].error.map_or(f64::NEG_INFINITY, |error| error.translation_m);
+    let off_m = |at: usize| {
+        let off_m = results[at].off_m().filter(|_| results[at].grade != Grade::NoPose);
+        off_m.unwrap_or(f64::NEG_INFINITY)
+    };
     failures.sort_by(|&one, &other| off_m(other).total_cmp(&off_m(one)));
     failures
 }
@@ -97,6 +104,24 @@ fn causes<'a>(results: impl Iterator<Item = &'a &'a QueryResult>) -> Vec<(Code, 
     let primary = results.filter_map(|result| Some((result.diagnosis.first()?.code, ())));
     let causes = grouped(primary).into_iter();
     causes.map(|(code, results)| (code, results.len())).collect()
+}
+
+/// How many poses have each second opinion.
+fn opinions(results: &[&QueryResult]) -> [usize; Standing::ALL.len()] {
+    let standings = || results.iter().filter_map(|one| Some(one.opinion.as_ref()?.standing));
+    Standing::ALL.map(|standing| standings().filter(|one| *one == standing).count())
+}
+
+/// What the second opinions on a method's poses come to, as a sentence after others; empty where there are none.
+fn opinions_in_words(bar: &Bar) -> String {
+    let counts = Standing::ALL.into_iter().zip(bar.opinions).filter(|(_, count)| *count > 0);
+    let parts: Vec<String> =
+        counts.map(|(standing, count)| format!("{count} {standing}")).collect();
+    if parts.is_empty() {
+        String::new()
+    } else {
+        format!(" By a second opinion: {}.", parts.join(", "))
+    }
 }
 
 /// The poses of another system are what a run is about, and methods beside it are there to compare.
@@ -146,9 +171,9 @@ fn best_in_words(results: &[&QueryResult], bars: &[Bar], is_named: bool) -> Stri
         };
     }
     if !is_measured {
-        return format!(
-            "{name} gives a pose for {good} of {total} {queries}. The truth is not known."
-        );
+        let known = "The truth is not known.";
+        let opinions = opinions_in_words(best);
+        return format!("{name} gives a pose for {good} of {total} {queries}. {known}{opinions}");
     }
     let mut words = match good {
         0 if is_named => format!("{name} is right for none of {total} {queries}."),
@@ -163,7 +188,7 @@ fn best_in_words(results: &[&QueryResult], bars: &[Bar], is_named: bool) -> Stri
     let is_counted = |result: &QueryResult| good == 0 || result.method_name() == *name;
     let whose = if good == 0 && !is_named { "the" } else { "its" };
     let failed: Vec<&&QueryResult> =
-        results.iter().filter(|result| is_counted(result) && result.grade.is_failure()).collect();
+        results.iter().filter(|result| is_counted(result) && result.is_suspect()).collect();
     let causes = causes(failed.iter().copied());
     if let Some((code, times)) = causes.iter().rev().max_by_key(|(_, times)| *times) {
         words += &format!(

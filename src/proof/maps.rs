@@ -10,6 +10,7 @@ use crate::event::PhaseSearched;
 use crate::geometry::Pose;
 use crate::grid::{Lattice, Offset, Phase, ScoredLattice};
 use crate::localize::QueryResult;
+use crate::method::Method;
 use crate::palette;
 use crate::picture;
 use crate::render::Comparison;
@@ -104,6 +105,27 @@ pub(super) fn freed_views(case: &ProofCase<'_>) -> Option<ProofPicture> {
     );
     let result = seen("result", pose).map(|result| view_panel(query, &result));
     Some(ProofPicture { large, below: None, beside: [frozen].into_iter().chain(result).collect() })
+}
+
+/// The map seen from where posescope has the query, and from the pose of another system.
+pub(super) fn both_poses(case: &ProofCase<'_>) -> Option<ProofPicture> {
+    let better = case.result.opinion.as_ref()?.better.as_ref()?.to_pose()?;
+    let estimator = estimator::find(Method::MI)?.make(case.params);
+    let seen = |label, pose: Pose| Seen::at(case, estimator.as_ref(), label, pose);
+    let given = seen("given pose", case.pose()?)?;
+    let better = seen("pose where posescope has it", better)?;
+    let query = &case.problem.query().photo().gray;
+    let parts = picture::preference(query, &given.comparison, &better.comparison);
+    let photo = Panel::photo("Query", case.problem.query().photo());
+    // Small panels have little room for words.
+    let given = Panel { title: given.label(), ..view_panel(query, &given) };
+    let beside = [photo, given];
+    let parts = parts.map(|parts| Panel::new("Orange: given, blue: other", parts));
+    Some(ProofPicture {
+        large: view_panel(query, &better),
+        below: None,
+        beside: beside.into_iter().chain(parts).collect(),
+    })
 }
 
 /// The mean place of the covered pixels \[px\].

@@ -4,6 +4,7 @@
 mod failures;
 mod glance;
 mod results;
+mod route;
 mod words;
 
 pub use failures::repeat_command;
@@ -50,6 +51,7 @@ pub(super) fn page(report: &RunReport) -> String {
             @if let Some(baseline) = &report.baseline { (changes(report, baseline)) }
             (glance::methods(&overview))
             (glance::causes(&overview))
+            (route::routes(report))
             (failures::failures(report))
             (results::results(report, &columns))
             (plots(report))

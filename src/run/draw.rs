@@ -13,9 +13,9 @@ use crate::scene::{Scene, SceneError};
 /// How the queries of a scene are chosen.
 #[derive(Clone, Copy, Debug)]
 pub struct Draw<'a> {
-    /// How many of the frames with a known pose are drawn; all without a limit.
+    /// How many frames are drawn; all without a limit.
     pub limit: Option<Limit>,
-    /// Only these of the drawn frames; all if empty.
+    /// Only these of the drawn frames, and frames without a pose; all drawn ones if empty.
     pub only: &'a [String],
     /// The seed of the choice.
     pub seed: u64,
@@ -24,9 +24,9 @@ pub struct Draw<'a> {
 /// Why there are no queries.
 #[derive(Debug, thiserror::Error)]
 pub enum DrawError {
-    /// Without poses, errors cannot be measured and references cannot be found.
+    /// No frame of the references' scene can be a reference.
     #[error(
-        "{0}: no frame has a known pose, so there are no queries; `posescope doctor` says what is missing"
+        "{0}: no frame has a known pose, so there are no references; `posescope doctor` says what is missing"
     )]
     NoPose(String),
     /// The frame exists but was not drawn.
@@ -57,11 +57,18 @@ impl Draw<'_> {
         references: &dyn Scene,
         queries: &dyn Scene,
     ) -> Result<ScenePair, DrawError> {
-        let drawn = self.frames(queries)?;
+        let has_references = (0..references.frames().len()).any(|at| references.pose(at).is_some());
+        if !has_references {
+            return Err(DrawError::NoPose(references.name().to_owned()));
+        }
+        let mut drawn = self.frames(queries);
         let mut wanted = BTreeSet::new();
         for name in self.only {
             let frame = queries.find(name)?;
             wanted.insert(frame);
+            if queries.pose(frame).is_none() && !drawn.contains(&frame) {
+                drawn.push(frame);
+            }
             if !drawn.contains(&frame) {
                 return Err(DrawError::NotDrawn {
                     scene: queries.name().to_owned(),
@@ -70,6 +77,7 @@ impl Draw<'_> {
                 });
             }
         }
+        drawn.sort_unstable();
         let mut chosen = drawn.clone();
         chosen.retain(|frame| wanted.is_empty() || wanted.contains(frame));
         let names = |frames: &[usize]| {
@@ -97,12 +105,14 @@ impl Draw<'_> {
         })
     }
 
-    /// The drawn frames in the order of the scene. The seed and the scene's name determine them.
-    fn frames(&self, scene: &dyn Scene) -> Result<Vec<usize>, DrawError> {
+    /// The drawn frames in the order of the scene: of those with a known pose, or of all where none has one. The seed and
+    /// the scene's name determine them.
+    fn frames(&self, scene: &dyn Scene) -> Vec<usize> {
+        let all = 0..scene.frames().len();
         let mut frames: Vec<usize> =
-            (0..scene.frames().len()).filter(|&frame| scene.pose(frame).is_some()).collect();
+            all.clone().filter(|&frame| scene.pose(frame).is_some()).collect();
         if frames.is_empty() {
-            return Err(DrawError::NoPose(scene.name().to_owned()));
+            frames = all.collect();
         }
         let count = match self.limit {
             None => frames.len(),
@@ -118,6 +128,6 @@ impl Draw<'_> {
             frames.truncate(count);
             frames.sort_unstable();
         }
-        Ok(frames)
+        frames
     }
 }

@@ -163,7 +163,7 @@ impl<'a> Evaluation<'a> {
                 for &method in &self.plan.run.protocol.methods {
                     let mut results = results.iter().map(|(result, _)| result);
                     let request = results
-                        .find(|result| result.method == method && result.grade.is_failure())
+                        .find(|result| result.method == method && result.is_suspect())
                         .and_then(|failed| {
                             requests.iter().find(|one| one.setting == failed.setting)
                         });

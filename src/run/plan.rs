@@ -125,6 +125,15 @@ pub enum Refusal {
         /// Its second argument.
         argument: String,
     },
+    /// Queries whose references are sought around a place that is not known.
+    #[error(
+        "the position of query {query} is not known, so its nearest references are not; choose them by looks with \
+         --reference matches:K or retrieve:K, name them, or say where the queries are with --gps"
+    )]
+    Position {
+        /// The first such query.
+        query: String,
+    },
     /// Another number of indexes than of scenes.
     #[error(
         "--index is given {indexes} times for {scenes} scenes; give one per scene, in the same order"
@@ -160,6 +169,7 @@ impl Plan {
             None => request.of_scenes(&given)?,
         };
         let scenes = scenes.with_protocol(&run.protocol)?;
+        refuse_unplaced(&run, &scenes)?;
         let (indices, contents) = indices(&run, &scenes, &params)?;
         run.inputs.extend(contents);
         request.check(&run)?;
@@ -346,7 +356,25 @@ pub fn failed_queries(folder: &Path) -> Result<BTreeSet<[String; 3]>, FolderErro
         [row.scene, queries, row.query]
     };
     let rows = read_rows(folder)?.into_iter();
-    Ok(rows.filter(|row| row.grade.is_failure()).map(key).collect())
+    Ok(rows.filter(|row| row.is_suspect()).map(key).collect())
+}
+
+/// Refuses queries whose references would be sought around a place that is not known.
+fn refuse_unplaced(run: &RunFile, scenes: &Scenes) -> Result<(), PlanError> {
+    let is_around =
+        matches!(run.protocol.selection(), Selection::Random(_) | Selection::Nearest(_));
+    if !is_around || run.protocol.named_references().next().is_some() {
+        return Ok(());
+    }
+    for pair in run.pairs.iter().filter(|pair| pair.references.is_empty()) {
+        let queries = scenes.of_queries(pair);
+        for query in &pair.queries {
+            if queries.position(queries.find(query)?).is_none() {
+                return Err(Refusal::Position { query: query.clone() }.into());
+            }
+        }
+    }
+    Ok(())
 }
 
 fn written(params: &Params) -> toml::Table {

@@ -21,7 +21,7 @@ pub enum RunMode {
     Paused,
     /// It runs to the next event.
     StepInto,
-    /// It runs past the stage that begins here, or to the next event.
+    /// It runs to the end of the stage that begins here, or that this is in; after a stage, to the next event.
     StepOver,
     /// It runs to the end of the surrounding stage.
     StepOut,
@@ -82,7 +82,9 @@ impl PauseAt {
     fn new(mode: RunMode, last: Option<&Record>) -> Self {
         match (mode, last) {
             (RunMode::Running, _) => Self::Never,
-            (RunMode::StepOver, Some(Record { event: Event::StageStarted(_), depth, .. })) => {
+            (RunMode::StepOver, Some(Record { event, depth, .. }))
+                if !matches!(event, Event::StageEnded(_)) =>
+            {
                 Self::EndOfStage(*depth)
             }
             // At the end of a stage, "out" leaves the surrounding stage.

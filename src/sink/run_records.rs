@@ -160,7 +160,7 @@ fn failures(folder: &Path, run: &RunFile) -> Result<Vec<String>, FolderError> {
     for result in read_results(folder, run)? {
         // Queries whose files cannot be read have no recording.
         let is_unread = result.reason.as_ref().is_some_and(|reason| reason.code == Code::I1);
-        let file = names.of_result(&result).filter(|_| result.grade.is_failure() && !is_unread);
+        let file = names.of_result(&result).filter(|_| result.is_suspect() && !is_unread);
         // The results of one method and query are consecutive.
         files.extend(file.filter(|file| files.last() != Some(file)));
     }

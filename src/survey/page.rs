@@ -7,7 +7,7 @@ use nalgebra::Point2;
 
 use super::SurveyRequest;
 use super::answers::{Answer, GROUPS, Part, Surveyed};
-use crate::chart::{Axis, Chart, Mark, Shape};
+use crate::chart::{Axis, Chart, GroundAxes, Mark, Shape};
 use crate::diagnosis::{Code, Grade};
 use crate::geometry::Pose;
 use crate::palette::{self, Rgb};
@@ -156,27 +156,9 @@ fn photos<'a>(scene: &'a dyn Scene, answers: &'a [Answer], part: Part) -> Vec<Ph
 
 /// The map from above. `None` for fewer than two photos.
 fn route(photos: &[Photo<'_>], scene: &dyn Scene) -> Option<Chart> {
-    /// The longer side of the plot, and the least of the shorter \[px\].
-    const SIDES_PX: [f64; 2] = [700.0, 160.0];
     let placed: Vec<(&Photo<'_>, Point2<f64>)> =
         photos.iter().filter_map(|photo| Some((photo, photo.at?))).collect();
-    let first = placed.first()?.1;
-    let (least, most) =
-        placed.iter().fold((first, first), |(least, most), (_, at)| (least.inf(at), most.sup(at)));
-    let (middle, extent) = (nalgebra::center(&least, &most), most - least);
-    let m_per_px = (extent.max() * 1.1).max(1e-6) / SIDES_PX[0];
-    // The longer side lies across the page.
-    let is_long = extent.y > extent.x;
-    let axis = |at: usize| {
-        let label = if at == 0 { "right (m)" } else { "ahead (m)" };
-        let length_px = (1.1 * extent[at] / m_per_px).max(SIDES_PX[1]);
-        let half = 0.5 * length_px * m_per_px;
-        let (from, to) = (middle[at] - half, middle[at] + half);
-        // With ahead to the right, right is down.
-        let ends = if is_long && at == 0 { (to, from) } else { (from, to) };
-        Axis::between(label, ends).long(length_px)
-    };
-    let (across, up) = if is_long { (1, 0) } else { (0, 1) };
+    let axes = GroundAxes::of(&placed.iter().map(|(_, at)| *at).collect::<Vec<_>>())?;
     let methods = photos.iter().map(|photo| photo.answers.len()).max()?;
     let color = |right: usize| -> (Rgb, bool) {
         match right {
@@ -187,7 +169,7 @@ fn route(photos: &[Photo<'_>], scene: &dyn Scene) -> Option<Chart> {
     };
     let marks = placed.iter().map(|(photo, at)| {
         let (color, filled) = color(photo.right());
-        Mark::new(Shape::Dot { at: (at[across], at[up]), filled }, color).titled(photo.words())
+        Mark::new(Shape::Dot { at: axes.place(at), filled }, color).titled(photo.words())
     });
     let legend = [
         ("all methods", palette::TRUTH),
@@ -196,9 +178,9 @@ fn route(photos: &[Photo<'_>], scene: &dyn Scene) -> Option<Chart> {
     ];
     Some(Chart {
         title: format!("Photos of {} that are localised", scene.name()),
-        x: axis(across),
-        y: axis(up),
         marks: marks.collect(),
+        x: axes.x,
+        y: axes.y,
         legend: legend.map(|(name, color)| (name.to_owned(), color)).to_vec(),
     })
 }

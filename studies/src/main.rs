@@ -23,6 +23,7 @@ mod planted;
 /// The scenes with mistakes that the tests examine, too.
 #[path = "../../tests/it/planted.rs"]
 mod planted_scene;
+mod pose_files;
 mod real_pairs;
 mod same_results;
 mod scene_statistics;
@@ -51,6 +52,7 @@ enum Study {
     Places(places_found::Options),
     Index(index::Options),
     Opinions(opinions::Options),
+    PoseFiles(pose_files::Options),
     Growth(growth::Options),
     Peers(peers::Options),
     SameResults(same_results::Options),
@@ -71,6 +73,7 @@ fn main() -> ExitCode {
         Study::Places(options) => places_found::run(&options),
         Study::Index(options) => index::run(&options),
         Study::Opinions(options) => opinions::run(&options),
+        Study::PoseFiles(options) => pose_files::run(&options),
         Study::Growth(options) => growth::run(&options),
         Study::Peers(options) => peers::run(&options),
         Study::SameResults(options) => match same_results::run(&options) {

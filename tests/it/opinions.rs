@@ -180,3 +180,104 @@ fn poses_of_a_map_with_a_mistake_have_no_confidence_until_it_is_mended() {
     has(&text(drive.root.path().join("run/run.toml")), "mistake_of_map = ");
     assert!(text(drive.root.path().join("run/results.jsonl")).contains("\"confidence\":null"));
 }
+
+/// A map of the street, and photos between its frames in a folder of their own, without poses.
+struct Photos {
+    root: TempDir,
+    names: Vec<String>,
+    poses: Vec<Pose>,
+}
+
+impl Photos {
+    const FIRST: usize = 63;
+    const EVERY: usize = 6;
+
+    fn written(count: usize) -> Self {
+        let root = TempDir::new().expect("a folder");
+        let street = street();
+        let synth = "synth map --layout toml --size half --condition overcast --every 6 -q";
+        Said::by(&mut command_in(root.path(), synth)).ok();
+        fs::create_dir_all(root.path().join("photos")).expect("writable");
+        let camera = street.intrinsics(0);
+        let mut gps = "name x y z\n".to_owned();
+        let (mut names, mut poses) = (Vec::new(), Vec::new());
+        for at in 0..count {
+            let frame = Self::FIRST + Self::EVERY * at;
+            let name = format!("IMG_{at:04}");
+            let path = root.path().join(format!("photos/{name}.png"));
+            street.photo(frame).expect("a photo").gray.save(path).expect("writable");
+            let pose = street.pose(frame).expect("a pose");
+            let at = pose.translation;
+            gps += &format!("{name} {} {} {}\n", at.x + 1.0, at.y, at.z - 1.0);
+            names.push(name);
+            poses.push(pose);
+        }
+        write(root.path().join("gps.txt"), gps);
+        let scene = format!(
+            "images = \"*.png\"\n[camera]\nfx = {}\nfy = {}\ncx = {}\ncy = {}\n",
+            camera.fx, camera.fy, camera.cx, camera.cy
+        );
+        write(root.path().join("photos/scene.toml"), scene);
+        Self { root, names, poses }
+    }
+
+    /// A file of poses, as hloc writes them.
+    fn estimated(&self, file: &str, meant: impl Fn(usize, &Pose) -> Pose) {
+        let mut lines = String::new();
+        for (at, (name, pose)) in self.names.iter().zip(&self.poses).enumerate() {
+            let camera_from_world = meant(at, pose).inverse();
+            let q = camera_from_world.rotation.into_inner().coords;
+            let t = camera_from_world.translation.vector;
+            lines +=
+                &format!("{name}.png {} {} {} {} {} {} {}\n", q.w, q.x, q.y, q.z, t.x, t.y, t.z);
+        }
+        write(self.root.path().join(file), lines);
+    }
+
+    fn said(&self, line: &str) -> Said {
+        Said::by(command_in(self.root.path(), line).env_remove("GITHUB_STEP_SUMMARY"))
+    }
+}
+
+#[test]
+fn a_file_of_poses_is_judged_where_no_query_has_a_true_one() {
+    let photos = Photos::written(12);
+    // One pose is 3 m off, one is that of the map's nearest frame, and all are those of an antenna above the camera.
+    let map = street();
+    photos.estimated("poses.txt", |at, pose| {
+        let pose = match at {
+            4 => pose * Pose::translation(3.0, 0.0, 0.0),
+            7 => map.pose(Photos::FIRST + 7 * Photos::EVERY + 3).expect("a pose"),
+            _ => *pose,
+        };
+        if at == 7 { pose } else { pose * Pose::translation(0.0, -1.6, 0.0) }
+    });
+    let eval = "eval map/overcast --query-scene photos --estimates mine=poses.txt --method mine";
+    let said = photos.said(&format!("{eval} --out run"));
+    assert_eq!(said.code, Some(2), "{}", said.err);
+    has(&said.err, "the position of query IMG_0000 is not known ~ --gps");
+
+    let near = "--gps gps.txt --reference nearest:1 --radius 8";
+    let gate = "--gate \"contradicted@mine <= 0.02\"";
+    let said = photos.said(&format!("{eval} {near} --out run {gate}"));
+    assert_eq!(said.code, Some(1), "{}", said.err);
+    has(&said.out, "The truth is not known. By a second opinion: ~ contradicted");
+    has(&said.out, "Finding: The poses of mine are shifted by 1.6");
+    has(&said.out, "All failures: ~ opinion = contradicted");
+    let summary = text(photos.root.path().join("run/summary.json"));
+    has(&summary, "\"E5\" ~ \"shift_m\"");
+    let report = text(photos.root.path().join("run/report.html"));
+    has(
+        &report,
+        "Where poses seem off ~ Worst failures ~ Map seen from the pose where posescope has it",
+    );
+    let failed = fs::read_dir(photos.root.path().join("run/failures")).expect("recordings");
+    assert!(failed.count() >= 10);
+    assert!(text(photos.root.path().join("run/results.jsonl")).contains("\"copied_from\":\"0001"));
+
+    // Poses that are right have no finding.
+    photos.estimated("poses.txt", |_, pose| *pose);
+    let said = photos.said(&format!("{eval} {near} --out sound {gate}")).ok();
+    assert!(!said.out.contains("Finding") && !said.out.contains("Failures"), "{}", said.out);
+    has(&said.out, "12 confirmed");
+}

@@ -104,7 +104,8 @@ fn a_session_waits_at_the_first_event_and_steps_into_over_and_out() {
     assert_eq!(starts(&event), Some(Stage::Match));
     let event = order(&mut session, RunMode::StepInto);
     assert!(matches!(event, Event::MatchesDecided(_)));
-    let event = order(&mut session, RunMode::StepOut);
+    // Inside of a stage, the step goes to its end.
+    let event = order(&mut session, RunMode::StepOver);
     assert_eq!(ends(&event), Some(Stage::Match));
     let event = order(&mut session, RunMode::StepOut);
     assert_eq!(ends(&event), Some(Stage::Estimator(Method::FB)));

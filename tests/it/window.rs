@@ -293,6 +293,87 @@ fn a_wrong_breakpoint_is_refused_with_what_there_is() {
 }
 
 #[test]
+fn a_text_field_keeps_the_focus_after_enter_so_that_words_are_no_commands() {
+    let mut window = window(setup());
+    run_until_idle(&mut window);
+    window.get_by_label("Break").click();
+    window.run_steps(2);
+    window.get_by_label("New breakpoint").focus();
+    window.step();
+    window.get_by_label("New breakpoint").type_text("nonsense");
+    press(&mut window, Modifiers::NONE, Key::Enter);
+    window.run_steps(2);
+    assert!(window.get_by_label("New breakpoint").is_focused());
+    // Q would close the list of queries.
+    let shows_queries = app(&window).options.shows_queries;
+    press(&mut window, Modifiers::NONE, Key::Q);
+    assert_eq!(app(&window).options.shows_queries, shows_queries);
+    assert!(app(&window).setup.task.breakpoints.is_empty());
+}
+
+#[test]
+fn a_small_window_shows_one_panel_beside_the_canvas_on_request() {
+    let mut window = finished(setup());
+    window.set_size(egui::vec2(1000.0, 640.0));
+    window.run_steps(2);
+    assert!(window.query_by_label("Filter queries").is_none());
+    press(&mut window, Modifiers::NONE, Key::Q);
+    window.run_steps(2);
+    assert!(window.query_by_label("Filter queries").is_some());
+    press(&mut window, Modifiers::NONE, Key::T);
+    window.run_steps(2);
+    assert!(window.query_by_label("Filter queries").is_none());
+    assert!(window.query_by_label("Numbers").is_some());
+    press(&mut window, Modifiers::NONE, Key::T);
+    window.run_steps(2);
+    assert!(window.query_by_label("Numbers").is_none());
+}
+
+#[test]
+fn another_scene_is_opened_by_its_name_and_what_cannot_be_opened_is_said() {
+    let opener: posescope::app::Opener = std::sync::Arc::new(|name| {
+        let setup = match name {
+            "elsewhere" => setup(),
+            other => return Err(format!("{other} is no scene")),
+        };
+        let results = posescope::app::KnownResults::default();
+        Ok(posescope::app::Opening { setup, results, lesson: None })
+    });
+    let mut window = finished(setup());
+    send(&mut window, |app| app.open_named("elsewhere"));
+    assert!(is_said(&window, "This window opens nothing else"));
+    let mut window = Harness::builder()
+        .with_size([1500.0, 950.0])
+        .build_eframe(|creation| App::new(creation, setup()).with_opener(opener));
+    press(&mut window, Modifiers::COMMAND, Key::O);
+    let field = window.get_by_label("File");
+    field.focus();
+    window.step();
+    send(&mut window, |app| app.open_named("nowhere"));
+    wait(&mut window, |app| !app.app_state().is_opening());
+    window.run_steps(2);
+    assert!(is_said(&window, "nowhere is no scene"));
+    send(&mut window, |app| app.arrange(posescope::app::Arrangement::Batch));
+    send(&mut window, |app| app.open_named("elsewhere"));
+    wait(&mut window, |app| app.app_state().options.layout == posescope::app::Arrangement::Inspect);
+    run_until_idle(&mut window);
+}
+
+#[test]
+fn the_camera_is_nudged_from_the_pose_that_is_shown() {
+    let mut window = finished(setup());
+    send(&mut window, |app| app.app_state_mut().select_method(Method::MI));
+    let state = app(&window);
+    let span = state.run().span_at(state.cursor()).expect("in a span");
+    let result = span.result.as_ref().and_then(|result| result.pose.as_ref()?.to_pose());
+    let shown = result.expect("a pose");
+    press(&mut window, Modifiers::ALT, Key::ArrowUp);
+    let camera = app(&window).camera.expect("a trial camera");
+    let moved = (camera.translation.vector - shown.translation.vector).norm();
+    assert!((moved - 0.2).abs() < 1e-9, "{moved}");
+}
+
+#[test]
 fn a_changed_parameter_runs_again_only_what_depends_on_it_and_keeps_the_place() {
     let mut window = finished(setup());
     send(&mut window, |app| app.app_state_mut().select_method(Method::MI));

@@ -13,6 +13,7 @@
 //! | `matches`, `search`, `free_search` | what the truth says about matches, a grid search, a search in six freedoms |
 //! | `confidence` | how likely a pose is right, without the truth |
 //! | `fused` | fused poses and rankings |
+//! | `readings` | other meanings of the numbers of a pose |
 //! | `remedies` | what may help |
 //!
 //! A pose that is right carries at most L1.
@@ -28,6 +29,7 @@ mod fused;
 mod matches;
 mod numbers;
 mod proof;
+pub(crate) mod readings;
 pub mod remedies;
 mod rules;
 mod search;

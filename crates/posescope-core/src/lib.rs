@@ -220,6 +220,8 @@ pub mod search;
 #[doc(hidden)]
 pub mod survey;
 #[doc(hidden)]
+pub mod systematic;
+#[doc(hidden)]
 pub mod text;
 #[doc(hidden)]
 pub mod trace;

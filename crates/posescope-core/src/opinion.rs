@@ -78,6 +78,12 @@ pub struct Opinion {
     pub interval_m: Option<[f64; 2]>,
     /// Where the photos agree, for a pose that is contradicted.
     pub better: Option<BetterPose>,
+    /// Posescope's own pose, where it is trusted.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub own: Option<BetterPose>,
+    /// The frame of the map that has this very pose, unless the pose is confirmed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub copied_from: Option<String>,
     /// The method of posescope whose answer this rests on.
     pub by: Option<Method>,
     /// Why, in a sentence.
@@ -187,6 +193,8 @@ impl Opinion {
             offset_deg: None,
             interval_m: None,
             better: None,
+            own: None,
+            copied_from: None,
             by: None,
             because,
         };
@@ -231,10 +239,27 @@ impl Opinion {
         }
     }
 
+    /// The same of a pose that is also that of a frame of the map. A right one may be: the camera stood still.
+    #[must_use]
+    pub(crate) fn of_a_pose_like(self, frame: Option<String>) -> Self {
+        match frame.filter(|_| self.standing != Standing::Confirmed) {
+            Some(frame) => {
+                let because = format!("It is the pose of {frame} of the map. {}", self.because);
+                Self { copied_from: Some(frame), because, ..self }
+            }
+            None => self,
+        }
+    }
+
+    /// How far off the position is \[m\].
+    pub fn distance_m(&self) -> Option<f64> {
+        let parts = self.offset_m?;
+        Some(parts.iter().map(|part| part * part).sum::<f64>().sqrt())
+    }
+
     /// How far off the pose is, with the directions that matter.
     fn off(&self) -> Option<String> {
-        let (offset, angle) = (self.offset_m?, self.offset_deg?);
-        let distance = offset.iter().map(|part| part * part).sum::<f64>().sqrt();
+        let (offset, distance, angle) = (self.offset_m?, self.distance_m()?, self.offset_deg?);
         let names = [["left", "right"], ["up", "down"], ["back", "forward"]];
         let parts = offset.iter().zip(names).filter(|(part, _)| part.abs() >= 0.3 * distance);
         let parts: Vec<String> = parts
@@ -304,6 +329,7 @@ fn best_known(
         offset_deg: Some(error.rotation_deg),
         interval_m: Some([less_m, error.translation_m + own.m]),
         better: (standing == Standing::Contradicted).then(|| BetterPose::from(&best.pose)),
+        own: best.is_trusted().then(|| BetterPose::from(&best.pose)),
         by: Some(best.method),
         ..undecided(because)
     }

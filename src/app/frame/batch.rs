@@ -1,8 +1,8 @@
 //! The batch: what many queries came to, all results in a table, and the proof of the selected one.
 
 use egui::{
-    Align2, Color32, CornerRadius, Painter, Rect, RichText, Role, Sense, Ui, UiBuilder, WidgetInfo,
-    pos2, vec2,
+    Align2, Color32, CornerRadius, Painter, Rect, Response, RichText, Role, Sense, Ui, UiBuilder,
+    WidgetInfo, pos2, vec2,
 };
 
 use super::inspector::capital;
@@ -13,7 +13,8 @@ use crate::app::action::Action;
 use crate::app::theme;
 use crate::app::{Sends, ViewContext, ViewName};
 use crate::diagnosis::Grade;
-use crate::measure::Overview;
+use crate::measure::{Bar, Overview};
+use crate::opinion::Standing;
 use crate::palette;
 
 /// Height of a bar with its gap \[points\].
@@ -45,35 +46,53 @@ pub(crate) fn left(ui: &mut Ui, context: &ViewContext<'_>, panes: &mut Panes) {
     let (area, _) =
         ui.allocate_exact_size(vec2(ui.available_width(), rows as f32 * BAR + 6.0), Sense::hover());
     let (bars, causes) = area.split_left_right_at_fraction(0.5);
-    draw_bars(ui, &overview, bars.with_max_x(bars.right() - 16.0));
-    draw_causes(ui, &overview, causes);
+    draw_bars(ui, context, &overview, bars.with_max_x(bars.right() - 16.0));
+    draw_causes(ui, context, &overview, causes);
     panes.show(ui, ViewName::Batch, context);
 }
 
-/// One bar for each method: right, unmeasured, wrong, no pose.
-fn draw_bars(ui: &Ui, overview: &Overview, area: Rect) {
+/// The parts of a bar: what it counts, its colour, and the count. Poses of other systems that nothing measures are
+/// counted by their second opinions.
+fn parts(bar: &Bar) -> Vec<(&'static str, palette::Rgb, usize)> {
+    let has_opinions = bar.opinions.iter().any(|count| *count > 0);
+    let of_grade = |grade: Grade| (grade.word(), palette::grade(grade), bar.count(grade));
+    let parts: Vec<_> = if has_opinions && bar.count(Grade::Unmeasured) > 0 {
+        let color = |standing| match standing {
+            Standing::Confirmed => palette::TRUTH,
+            Standing::Contradicted => palette::ESTIMATE,
+            Standing::Undecided => palette::NO_POSE,
+        };
+        let opinions = Standing::ALL.into_iter().zip(bar.opinions);
+        let opinions = opinions.map(|(one, count)| (one.word(), color(one), count));
+        opinions.chain([of_grade(Grade::NoPose)]).collect()
+    } else {
+        Grade::ALL.map(of_grade).to_vec()
+    };
+    parts.into_iter().filter(|(_, _, count)| *count > 0).collect()
+}
+
+/// One bar for each method: right, unmeasured, wrong, no pose. A click filters by the method.
+fn draw_bars(ui: &Ui, context: &ViewContext<'_>, overview: &Overview, area: Rect) {
     const NAME: f32 = 64.0;
     for (row, bar) in overview.bars.iter().take(MAX).enumerate() {
-        let words = Grade::ALL.iter().filter(|grade| bar.count(**grade) > 0);
+        let parts = parts(bar);
         let words: Vec<String> =
-            words.map(|grade| format!("{} {grade}", bar.count(*grade))).collect();
+            parts.iter().map(|(what, _, count)| format!("{count} {what}")).collect();
         let spoken = format!("{}: {}", bar.name, words.join(", "));
-        let (painter, line) = bar_row(ui, area, row, spoken, &bar.name, NAME - 4.0);
+        let (painter, line, response) = bar_row(ui, area, row, spoken, &bar.name, NAME - 4.0);
+        // The fusion is not part of the method.
+        let method = bar.name.split(' ').next().unwrap_or_default();
+        filter_by(context, &response, format!("method = {method}"));
         let width = (line.width() - NAME) / bar.total().max(1) as f32;
         let mut left = line.left() + NAME;
-        for grade in Grade::ALL {
-            let count = bar.count(grade);
-            if count == 0 {
-                continue;
-            }
+        for (what, color, count) in parts {
             let part = Rect::from_min_size(
                 pos2(left, line.top()),
                 vec2(width * count as f32, line.height()),
             );
-            let color = theme::rgb(palette::dark(palette::grade(grade)));
-            painter.rect_filled(part, CornerRadius::ZERO, color);
+            painter.rect_filled(part, CornerRadius::ZERO, theme::rgb(palette::dark(color)));
             let galley =
-                painter.layout_no_wrap(format!("{count} {grade}"), theme::CAPTION, Color32::WHITE);
+                painter.layout_no_wrap(format!("{count} {what}"), theme::CAPTION, Color32::WHITE);
             let galley = if galley.size().x + 6.0 <= part.width() {
                 galley
             } else {
@@ -87,8 +106,16 @@ fn draw_bars(ui: &Ui, overview: &Overview, area: Rect) {
     }
 }
 
+/// Shows only the results that meet a condition once it was clicked, and all of them after the next click.
+fn filter_by(context: &ViewContext<'_>, response: &Response, condition: String) {
+    response.sends(context, move |app| {
+        let filter = &mut app.state.options.results_filter;
+        *filter = if *filter == condition { String::new() } else { condition };
+    });
+}
+
 /// Draws the name of a row at the left, and returns where its bar goes and what paints it. Hovering shows the whole
-/// row as text.
+/// row as text, and it can be clicked.
 fn bar_row(
     ui: &Ui,
     area: Rect,
@@ -96,28 +123,29 @@ fn bar_row(
     spoken: String,
     name: &str,
     width: f32,
-) -> (Painter, Rect) {
+) -> (Painter, Rect, Response) {
     let top = area.top() + row as f32 * BAR;
     let line = Rect::from_min_size(pos2(area.left(), top), vec2(area.width(), BAR - 4.0));
     let id = ui.scope_id().with((area.left().to_bits(), row));
-    let response = ui.interact(line, id, Sense::hover());
-    response.widget_info(|| WidgetInfo::labeled(Role::Image, true, &spoken));
-    response.on_hover_text(spoken);
+    let response = ui.interact(line, id, Sense::click());
+    response.widget_info(|| WidgetInfo::labeled(Role::Button, true, &spoken));
+    let response = response.on_hover_text(spoken);
     let (painter, text) = (ui.painter_at(line), ui.visuals().text_color());
     let name = elided(ui, name, text, width);
     painter.galley(pos2(line.left(), line.center().y - name.size().y / 2.0), name, text);
-    (painter, line)
+    (painter, line, response)
 }
 
-/// The causes of all failures, in words.
-fn draw_causes(ui: &Ui, overview: &Overview, area: Rect) {
+/// The causes of all failures, in words. A click filters by one.
+fn draw_causes(ui: &Ui, context: &ViewContext<'_>, overview: &Overview, area: Rect) {
     const COUNT: f32 = 36.0;
     let most = overview.causes.first().map_or(1, |(_, times)| *times);
     let names = area.width() * 0.62;
     for (row, (code, times)) in overview.causes.iter().take(MAX).enumerate() {
         let title = capital(code.title());
         let spoken = format!("{title} ({code}): {times} results");
-        let (painter, line) = bar_row(ui, area, row, spoken, &title, names - 8.0);
+        let (painter, line, response) = bar_row(ui, area, row, spoken, &title, names - 8.0);
+        filter_by(context, &response, format!("code = {code}"));
         let longest = area.width() - names - COUNT;
         let bar = Rect::from_min_size(
             pos2(line.left() + names, line.top() + 2.0),

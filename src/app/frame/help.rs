@@ -122,9 +122,16 @@ impl ActionSearch {
 /// The actions that have all typed words.
 fn found(typed: &str) -> Vec<&'static Action> {
     let typed = typed.to_lowercase();
+    /// Words that people type, and those of the table.
+    const ALSO: [(&str, &str); 4] =
+        [("export", "save"), ("pose", "camera"), ("screenshot", "picture"), ("undo", "back")];
     let has_all = |action: &&Action| {
         let text = action.text.to_lowercase();
-        typed.split_whitespace().all(|word| text.contains(word))
+        let has = |word: &str| {
+            let also = ALSO.iter().filter(|(typed, _)| *typed == word);
+            text.contains(word) || also.into_iter().any(|(_, meant)| text.contains(meant))
+        };
+        typed.split_whitespace().all(has)
     };
     ACTIONS.iter().filter(has_all).collect()
 }
@@ -138,6 +145,8 @@ mod tests {
         let texts: Vec<_> = found("RERUN stream").iter().map(|action| action.text).collect();
         assert_eq!(texts, ["Stream the run to a Rerun viewer"]);
         assert_eq!(found("").len(), ACTIONS.len());
+        assert!(found("export").iter().any(|action| action.text.starts_with("Save a recording")));
+        assert!(found("pose truth").iter().any(|action| action.text == "Camera to the truth"));
         assert!(found("no such words").is_empty());
     }
 }

@@ -9,6 +9,7 @@ use crate::app::action::{ACTIONS, Action, Group, button};
 use crate::app::theme;
 use crate::app::{Sends, ViewContext, ViewName};
 use crate::event::Side;
+use crate::lesson::Lesson;
 use crate::session::RunState;
 
 /// Room of the buttons at the right, and of those in the middle \[points\].
@@ -46,6 +47,15 @@ fn menu(ui: &mut Ui, context: &ViewContext<'_>) {
                 }
             });
         }
+        ui.menu_button("Open a lesson", |ui| {
+            for lesson in Lesson::all().unwrap_or_default() {
+                let button = ui.button(&lesson.title).on_hover_text(&lesson.about);
+                let name = lesson.name;
+                if button.sends(context, move |app| app.open_named(&name)) {
+                    ui.close();
+                }
+            }
+        });
         ui.menu_button("Views", |ui| {
             for entry in crate::app::views::ALL {
                 let button = ui.button(entry.title).on_hover_text(entry.about);
@@ -135,7 +145,12 @@ fn shown(ui: &mut Ui, context: &ViewContext<'_>) {
     }
     ui.separator();
     compare(ui, context);
-    button(ui, context, "Truth", const { Action::named("Ground truth") });
+    let is_known = context.run.truth().is_some() || context.run.loaded.is_none();
+    ui.add_enabled_ui(is_known, |ui| {
+        button(ui, context, "Truth", const { Action::named("Ground truth") });
+    })
+    .response
+    .on_disabled_hover_text("The true pose of this query is not known");
 }
 
 fn compare(ui: &mut Ui, context: &ViewContext<'_>) {

@@ -9,8 +9,9 @@ use egui_extras::{Column, TableBuilder, TableRow};
 use super::View;
 use crate::app::action::{Action, button, toggle};
 use crate::app::memo::Memo;
-use crate::app::{ResultRow, Sends, ViewContext, theme};
-use crate::measure::{Field, Order, select, verdict_name};
+use crate::app::text_field::text_field;
+use crate::app::{App, ResultRow, Sends, ViewContext, theme};
+use crate::measure::{Field, Order, verdict_name};
 use crate::method::Method;
 
 /// The columns of the table.
@@ -36,7 +37,6 @@ type ShownKey = (Rc<[ResultRow]>, Option<Order>, u64);
 /// The results of all queries that were run.
 #[derive(Default)]
 pub struct BatchView {
-    order: Option<Order>,
     /// The rows in their order, and a line about them.
     shown: Memo<ShownKey, (Vec<ResultRow>, String)>,
 }
@@ -48,7 +48,8 @@ impl View for BatchView {
             let hint = "method = mi and code = D3";
             let mut typed = context.options.results_filter.clone();
             let field = TextEdit::singleline(&mut typed).hint_text(hint);
-            let field = ui.add(field.desired_width(ui.available_width() - 8.0));
+            let width = ui.available_width() - 8.0;
+            let (field, _) = text_field(ui, field.desired_width(width));
             if field.labelled_by(label.id).changed() {
                 context.send(|app| app.state.options.results_filter = typed);
             }
@@ -69,12 +70,10 @@ impl View for BatchView {
             return;
         }
         // Clicks on the names of the columns sort from the next frame on.
-        let mut order = self.order;
+        let mut order = context.options.results_order;
         let key = (Rc::clone(&chosen), order, context.state.results.version());
         let (rows, words) = self.shown.get(key, || {
-            let known = chosen.iter().filter_map(|row| context.state.results.result(*row));
-            let sorted = select(&known.collect::<Vec<_>>(), None, order).into_iter();
-            let rows: Vec<ResultRow> = sorted.map(|index| chosen[index]).collect();
+            let rows = context.state.results.sorted(&chosen, order);
             let words = words(context, &rows);
             (rows, words)
         });
@@ -96,7 +95,7 @@ impl View for BatchView {
             }
             let table = table.header(height, |mut names| {
                 for field in COLUMNS {
-                    names.col(|ui| header(ui, field, &mut order));
+                    names.col(|ui| header(ui, context, field, &mut order));
                 }
                 if has_before {
                     names.col(|ui| {
@@ -112,7 +111,9 @@ impl View for BatchView {
                 });
             });
         });
-        self.order = order;
+        if order != context.options.results_order {
+            context.send(move |app| app.state.options.results_order = order);
+        }
     }
 }
 
@@ -147,14 +148,27 @@ fn words(context: &ViewContext<'_>, rows: &[ResultRow]) -> String {
     format!("{} of {results} results; wrong or without a pose: {}", rows.len(), failed.join(", "))
 }
 
+/// The name of a column by which conditions call it, with its unit.
+fn heading(context: &ViewContext<'_>, field: &Field) -> String {
+    match field.unit {
+        "" => field.name.to_owned(),
+        unit => context.in_unit(&format!("{} ({unit})", field.name)),
+    }
+}
+
 /// The name of a column. A click sorts by it, the next one reverses, the third ends it.
-fn header(ui: &mut Ui, field: &'static Field, order: &mut Option<Order>) {
-    let name = field.name;
+fn header(
+    ui: &mut Ui,
+    context: &ViewContext<'_>,
+    field: &'static Field,
+    order: &mut Option<Order>,
+) {
+    let heading = heading(context, field);
     let own = order.filter(|order| order.field == field);
     let (text, next) = match own.map(|order| order.descending) {
-        None => (name.to_owned(), Some(false)),
-        Some(false) => (format!("{name} ▲"), Some(true)),
-        Some(true) => (format!("{name} ▼"), None),
+        None => (heading.clone(), Some(false)),
+        Some(false) => (format!("{heading} ▲"), Some(true)),
+        Some(true) => (format!("{heading} ▼"), None),
     };
     let button = ui.add(Button::new(RichText::new(text).small()).frame(false));
     if button.on_hover_text(field.about()).clicked() {
@@ -166,7 +180,8 @@ fn draw(row: &mut TableRow<'_, '_>, context: &ViewContext<'_>, at: ResultRow) {
     let Some(result) = context.state.results.result(at) else {
         return;
     };
-    let is_here = at.query == context.setup.query;
+    let selected = context.options.selected_row.filter(|row| row.query == context.setup.query);
+    let is_here = selected.map_or(at.query == context.setup.query, |row| row == at);
     let label = |ui: &mut Ui, text: RichText| {
         ui.add(egui::Label::new(text).truncate().selectable(false));
     };
@@ -193,6 +208,9 @@ fn draw(row: &mut TableRow<'_, '_>, context: &ViewContext<'_>, at: ResultRow) {
     let mut answer = row.response();
     if let Some(finding) = result.diagnosis.first() {
         answer = answer.on_hover_text(&finding.text);
+    }
+    if answer.double_clicked() {
+        context.send(App::open_selected);
     }
     answer.sends(context, move |app| app.state.open_result(at.query, at.place));
 }

@@ -4,6 +4,7 @@ use egui::{ScrollArea, TextEdit, Ui};
 
 use super::View;
 use crate::app::ViewContext;
+use crate::app::text_field::text_field;
 use crate::session::Breakpoint;
 
 /// The list of breakpoints, and a line to write a new one.
@@ -20,12 +21,10 @@ impl View for BreakpointsView {
         let parsed = self.text.parse::<Breakpoint>();
         ui.horizontal(|ui| {
             let edit = TextEdit::singleline(&mut self.text).hint_text("inliers < 10");
-            let response = ui.add(edit.desired_width(180.0));
+            let (response, entered) = text_field(ui, edit.desired_width(180.0));
             response.widget_info(|| {
                 egui::WidgetInfo::labeled(egui::Role::TextInput, true, "New breakpoint")
             });
-            let entered =
-                response.lost_focus() && ui.input(|input| input.key_pressed(egui::Key::Enter));
             let button = ui.add_enabled(parsed.is_ok(), egui::Button::new("Add"));
             if parsed.is_ok() && (entered || button.clicked()) {
                 wanted.push(std::mem::take(&mut self.text).trim().to_owned());

@@ -29,6 +29,10 @@ impl View for LogView {
                         let name = ended.stage.name().replace('_', " ");
                         (indent, format!("{name} stopped here"))
                     }
+                    // Of all that is tried, only what the cursor is on has a line.
+                    Event::PoseScored(_) if at == context.cursor => {
+                        (indent + 1, narration::tried(&context.run.records()[..=at])?)
+                    }
                     event => (indent + 1, context.in_unit(&narration::sentence(event)?)),
                 };
                 Some((at, indent, words))

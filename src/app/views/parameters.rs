@@ -5,6 +5,7 @@ use std::ops::RangeInclusive;
 use egui::{Align, Button, ComboBox, DragValue, Id, Layout, RichText, ScrollArea, TextEdit, Ui};
 
 use super::View;
+use crate::app::text_field::text_field;
 use crate::app::{Sends, ViewContext};
 use crate::describe::{Described, Domain, Value};
 use crate::image::Degradation;
@@ -23,7 +24,7 @@ impl View for ParametersView {
     fn ui(&mut self, ui: &mut Ui, context: &ViewContext<'_>) {
         ui.horizontal(|ui| {
             let edit = TextEdit::singleline(&mut self.filter).hint_text("Filter (/)");
-            let response = ui.add(edit.desired_width(120.0));
+            let (response, _) = text_field(ui, edit.desired_width(120.0));
             response.widget_info(|| {
                 egui::WidgetInfo::labeled(egui::Role::TextInput, true, "Filter parameters")
             });

@@ -6,7 +6,9 @@ use egui::style::ScrollAnimation;
 use egui::{Align, Color32, Rect, Role, ScrollArea, Sense, Ui, WidgetInfo, pos2, vec2};
 
 use super::View;
+use crate::app::text_field::text_field;
 use crate::app::{Sends, ViewContext, theme};
+use crate::diagnosis::Grade;
 use crate::event::Side;
 use crate::localize::QueryResult;
 use crate::method::Method;
@@ -26,11 +28,19 @@ pub struct QueriesView {
 impl View for QueriesView {
     fn ui(&mut self, ui: &mut Ui, context: &ViewContext<'_>) {
         let field = egui::TextEdit::singleline(&mut self.typed).hint_text("Filter");
-        let field = ui.add(field.desired_width(f32::INFINITY));
+        let (field, _) = text_field(ui, field.desired_width(f32::INFINITY));
         field.widget_info(|| WidgetInfo::labeled(Role::TextInput, true, "Filter queries"));
         let failed = context.state.results.keys().filter(|query| context.state.has_failed(**query));
         let failed = failed.count();
-        let words = format!("{failed} of {} wrong", context.state.results.len());
+        let run = context.state.results.len();
+        let is_measured = |one: &QueryResult| one.grade != Grade::Unmeasured;
+        let words = if run == 0 || context.state.results.values().flatten().any(is_measured) {
+            format!("{failed} of {run} wrong")
+        } else if failed > 0 {
+            format!("{failed} of {run} contradicted")
+        } else {
+            format!("{run} run, none measured")
+        };
         let only = ui.checkbox(&mut self.only_failures, words);
         only.on_hover_text("Only queries where at least one method is wrong or found no pose");
         let frames = context.setup.queries.frames();

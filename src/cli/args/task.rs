@@ -64,6 +64,18 @@ impl RunArgs {
 }
 
 #[cfg(feature = "app")]
+impl ViewArgs {
+    /// The arguments of a command line that begins with `posescope view`.
+    pub fn parse(words: impl IntoIterator<Item = String>) -> Result<Box<Self>, CliError> {
+        match Arguments::try_parse_from(words).map(|parsed| parsed.command) {
+            Ok(Some(Command::View(args))) => Ok(args),
+            Ok(_) => unreachable!("the words begin with `view`"),
+            Err(error) => Err(CliError::Usage(error.to_string())),
+        }
+    }
+}
+
+#[cfg(feature = "app")]
 #[derive(Debug, Args)]
 pub struct ViewArgs {
     /// The scene of the references, or the folder of a run; see `posescope run --help`

@@ -6,6 +6,7 @@ use std::path::Path;
 use posescope::diagnosis::{Grade, confidence};
 use posescope::localize::QueryResult;
 use posescope::measure::{Bar, Finding, Overview, Report, worst_first};
+use posescope::opinion::Standing;
 use posescope::report::repeat_command;
 use posescope::run::RunFile;
 use posescope::session::command_line;
@@ -48,9 +49,15 @@ fn methods(bars: &[Bar]) -> Table {
     let grades = Grade::ALL.into_iter();
     let grades: Vec<Grade> =
         grades.filter(|grade| bars.iter().any(|bar| bar.count(*grade) > 0)).collect();
+    // Poses of other systems have second opinions, and own ones a confidence.
+    let has_opinions = bars.iter().any(|bar| bar.opinions != [0; 3]);
+    let has_confidence = bars.iter().any(|bar| bar.opinions == [0; 3]);
     let names = grades.iter().map(|grade| grade.word());
     let header = ["method"].into_iter().chain(names);
-    let header = header.chain(["trusted", "median error", "cause of failures"]);
+    let opinions = Standing::ALL.map(Standing::word);
+    let header = header.chain(opinions.into_iter().filter(|_| has_opinions));
+    let header = header.chain(["trusted"].into_iter().filter(|_| has_confidence));
+    let header = header.chain(["median error", "cause of failures"]);
     let mut table = Table::new("", "", header);
     if let Some(cause) = table.align.last_mut() {
         *cause = posescope::table::Align::Note;
@@ -60,8 +67,15 @@ fn methods(bars: &[Bar]) -> Table {
         let error = bar.median_m.map_or("–".to_owned(), |median| format!("{median:.3} m"));
         let cause =
             bar.cause.map(|(code, times)| format!("mostly {code} {} ({times})", code.title()));
+        let own = bar.opinions == [0; 3];
+        let counted =
+            |is: bool, count: usize| if is { count.to_string() } else { "–".to_owned() };
+        let opinions = bar.opinions.map(|count| counted(!own, count));
         let cells = [bar.name.clone()].into_iter().chain(counts);
-        table.push(cells.chain([bar.trusted.to_string(), error, cause.unwrap_or_default()]));
+        let cells = cells.chain(opinions.into_iter().filter(|_| has_opinions));
+        let trusted = counted(own, bar.trusted);
+        let cells = cells.chain([trusted].into_iter().filter(|_| has_confidence));
+        table.push(cells.chain([error, cause.unwrap_or_default()]));
     }
     table
 }
@@ -77,8 +91,14 @@ fn meanings(run: &RunFile, bars: &[Bar]) -> String {
         "Trusted: by the method's own evidence at least {} likely right.\n",
         confidence::percent(confidence::TRUSTED_FROM)
     );
-    let is_measured = bars.iter().any(|bar| bar.median_m.is_some());
-    if is_measured { measured + &trusted } else { trusted }
+    let compared = "Confirmed, contradicted: by posescope's own pose of the query, found from the same references.\n";
+    let is_any = |is: fn(&Bar) -> bool| bars.iter().any(is);
+    let lines = [
+        (measured, is_any(|bar| bar.median_m.is_some())),
+        (trusted, is_any(|bar| bar.opinions == [0; 3])),
+        (compared.to_owned(), is_any(|bar| bar.opinions != [0; 3])),
+    ];
+    lines.into_iter().filter_map(|(line, is_said)| is_said.then_some(line)).collect()
 }
 
 /// The worst failures, each of another query, with the commands that open them. One without a pose is among them
@@ -99,27 +119,34 @@ fn worst(run: &RunFile, results: &[QueryResult], folder: &Path, width: usize) ->
     if worst.is_empty() {
         return String::new();
     }
-    let missing = failures.iter().filter(|one| is_missing(one)).count();
-    let wrong = failures.len() - missing;
-    let mut text = wrapped(
-        &format!("Failures: {wrong} wrong, {missing} without a pose. The worst:"),
-        width,
-        "  ",
-    );
+    let count =
+        |grade: Grade| -> usize { failures.iter().filter(|one| one.grade == grade).count() };
+    let (wrong, missing) = (count(Grade::Wrong), count(Grade::NoPose));
+    let contradicted = count(Grade::Unmeasured);
+    let kinds = [
+        (contradicted, "contradicted by a second opinion"),
+        (wrong, "wrong"),
+        (missing, "without a pose"),
+    ];
+    // What cannot be known is not counted.
+    let is_told = |(count, what): &(usize, &str)| {
+        *count > 0 || contradicted == 0 && *what != "contradicted by a second opinion"
+    };
+    let kinds: Vec<String> =
+        kinds.into_iter().filter(is_told).map(|(count, what)| format!("{count} {what}")).collect();
+    let mut text = wrapped(&format!("Failures: {}. The worst:", kinds.join(", ")), width, "  ");
     for one in worst {
-        let off = one.off().map_or_else(|| one.grade.to_string(), |off| format!("{off} off"));
         let cause = one.diagnosis.first().map(|found| format!(", {}", found.code.title()));
-        let line =
-            format!("  {} {}: {off}{}", one.query, one.method_name(), cause.unwrap_or_default());
+        let (wrong, cause) = (one.how_wrong(), cause.unwrap_or_default());
+        let line = format!("  {} {}: {wrong}{cause}", one.query, one.method_name());
         text += &wrapped(&line, width, "    ");
         text += &format!("    {}\n", opening(run, one, folder));
     }
-    let all = [
-        "results",
-        &folder.display().to_string(),
-        "--where",
-        "grade = wrong or grade = \"no pose\"",
-    ];
+    let mut condition = "grade = wrong or grade = \"no pose\"".to_owned();
+    if contradicted > 0 {
+        condition += " or opinion = contradicted";
+    }
+    let all = ["results", &folder.display().to_string(), "--where", &condition];
     text + &format!("All failures: {}\n\n", command_line(&all.map(str::to_owned)))
 }
 

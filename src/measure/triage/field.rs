@@ -123,10 +123,7 @@ impl Field {
             "distance of another system's pose from where posescope has it",
             "m",
             3,
-            |r| {
-                let offset = r.opinion.as_ref()?.offset_m?;
-                Some(offset.iter().map(|part| part * part).sum::<f64>().sqrt())
-            },
+            |r| r.opinion.as_ref()?.distance_m(),
         ),
         number("keypoints", "keypoints of the query", "", 0, |r| {
             Some(r.counts?.query_keypoints as f64)

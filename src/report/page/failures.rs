@@ -77,10 +77,8 @@ fn failure(report: &RunReport, one: &ReportedResult, is_open: bool) -> Markup {
 /// The error, or that there is no pose.
 fn score(result: &QueryResult) -> String {
     let glyph = result.grade.glyph();
-    match result.off() {
-        Some(off) => format!("{glyph} {off} off"),
-        None => format!("{glyph} {}", result.grade),
-    }
+    let off = result.off().map(|off| format!("{off} off"));
+    format!("{glyph} {}", off.unwrap_or_else(|| result.grade.to_string()))
 }
 
 fn details(report: &RunReport, one: &ReportedResult) -> Markup {

@@ -5,6 +5,7 @@ use maud::{Markup, html};
 use super::words::{capital, class_of};
 use crate::diagnosis::Grade;
 use crate::measure::{Bar, Overview};
+use crate::opinion::Standing;
 
 /// One bar for each method, with the count in each part.
 pub(super) fn methods(overview: &Overview) -> Markup {
@@ -18,23 +19,50 @@ pub(super) fn methods(overview: &Overview) -> Markup {
                     span { i class={ "part " (class_of(grade)) } {} " " (grade) } " "
                 }
             }
+            @if overview.bars.iter().any(has_opinions) {
+                h2 { "Second opinions on other systems" }
+                @for one in overview.bars.iter().filter(|bar| has_opinions(bar)) {
+                    (parts(&one.name, &opinions(one)))
+                }
+            }
         }
     }
 }
 
 fn bar(bar: &Bar) -> Markup {
-    let counts = Grade::ALL.map(|grade| (grade, bar.count(grade)));
-    let counts: Vec<(Grade, usize)> = counts.into_iter().filter(|(_, count)| *count > 0).collect();
+    let counts = Grade::ALL.map(|grade| (grade.word(), class_of(grade), bar.count(grade)));
+    parts(&bar.name, &counts)
+}
+
+fn has_opinions(bar: &Bar) -> bool {
+    bar.opinions.iter().any(|count| *count > 0)
+}
+
+/// The second opinions in the colours of what they stand for.
+fn opinions(bar: &Bar) -> [Part; 3] {
+    let [confirmed, undecided, contradicted] = bar.opinions;
+    [
+        (Standing::Confirmed.word(), class_of(Grade::Right), confirmed),
+        (Standing::Contradicted.word(), class_of(Grade::Wrong), contradicted),
+        (Standing::Undecided.word(), class_of(Grade::Unmeasured), undecided),
+    ]
+}
+
+/// A part of a bar: what it is, its CSS class, and the count.
+type Part = (&'static str, &'static str, usize);
+
+fn parts(name: &str, parts: &[Part]) -> Markup {
+    let parts: Vec<&Part> = parts.iter().filter(|(_, _, count)| *count > 0).collect();
     let words: Vec<String> =
-        counts.iter().map(|(grade, count)| format!("{count} {grade}")).collect();
-    let spoken = format!("{}: {}", bar.name, words.join(", "));
+        parts.iter().map(|(what, _, count)| format!("{count} {what}")).collect();
+    let spoken = format!("{name}: {}", words.join(", "));
     html! {
         div.bar {
-            span.name { (bar.name) }
+            span.name { (name) }
             div.parts role="img" aria-label=(spoken) title=(spoken) {
-                @for (grade, count) in &counts {
-                    span class={ "part " (class_of(*grade)) } style={ "flex-grow:" (count) } {
-                        b { (count) } " " (grade)
+                @for (what, class, count) in &parts {
+                    span class={ "part " (class) } style={ "flex-grow:" (count) } {
+                        b { (count) } " " (what)
                     }
                 }
             }

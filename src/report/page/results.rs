@@ -203,7 +203,7 @@ fn cell(report: &RunReport, one: &ReportedResult, column: Column) -> Markup {
             td class=[class] {
                 @if let Some(primary) = result.diagnosis.first() {
                     @let title = capital(primary.code.title());
-                    @if result.grade.is_failure() {
+                    @if result.is_suspect() {
                         a href={ "#f" (one.number) } { (title) }
                     } @else { (title) }
                     " " span.code { (primary.code) }

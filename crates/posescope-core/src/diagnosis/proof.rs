@@ -21,6 +21,8 @@ pub enum Proof {
     PoseMap,
     /// The ranked references, the right place marked.
     Ranking,
+    /// The map seen from another system's pose and from posescope's own, and which parts of the photo prefer which.
+    BothPoses,
     /// The picture of the stage that decided.
     DecidingStage,
 }

@@ -90,6 +90,8 @@ verdicts! {
     E2 in e2,
     E3 in e3,
     E4 in e4,
+    E5 in e5,
+    E6 in e6,
     D9 in d9,
     D5 in d5,
     N1 in n1,

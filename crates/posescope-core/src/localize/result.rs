@@ -460,12 +460,29 @@ impl QueryResult {
         is_hybrid && (self.cost.is_some() || self.status == Status::Failed)
     }
 
+    /// Whether it is among the results to look at first: it failed, or nothing measures it and a second opinion
+    /// contradicts it.
+    pub fn is_suspect(&self) -> bool {
+        let is_contradicted = || {
+            let opinion = self.opinion.as_ref();
+            opinion.is_some_and(|opinion| opinion.standing == Standing::Contradicted)
+        };
+        self.grade.is_failure() || self.grade == Grade::Unmeasured && is_contradicted()
+    }
+
+    /// How far off its position is \[m\]: by the truth, or else by a second opinion.
+    pub fn off_m(&self) -> Option<f64> {
+        let estimated = self.opinion.as_ref().and_then(Opinion::distance_m);
+        self.error.map(|error| error.translation_m).or(estimated)
+    }
+
     /// Takes the opinion on its pose. Where no truth says more, what speaks against the pose is a verdict.
     pub(super) fn take_opinion(&mut self, opinion: Option<Opinion>) {
         if self.grade == Grade::Unmeasured {
             let verdict = opinion.as_ref().and_then(|opinion| {
                 let code = match opinion.standing {
                     Standing::Confirmed => return None,
+                    Standing::Contradicted if opinion.copied_from.is_some() => Code::E6,
                     Standing::Contradicted => Code::E3,
                     Standing::Undecided => Code::E4,
                 };

@@ -20,6 +20,15 @@ impl QueryResult {
         Some(self.unit.words(&off))
     }
 
+    /// How wrong it is, as far as is known: by the truth, by a second opinion, or that there is no pose.
+    pub fn how_wrong(&self) -> String {
+        match (self.off(), self.opinion.as_ref().filter(|_| self.is_suspect())) {
+            (Some(off), _) => format!("{off} off"),
+            (None, Some(opinion)) => self.unit.words(&opinion.words()),
+            (None, None) => self.grade.to_string(),
+        }
+    }
+
     /// Says in the unit what its sentences say in metres.
     pub(super) fn put_into_words_of(&mut self, unit: LengthUnit) {
         self.unit = unit;

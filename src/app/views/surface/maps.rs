@@ -371,6 +371,12 @@ fn overlay(ui: &Ui, shown: &MapContent<'_>, transform: &PlotTransform, pointed_a
             painter.line_segment([*place, *stand], Stroke::new(width, color));
         }
     }
+    // Where a mark stands aside, a dot of its colour is at its place.
+    for ((mark, place), stand) in shown.marks.iter().zip(&places).zip(&stands) {
+        if place != stand {
+            painter.circle(*place, 2.5, mark.kind.color(), Stroke::new(1.0, Color32::BLACK));
+        }
+    }
     for (mark, at) in shown.marks.iter().zip(stands) {
         if mark.kind == MarkKind::Thing(Thing::Truth) && !transform.frame().contains(at) {
             mark.paint_beyond(&painter, *transform.frame(), at, reach);

@@ -5,6 +5,7 @@ use super::*;
 pub(super) const RULE: Rule = Rule {
     title: "another system's pose is contradicted by a trusted one",
     advice: "look at the photos at both poses, and check the pose's matches and place",
+    proof: Proof::BothPoses,
     needs_truth: false,
     ..Rule::new(Code::E3)
 };

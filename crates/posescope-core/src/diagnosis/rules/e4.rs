@@ -4,7 +4,7 @@ use super::*;
 
 pub(super) const RULE: Rule = Rule {
     title: "whether another system's pose is right stays open",
-    advice: "compare it with more references (--reference nearest:3), or survey the map",
+    advice: "compare it with more references (--reference matches:3), or survey the map",
     needs_truth: false,
     ..Rule::new(Code::E4)
 };

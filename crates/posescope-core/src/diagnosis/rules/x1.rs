@@ -6,15 +6,13 @@ mod truth;
 
 use std::cell::OnceCell;
 
-use nalgebra::{Quaternion, Translation3, UnitQuaternion};
-
 use self::camera::{camera_by_matches, camera_of_both};
 use self::resized::resized;
 use self::truth::{truth_by_cost, truth_by_free_search, truth_by_matches};
 use super::*;
 use crate::camera::Intrinsics;
-use crate::diagnosis::axes::other_axes;
 use crate::diagnosis::matches::TrueMatches;
+use crate::diagnosis::readings::Reading;
 use crate::diagnosis::{Evidence, Subject};
 use crate::estimator::{Estimator, FeatureBased};
 use crate::stats::median;
@@ -191,9 +189,9 @@ fn poses(case: &Case<'_>) -> Option<Diagnosis> {
     let radius_m = subject.problem.uncertainty_radius_m;
     // In other units, near poses are nearly the same, and so is the estimate.
     let is_far = stated.translation.vector.norm() > 5.0 * radius_m;
-    let of_both = readings(reference).into_iter().zip(readings(truth));
-    let readings = of_both.map(|((reading, reference), (_, truth))| {
-        (reading, PoseError::between(&(reference.inverse() * truth), &found))
+    let readings = Reading::all().into_iter().map(|reading| {
+        let reference_from_truth = reading.of(reference).inverse() * reading.of(truth);
+        (reading.name, PoseError::between(&reference_from_truth, &found))
     });
     // A car that drives straight on reads alike in several axes.
     let (reading, error) = readings
@@ -227,44 +225,18 @@ fn given_pose(case: &Case<'_>) -> Option<Diagnosis> {
         return None;
     };
     let error_as_stated = case.subject.error()?;
-    readings(pose).into_iter().find_map(|(reading, pose)| {
-        let error = PoseError::between(&pose, truth);
+    Reading::all().into_iter().find_map(|reading| {
+        let error = PoseError::between(&reading.of(pose), truth);
         let is_nearer = TIMES * error.translation_m < error_as_stated.translation_m;
         // Where the place is right already, the heading decides.
         let is_turned = TIMES * error.rotation_deg < error_as_stated.rotation_deg
             && case.subject.tolerance.contains(&error);
         let agrees = error.rotation_deg < AGREEING_DEG && (is_nearer || is_turned);
-        agrees.then(|| RULE.found(&GivenPose { reading, error, error_as_stated }))
+        agrees.then(|| {
+            let reading = reading.name;
+            RULE.found(&GivenPose { reading, error, error_as_stated })
+        })
     })
-}
-
-/// A pose as it would be if its numbers were meant otherwise, the likeliest mistakes first.
-fn readings(pose: &Pose) -> Vec<(String, Pose)> {
-    let scaled = |by: f64| {
-        let translation = Translation3::from(pose.translation.vector * by);
-        Pose::from_parts(translation, pose.rotation)
-    };
-    let reordered = |[w, x, y, z]: [f64; 4]| {
-        let rotation = UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z));
-        Pose::from_parts(pose.translation, rotation)
-    };
-    let Quaternion { coords } = pose.rotation.into_inner();
-    let [x, y, z, w] = [coords.x, coords.y, coords.z, coords.w];
-    let mut readings = vec![
-        ("camera_from_world (inverted)".to_owned(), pose.inverse()),
-        ("millimetres".to_owned(), scaled(1e-3)),
-        ("centimetres".to_owned(), scaled(1e-2)),
-        ("kilometres".to_owned(), scaled(1e3)),
-        ("quaternions with w first".to_owned(), reordered([x, y, z, w])),
-        ("quaternions with w last".to_owned(), reordered([z, w, x, y])),
-    ];
-    for (axes, rotation) in other_axes() {
-        readings.push((format!("camera axes {axes}"), pose * rotation));
-    }
-    for (axes, rotation) in other_axes() {
-        readings.push((format!("world axes {axes}"), rotation * pose));
-    }
-    readings
 }
 
 evidence!(GivenPose { reading: String, error: PoseError, error_as_stated: PoseError } =>
@@ -298,9 +270,10 @@ evidence!(Cloud { wrong_depth: usize, right_depth: usize, certain: bool } => {
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::{Matrix3, Rotation3};
+    use nalgebra::{Matrix3, Quaternion, Rotation3, Translation3, UnitQuaternion};
 
     use super::*;
+    use crate::diagnosis::axes::other_axes;
 
     /// Poses that were written in another convention are right when they are read so.
     #[test]
@@ -325,11 +298,11 @@ mod tests {
             (z_up * truth, "world axes (x, -z, y)"),
             (misread, "quaternions with w first"),
         ] {
-            let right = readings(&given).into_iter().find(|(_, pose)| {
-                let error = PoseError::between(pose, &truth);
+            let right = Reading::all().into_iter().find(|reading| {
+                let error = PoseError::between(&reading.of(&given), &truth);
                 error.translation_m < 1e-9 && error.rotation_deg < 1e-4
             });
-            assert_eq!(right.map(|(reading, _)| reading).as_deref(), Some(wanted));
+            assert_eq!(right.map(|reading| reading.name).as_deref(), Some(wanted));
         }
         assert_eq!(other_axes().len(), 23);
     }

@@ -131,7 +131,25 @@ impl Localizer<'_> {
         let answers: Vec<OwnAnswer> = answers.collect();
         let missing = own.iter().map(|(_, own)| own.missing.as_str());
         let missing = missing.into_iter().find(|words| !words.is_empty());
-        Opinion::of(given, self.tolerance, &answers, missing.unwrap_or_default())
+        let opinion = Opinion::of(given, self.tolerance, &answers, missing.unwrap_or_default());
+        let query = own.first().map(|(problem, _)| problem.query().name());
+        opinion.of_a_pose_like(self.frame_at(given, query))
+    }
+
+    /// The other frame of the map whose pose this is, to the digits that files have.
+    fn frame_at(&self, given: &Pose, query: Option<&str>) -> Option<String> {
+        const SAME_M: f64 = 1e-4;
+        const SAME_DEG: f64 = 0.01;
+        let map = self.references();
+        let is_there = |frame: &usize| {
+            map.pose(*frame).is_some_and(|pose| {
+                let error = PoseError::between(&pose, given);
+                error.translation_m < SAME_M && error.rotation_deg < SAME_DEG
+            })
+        };
+        let names = map.frames().iter().map(String::as_str).enumerate();
+        let mut others = names.filter(|(_, name)| !(self.is_one_drive() && query == Some(*name)));
+        others.find(|(frame, _)| is_there(frame)).map(|(_, name)| name.to_owned())
     }
 
     /// How much more the minimum costs that a given pose leads to than an own answer, in standard deviations. Where it
