@@ -14,6 +14,8 @@ mod lesson;
 mod match_export;
 mod observer;
 mod opened;
+#[cfg(feature = "app")]
+mod opener;
 mod output;
 mod params;
 mod results;
@@ -41,6 +43,8 @@ use clap::{CommandFactory as _, FromArgMatches as _, Parser as _};
 
 use args::{Arguments, Command, Everywhere};
 use failure::CliError;
+#[cfg(feature = "app")]
+use opener::lesson_window;
 use stderr::tell;
 
 pub use compute::{Compute, ComputeError, with as with_compute};
@@ -96,9 +100,9 @@ fn dispatch(arguments: &Arguments) -> Result<(), CliError> {
         #[cfg(feature = "app")]
         Some(Command::View(args)) => scored(&|| match &args.screenshot.screenshot {
             Some(path) => screenshot::screenshot(args, path, &terminal),
-            None => view::view(args, &terminal),
+            None => view::view(args, &terminal, opener::opener()),
         }),
-        Some(Command::Lesson(args)) => lesson::lesson(args, &terminal),
+        Some(Command::Lesson(args)) => lesson::lesson(args, &terminal, lesson_window),
         Some(Command::Eval(args)) => scored(&|| eval::eval(args, &terminal)),
         Some(Command::Results(args)) => results::results(args, &terminal),
         Some(Command::Compare(args)) => compare::compare(args, &terminal),
@@ -160,4 +164,13 @@ fn use_threads(threads: Option<NonZeroUsize>) -> Result<(), CliError> {
         .num_threads(threads.get())
         .build_global()
         .map_err(|error| CliError::Usage(error.to_string()))
+}
+
+/// A program without the window records the lesson instead.
+#[cfg(not(feature = "app"))]
+fn lesson_window(
+    opened: &posescope::lesson::Lesson,
+    terminal: &terminal::Terminal,
+) -> Result<(), CliError> {
+    lesson::save_instead(opened, &"this posescope is built without the window", terminal)
 }

@@ -4,6 +4,7 @@ mod chance;
 mod diff;
 #[cfg(feature = "cli")]
 mod export;
+mod finding;
 mod findings;
 mod gate;
 mod groups;
@@ -34,7 +35,8 @@ pub use diff::{
 };
 #[cfg(feature = "cli")]
 pub use export::{Export, ExportError, ExportedFile, Format, export};
-pub use findings::{Finding, failing_scenes, of_examination};
+pub use finding::Finding;
+pub use findings::{failing_scenes, of_examination};
 pub use gate::{Gate, GateResult};
 pub use known::{KnownFailures, KnownReport};
 pub use metrics::{Group, Measures, RECALL_LIMITS, Spread, measure};

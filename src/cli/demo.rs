@@ -36,7 +36,7 @@ fn view_where_there_is_a_display(terminal: &Terminal) -> Result<(), CliError> {
     use super::args::{Arguments, Command};
 
     match Arguments::parse_from(["posescope", "view", SCENE]).command {
-        Some(Command::View(args)) => super::view::view(&args, terminal),
+        Some(Command::View(args)) => super::view::view(&args, terminal, super::opener::opener()),
         _ => unreachable!("the words begin with `view`"),
     }
 }

@@ -21,15 +21,18 @@ use super::output;
 use super::stderr::tell;
 use super::terminal::Terminal;
 
+/// Shows a lesson.
+type Window = fn(&Lesson, &Terminal) -> Result<(), CliError>;
+
 /// Lists the lessons, or starts one.
-pub fn lesson(args: &LessonArgs, terminal: &Terminal) -> Result<(), CliError> {
+pub fn lesson(args: &LessonArgs, terminal: &Terminal, window: Window) -> Result<(), CliError> {
     let Some(name) = &args.name else {
         return list(terminal);
     };
     let lesson = Lesson::open(name)?;
     match &args.save {
         Some(path) => save(&lesson, path, terminal),
-        None => window(lesson, terminal),
+        None => window(&lesson, terminal),
     }
 }
 
@@ -43,15 +46,6 @@ fn list(terminal: &Terminal) -> Result<(), CliError> {
     output::print(&table.to_text(terminal.width()).trim_end())
 }
 
-#[cfg(feature = "app")]
-fn window(lesson: Lesson, terminal: &Terminal) -> Result<(), CliError> {
-    let setup = setup_of(&lesson)?;
-    match posescope::app::open_lesson(setup, lesson.clone(), super::view::opener()) {
-        Ok(()) => Ok(()),
-        Err(why) => save_instead(&lesson, &why, terminal),
-    }
-}
-
 /// What the first page of a lesson localises.
 #[cfg(feature = "app")]
 pub fn setup_of(lesson: &Lesson) -> Result<posescope::app::Setup, CliError> {
@@ -60,13 +54,8 @@ pub fn setup_of(lesson: &Lesson) -> Result<posescope::app::Setup, CliError> {
     Ok(posescope::app::Setup::of_lesson(open, defaults::FOLDER.into()))
 }
 
-/// A program without the window records the lesson instead.
-#[cfg(not(feature = "app"))]
-fn window(lesson: Lesson, terminal: &Terminal) -> Result<(), CliError> {
-    save_instead(&lesson, &"this posescope is built without the window", terminal)
-}
-
-fn save_instead(
+/// Records a lesson in place of a window, and says why.
+pub fn save_instead(
     lesson: &Lesson,
     why: &dyn std::fmt::Display,
     terminal: &Terminal,

@@ -3,8 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use posescope::app::{self, KnownResults, Opener, Opening, Results, Setup, WindowError};
-use posescope::lesson::Lesson;
+use posescope::app::{self, KnownResults, Opener, Results, Setup, WindowError};
 use posescope::localize::QueryResult;
 use posescope::measure::StoredSummary;
 use posescope::run::{ConfigError, RunFile, ScenePair, read_run, results_of_pair};
@@ -20,32 +19,15 @@ use super::stderr::tell;
 use super::terminal::Terminal;
 
 /// Opens the window, or without a display records the run.
-pub fn view(args: &ViewArgs, terminal: &Terminal) -> Result<(), CliError> {
+pub fn view(args: &ViewArgs, terminal: &Terminal, opener: Opener) -> Result<(), CliError> {
     let (setup, results) = setup(args)?;
     let headless = setup.clone();
-    match app::open(setup, results, args.screenshot.window, opener()) {
+    match app::open(setup, results, args.screenshot.window, opener) {
         Ok(()) => Ok(()),
         Err(
             error @ (WindowError::NoDisplay | WindowError::NoAdapter(_) | WindowError::Failed(_)),
         ) => record_instead(&headless, &error, terminal),
     }
-}
-
-/// Opens what is named in a window that is open.
-pub fn opener() -> Opener {
-    Arc::new(|name| opening(name).map_err(|error| error.to_string()))
-}
-
-/// A lesson, a run folder or a scene. What is in the file system comes before a lesson of that name.
-fn opening(name: &str) -> Result<Opening, CliError> {
-    let lessons = if Path::new(name).exists() { Vec::new() } else { Lesson::all()? };
-    if let Some(lesson) = lessons.into_iter().find(|lesson| lesson.name == name) {
-        let setup = super::lesson::setup_of(&lesson)?;
-        return Ok(Opening { setup, results: KnownResults::default(), lesson: Some(lesson) });
-    }
-    let args = ViewArgs::parse(["posescope", "view", name].map(str::to_owned))?;
-    let (setup, results) = setup(&args)?;
-    Ok(Opening { setup, results, lesson: None })
 }
 
 /// Records the same run.

@@ -6,9 +6,9 @@
 use std::collections::BTreeSet;
 use std::mem::discriminant;
 
-use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
+use super::finding::Finding;
 use super::groups::grouped;
 use crate::diagnosis::{Code, Diagnosis, Grade};
 use crate::doctor::{self, Subject};
@@ -24,25 +24,6 @@ const COMMON_HINT: f64 = 0.25;
 const COMMON_MISFIT: f64 = 1.0 / 3.0;
 /// The share of a scene's queries that fail where a mistake of the scene matters.
 const COMMON_FAILURE: f64 = 0.25;
-
-/// A mistake of a whole scene.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Finding {
-    /// The verdict of the single queries.
-    pub code: Code,
-    /// The scene or the method with the mistake.
-    pub of: String,
-    /// What is wrong with it.
-    pub about: Subject,
-    /// The number of queries that agree; 0 if only `posescope doctor` says it.
-    pub queries: usize,
-    /// Whether `posescope doctor` says so.
-    pub doctor: bool,
-    /// The mistake in one sentence.
-    pub text: String,
-    /// The value that they agree on.
-    pub evidence: Value,
-}
 
 /// What a verdict says about a whole scene.
 #[derive(Clone, Debug, PartialEq)]

@@ -2,7 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use super::findings::{Finding, findings};
+use super::finding::Finding;
+use super::findings::findings;
 use super::groups::grouped;
 use super::metrics::median;
 use crate::diagnosis::{Code, Confidence, Grade};

@@ -7,7 +7,8 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use super::diff::{Change, RunComparison};
-use super::findings::{Finding, failing_scenes, findings};
+use super::finding::Finding;
+use super::findings::{failing_scenes, findings};
 use super::gate::{Gate, GateResult};
 use super::known::{KnownFailures, KnownReport};
 use super::metrics::{Measures, measure};

@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use super::findings::Finding;
+use super::finding::Finding;
 use super::groups::grouped;
 use super::metrics::Group;
 use crate::diagnosis::{Code, Tolerance};

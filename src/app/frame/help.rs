@@ -31,7 +31,7 @@ pub(crate) fn keys_ui(ctx: &egui::Context, open: &mut bool) {
                     ui.vertical(|ui| {
                         for (group, title) in groups {
                             ui.strong(*title);
-                            egui::Grid::new(title).striped(true).spacing([12.0, 2.0]).show(
+                            egui::Grid::new(title).striped(true).spacing([12.0, 1.0]).show(
                                 ui,
                                 |ui| {
                                     for action in of(*group) {
@@ -41,7 +41,7 @@ pub(crate) fn keys_ui(ctx: &egui::Context, open: &mut bool) {
                                     }
                                 },
                             );
-                            ui.add_space(6.0);
+                            ui.add_space(4.0);
                         }
                     });
                     ui.add_space(12.0);
