@@ -32,7 +32,7 @@ pub enum Mistake {
     InversePose,
     /// Poses use other axes of the camera: those of OpenGL, or of a vehicle.
     PoseAxes,
-    /// Clouds use the axes of a scanner: forward, left, up.
+    /// Clouds use other axes: of a scanner (forward, left, up), of OpenGL (right, up, backwards), or right, forward, up.
     CloudAxes,
     /// The camera parameters belong to another camera.
     WrongCamera,
@@ -68,9 +68,7 @@ impl Mistake {
                 "the poses are inverted: world to camera instead of camera to world"
             }
             Self::PoseAxes => "the poses use other axes of the camera than right, down, forward",
-            Self::CloudAxes => {
-                "the clouds use the axes forward, left, up of a scanner instead of right, down, forward"
-            }
+            Self::CloudAxes => "the clouds use other axes than right, down, forward",
             Self::WrongCamera => "the camera parameters are those of another camera",
             Self::Units => "poses and clouds use different units of length",
             Self::QuaternionOrder => "the quaternions have the other order (w first or last)",
@@ -357,10 +355,22 @@ pub(super) fn readings() -> Vec<Reading> {
         ),
         reading(
             M::CloudAxes,
-            "rotate the axes of each cloud to right, down, forward",
+            "rotate the axes of each cloud from forward, left, up to right, down, forward",
             Change::Points(|p| Point3::new(-p.y, -p.z, p.x)),
         )
         .written(Place::Clouds, "camera_from_cloud = [0, -1, 0, 0,  0, 0, -1, 0,  1, 0, 0, 0]"),
+        reading(
+            M::CloudAxes,
+            "rotate the axes of each cloud from right, up, backwards, those of OpenGL, to right, down, forward",
+            Change::Points(|p| Point3::new(p.x, -p.y, -p.z)),
+        )
+        .written(Place::Clouds, "camera_from_cloud = [1, 0, 0, 0,  0, -1, 0, 0,  0, 0, -1, 0]"),
+        reading(
+            M::CloudAxes,
+            "rotate the axes of each cloud from right, forward, up to right, down, forward",
+            Change::Points(|p| Point3::new(p.x, -p.z, p.y)),
+        )
+        .written(Place::Clouds, "camera_from_cloud = [1, 0, 0, 0,  0, 0, -1, 0,  0, 1, 0, 0]"),
         reading(M::Units, "divide the coordinates of clouds by 1000", Change::Size(1e-3))
             .with_unit("clouds", "\"mm\""),
         reading(M::Units, "divide the coordinates of clouds by 100", Change::Size(1e-2))

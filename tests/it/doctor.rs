@@ -72,6 +72,8 @@ fn what_is_to_be_written_mends_the_scene() {
         Fault::InversePose,
         Fault::PoseAxes,
         Fault::CloudAxes,
+        Fault::OpenGlClouds,
+        Fault::UprightClouds,
         Fault::UpsideDown,
         Fault::WrongCamera,
         Fault::ResizedPhotos,

@@ -20,6 +20,8 @@ pub enum Fault {
     OpenGlAxes,
     PoseOneLineOff,
     CloudAxes,
+    OpenGlClouds,
+    UprightClouds,
     FiveTimesTheDepth,
     UpsideDown,
     OnTheirSide,
@@ -45,13 +47,15 @@ pub enum Fault {
 }
 
 /// What each fault is to be called; half a pixel is less than clouds and photos agree by.
-pub const FAULTS: [(Fault, Option<Mistake>); 27] = [
+pub const FAULTS: [(Fault, Option<Mistake>); 29] = [
     (Fault::Nothing, None),
     (Fault::InversePose, Some(Mistake::InversePose)),
     (Fault::InverseRotation, Some(Mistake::InversePose)),
     (Fault::PoseAxes, Some(Mistake::PoseAxes)),
     (Fault::OpenGlAxes, Some(Mistake::PoseAxes)),
     (Fault::CloudAxes, Some(Mistake::CloudAxes)),
+    (Fault::OpenGlClouds, Some(Mistake::CloudAxes)),
+    (Fault::UprightClouds, Some(Mistake::CloudAxes)),
     (Fault::FiveTimesTheDepth, Some(Mistake::Units)),
     (Fault::UpsideDown, Some(Mistake::TurnedPhotos)),
     (Fault::OnTheirSide, Some(Mistake::TurnedPhotos)),
@@ -241,6 +245,8 @@ impl Scene for Planted<'_> {
         };
         Ok(match self.fault {
             Fault::CloudAxes => moved(&|p| Point3::new(p.z, -p.x, -p.y)),
+            Fault::OpenGlClouds => moved(&|p| Point3::new(p.x, -p.y, -p.z)),
+            Fault::UprightClouds => moved(&|p| Point3::new(p.x, p.z, -p.y)),
             Fault::MillimetreClouds => moved(&|p| p * 1000.0),
             Fault::DepthsOfNoise => {
                 let noise = |p: &Point3<f32>| 0.2 + 5.0 * (p.x * 91.7 + p.y * 37.3).sin().abs();
