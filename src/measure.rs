@@ -20,6 +20,7 @@ mod plots;
 #[cfg(feature = "cli")]
 mod report;
 mod results;
+mod rivals;
 #[cfg(feature = "cli")]
 mod sweep;
 mod systematic;
@@ -48,6 +49,7 @@ pub use plots::Plot;
 #[cfg(feature = "cli")]
 pub use report::{Report, SUMMARY_SCHEMA, StoredSummary, plain};
 pub use results::{RunResults, read_rows};
+pub use rivals::{Rivalry, Rivals, rivals};
 #[cfg(feature = "cli")]
 pub use sweep::{SweptRun, write_sweep};
 #[cfg(feature = "cli")]

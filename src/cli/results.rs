@@ -111,7 +111,7 @@ fn row_table<'a>(
     let has_opinions = results.clone().any(|result| result.opinion.is_some());
     let columns: Vec<&Field> = match args.columns.as_slice() {
         [] if is_text && has_opinions => {
-            let own = ["opinion", "off"].map(Field::named);
+            let own = ["opinion", "off", "turned"].map(Field::named);
             let (before, behind) = COLUMNS.split_at(4);
             before.iter().copied().chain(own).chain(behind.iter().copied()).collect()
         }

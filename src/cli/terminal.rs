@@ -1,6 +1,8 @@
 //! The terminal: progress and messages on stderr, results on stdout.
 
+use std::collections::HashSet;
 use std::io::Write as _;
+use std::sync::Mutex;
 use std::time::Duration;
 
 use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
@@ -29,12 +31,16 @@ impl Terminal {
             LevelFilter::Error => LevelFilter::Off,
             level => level,
         };
+        // A file that is read twice has nothing new to say.
+        let said = Mutex::new(HashSet::new());
         let logger = env_logger::Builder::new()
-            .format(|buffer, record| match record.level() {
+            .format(move |buffer, record| match record.level() {
                 Level::Error | Level::Warn => {
                     let is_error = record.level() == Level::Error;
                     let word = if is_error { "error" } else { "warning" };
-                    writeln!(buffer, "posescope: {word}: {}", message(&record.args().to_string()))
+                    let text = message(&record.args().to_string());
+                    let is_new = said.lock().is_ok_and(|mut said| said.insert(text.clone()));
+                    if is_new { writeln!(buffer, "posescope: {word}: {text}") } else { Ok(()) }
                 }
                 level => {
                     let text = message(&record.args().to_string());

@@ -6,6 +6,8 @@ use super::finding::Finding;
 use super::findings::findings;
 use super::groups::grouped;
 use super::metrics::median;
+use super::rivals::{Rivals, rivals};
+use super::systematic::nothing_in_common;
 use crate::diagnosis::{Code, Confidence, Grade};
 use crate::estimator;
 use crate::localize::QueryResult;
@@ -18,6 +20,8 @@ pub struct Overview {
     pub findings: Vec<Finding>,
     /// How the best method did, why its worst failures failed, and what mends most of them.
     pub headline: String,
+    /// What else is known of files of other systems' poses, a sentence each.
+    pub remarks: Vec<String>,
     /// One bar for each method, in the order of the results.
     pub bars: Vec<Bar>,
     /// The primary causes of all failures, the most frequent first.
@@ -83,7 +87,9 @@ impl Overview {
         // A stable sort: causes that are as frequent stay in the order in which they occur.
         causes.sort_by_key(|(_, times)| std::cmp::Reverse(*times));
         let findings = findings(results, examined);
-        Self { findings, headline: headline(results, &bars), bars, causes }
+        let mut remarks = nothing_in_common(results, &findings);
+        remarks.extend(rivals(results).iter().map(Rivals::words));
+        Self { findings, headline: headline(results, &bars), remarks, bars, causes }
     }
 }
 
@@ -93,8 +99,11 @@ pub fn worst_first(results: &[QueryResult]) -> Vec<usize> {
     let failures = (0..results.len()).filter(|&at| results[at].is_suspect());
     let mut failures: Vec<usize> = failures.collect();
     let off_m = |at: usize| {
-        let off_m = results[at].off_m().filter(|_| results[at].grade != Grade::NoPose);
-        off_m.unwrap_or(f64::NEG_INFINITY)
+        let result = &results[at];
+        // A second opinion may be of a turn alone, which counts like the distance that is as wrong.
+        let estimated = result.opinion.as_ref().and_then(|one| Some(one.share()? * one.within.m));
+        let off_m = result.error.map(|error| error.translation_m).or(estimated);
+        off_m.filter(|_| result.grade != Grade::NoPose).unwrap_or(f64::NEG_INFINITY)
     };
     failures.sort_by(|&one, &other| off_m(other).total_cmp(&off_m(one)));
     failures
@@ -113,7 +122,7 @@ fn opinions(results: &[&QueryResult]) -> [usize; Standing::ALL.len()] {
     Standing::ALL.map(|standing| standings().filter(|one| *one == standing).count())
 }
 
-/// What the second opinions on a method's poses come to, as a sentence after others; empty where there are none.
+/// What the second opinions on a method's poses come to, as the end of a sentence; empty where there are none.
 fn opinions_in_words(bar: &Bar) -> String {
     let counts = Standing::ALL.into_iter().zip(bar.opinions).filter(|(_, count)| *count > 0);
     let parts: Vec<String> =
@@ -121,7 +130,7 @@ fn opinions_in_words(bar: &Bar) -> String {
     if parts.is_empty() {
         String::new()
     } else {
-        format!(" By a second opinion: {}.", parts.join(", "))
+        format!(": by a second opinion {}", parts.join(", "))
     }
 }
 
@@ -172,9 +181,10 @@ fn best_in_words(results: &[&QueryResult], bars: &[Bar], is_named: bool) -> Stri
         };
     }
     if !is_measured {
-        let known = "The truth is not known.";
         let opinions = opinions_in_words(best);
-        return format!("{name} gives a pose for {good} of {total} {queries}. {known}{opinions}");
+        return format!(
+            "{name} gives a pose for {good} of {total} {queries}{opinions}. The truth is not known."
+        );
     }
     let mut words = match good {
         0 if is_named => format!("{name} is right for none of {total} {queries}."),

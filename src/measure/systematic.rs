@@ -1,5 +1,7 @@
 //! Mistakes of a whole file of another system's poses, as findings of a run.
 
+use std::collections::BTreeMap;
+
 use serde_json::{Value, json};
 
 use super::finding::Finding;
@@ -10,18 +12,15 @@ use crate::doctor::Subject;
 use crate::estimator;
 use crate::localize::{PoseReport, QueryResult};
 use crate::opinion::{BetterPose, Standing};
-use posescope_core::systematic::{Answered, Mistake, Systematic, systematic};
+use posescope_core::systematic::{Answered, FEWEST, Mistake, Systematic, systematic};
 
 /// From this share of the poses on, and this number, copies are a mistake of the whole file.
 const COPIED: (f64, usize) = (0.2, 3);
 
 /// What the poses of each other system have in common, by what posescope itself finds for the queries.
 pub(super) fn of_given_poses(results: &[&QueryResult]) -> Vec<Finding> {
-    let given = results.iter().filter(|result| estimator::find(result.method).is_none());
-    let files = grouped(given.map(|result| ((result.method, Group::of(result)), *result)));
     let mut found: Vec<Finding> = Vec::new();
-    for ((method, _), results) in files {
-        let of = method.to_string();
+    for (of, results) in files(results) {
         // Other radii and fusions compare the same poses.
         if !found.iter().any(|one| one.of == of) {
             found.extend(of_file(&of, &results));
@@ -31,17 +30,52 @@ pub(super) fn of_given_poses(results: &[&QueryResult]) -> Vec<Finding> {
     found
 }
 
-fn of_file(of: &str, results: &[&QueryResult]) -> Option<Finding> {
-    let within = results.iter().find_map(|result| Some(result.opinion.as_ref()?.within))?;
-    let right = Tolerance { translation_m: within.m, rotation_deg: within.deg };
-    let queries = results.iter().map(|result| Answered {
+/// A sentence about each file of another system of which no common mistake is found.
+pub(super) fn nothing_in_common(results: &[&QueryResult], findings: &[Finding]) -> Vec<String> {
+    let mut compared: BTreeMap<String, usize> = BTreeMap::new();
+    for (of, results) in files(results) {
+        if results.iter().any(|result| result.opinion.is_some()) {
+            let count = answered(&results).iter().filter(|one| one.is_comparable()).count();
+            let most = compared.entry(of).or_default();
+            *most = count.max(*most);
+        }
+    }
+    compared.retain(|of, _| !findings.iter().any(|one| one.of == *of));
+    let sentences = compared.iter().map(|(of, count)| match count {
+        count if *count >= FEWEST => format!(
+            "No mistake is common to the poses of {of}: {count} were compared with trusted poses of posescope's own."
+        ),
+        count => format!(
+            "Whether the poses of {of} have a mistake in common cannot be known: {count} can be compared with trusted \
+             poses of posescope's own, {FEWEST} are needed."
+        ),
+    });
+    sentences.collect()
+}
+
+/// The results of each other system, those of one setting together.
+fn files<'a>(results: &[&'a QueryResult]) -> Vec<(String, Vec<&'a QueryResult>)> {
+    let given = results.iter().filter(|result| estimator::find(result.method).is_none());
+    let files = grouped(given.map(|result| ((result.method, Group::of(result)), *result)));
+    files.into_iter().map(|((method, _), results)| (method.to_string(), results)).collect()
+}
+
+/// What the file and posescope answer to each query.
+fn answered(results: &[&QueryResult]) -> Vec<Answered> {
+    let answered = results.iter().map(|result| Answered {
         given: result.pose.as_ref().and_then(PoseReport::to_pose),
         own: result
             .opinion
             .as_ref()
             .and_then(|opinion| opinion.own.as_ref().and_then(BetterPose::to_pose)),
     });
-    let found = systematic(&queries.collect::<Vec<_>>(), right)?;
+    answered.collect()
+}
+
+fn of_file(of: &str, results: &[&QueryResult]) -> Option<Finding> {
+    let within = results.iter().find_map(|result| Some(result.opinion.as_ref()?.within))?;
+    let right = Tolerance { translation_m: within.m, rotation_deg: within.deg };
+    let found = systematic(&answered(results), right)?;
     let unit = results.first()?.unit;
     Some(Finding {
         code: Code::E5,

@@ -11,6 +11,7 @@ use serde::Deserialize;
 use super::metrics::Measures;
 use super::paper;
 use super::results::RunResults;
+use super::rivals::{Rivals, rivals};
 use super::triage::Field;
 use crate::localize::QueryResult;
 use crate::method::Method;
@@ -32,6 +33,8 @@ pub enum TableName {
     Summary,
     /// The shares of primary verdicts.
     Verdicts,
+    /// Which of two other systems' poses the photos support, one row per query.
+    Rivals,
     /// The paper's scenes of KITTI.
     #[value(name = "paper:1")]
     Paper1,
@@ -70,6 +73,10 @@ impl TableName {
             }
             Self::Summary => in_unit(shaped(&run.measures, |shape| shape.name == "summary")),
             Self::Verdicts => in_unit(verdicts(&run.measures).into_iter().collect()),
+            Self::Rivals => {
+                let results: Vec<&QueryResult> = run.results.iter().collect();
+                in_unit(rivals(&results).iter().map(Rivals::table).collect())
+            }
             Self::Paper1 => vec![paper::scenes(1)],
             Self::Paper2 => vec![paper::scenes(2)],
             Self::Paper3 => papers(3),

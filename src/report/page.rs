@@ -51,7 +51,7 @@ pub(super) fn page(report: &RunReport) -> String {
             @if let Some(baseline) = &report.baseline { (changes(report, baseline)) }
             (glance::methods(&overview))
             (glance::causes(&overview))
-            (route::routes(report))
+            (route::routes(report, &overview.remarks))
             (failures::failures(report))
             (results::results(report, &columns))
             (plots(report))

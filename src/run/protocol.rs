@@ -119,7 +119,8 @@ pub struct Protocol {
     // Parsed before the methods, which may use its names.
     /// Evaluate the poses of another system as a method of this name; repeatable
     ///
-    /// FILE is in TUM or KITTI format, COLMAP's images.txt, or lines of `name qw qx qy qz x y z`.
+    /// FILE is in TUM or KITTI format, COLMAP's images.txt, or lines of `name qw qx qy qz x y z`. The name `truth` puts its
+    /// poses in the place of the queries' true ones.
     #[cfg_attr(
         feature = "cli",
         arg(long, help_heading = "Methods", value_name = "NAME=FILE", hide_short_help = true)

@@ -103,7 +103,8 @@ impl<'a> FrameNames<'a> {
 
     /// Says how many names of a file mean no frame.
     pub fn warn_of_strangers(&self, file: &str, what: &str, strangers: &[&str], all: usize) {
-        if let Some(first) = strangers.first() {
+        // The file of a whole set serves a single photo.
+        if let Some(first) = strangers.first().filter(|_| self.frames.len() > 1) {
             log::warn!(
                 "{file}: {} of {all} {what} are of no frame of {}, such as `{}`",
                 strangers.len(),

@@ -208,7 +208,11 @@ fn planted(set: &Set, seed: u64) -> Result<Vec<Planted>, Failure> {
         UnitQuaternion::from_scaled_axis(axis.normalize() * degrees.to_radians())
     };
     let reading = |name: &'static str| -> Box<dyn Fn(&Finding) -> bool + Sync> {
-        Box::new(move |found| found.evidence["mistake"]["reading"] == name)
+        // Of each pose alone, or of all that are compared.
+        Box::new(move |found| {
+            [&found.evidence["reading"], &found.evidence["mistake"]["reading"]]
+                .contains(&&Value::from(name))
+        })
     };
     let (half_x, quarter_x) = (turned(Vector3::x(), 180.0), turned(Vector3::x(), 90.0));
     let misread = |pose: &Pose| {

@@ -99,6 +99,45 @@ fn the_truth_changes_no_opinion_and_a_verdict_stands_only_where_there_is_none() 
 }
 
 #[test]
+fn a_truth_that_a_confirmed_pose_contradicts_is_suspect() {
+    let street = street();
+    let pose = street.pose(70).expect("a pose");
+    let [other, truth] = [Method::called("other").expect("a plain name"), Foreign::TRUTH];
+    let results = |truth_is_off_m: f64| -> [QueryResult; 2] {
+        let name = || street.frames()[70].clone();
+        let stated = pose * Pose::translation(truth_is_off_m, 0.0, 0.0);
+        let foreign = Foreign::default()
+            .with_estimates(other, [(name(), pose)].into())
+            .with_estimates(truth, [(name(), stated)].into());
+        let params = Params::default();
+        let localizer = Localizer::new(&street, &street, &params, 0).with_foreign(foreign);
+        let references = vec![66].into();
+        let request = Request { radius_m: 12.0, references, fusions: vec![], setting: None };
+        let mut results = Vec::new();
+        let keep = |result, _| {
+            results.push(result);
+            Ok::<(), LocalizeError>(())
+        };
+        localizer
+            .localize(0, 70, &[request], &[other, truth], &mut NoObserver, keep)
+            .expect("localised");
+        results.try_into().expect("two")
+    };
+    let [estimate, stated] = results(3.0);
+    assert_eq!((estimate.grade, estimate.diagnosis[0].code), (Grade::Wrong, Code::X1));
+    let text = &estimate.diagnosis[0].text;
+    assert!(text.starts_with("The ground truth is suspect"), "{text}");
+    // Nothing measures the truth, and the photos contradict it.
+    assert_eq!((stated.grade, stated.error), (Grade::Unmeasured, None));
+    assert_eq!(opinion(&stated).standing, Standing::Contradicted);
+    assert_eq!(stated.diagnosis[0].code, Code::E3);
+
+    let [estimate, stated] = results(0.0);
+    assert_eq!((estimate.grade, estimate.diagnosis.len()), (Grade::Right, 0));
+    assert_eq!(opinion(&stated).standing, Standing::Confirmed);
+}
+
+#[test]
 fn several_references_vote_on_a_fused_pose() {
     let fusions = || Fusion::all().filter(|fusion| fusion.name == "r-wavg").collect();
     let [fused] = results(Pose::translation(-3.0, 0.0, 0.0), &[66, 74], fusions(), false)
@@ -261,7 +300,7 @@ fn a_file_of_poses_is_judged_where_no_query_has_a_true_one() {
     let gate = "--gate \"contradicted@mine <= 0.02\"";
     let said = photos.said(&format!("{eval} {near} --out run {gate}"));
     assert_eq!(said.code, Some(1), "{}", said.err);
-    has(&said.out, "The truth is not known. By a second opinion: ~ contradicted");
+    has(&said.out, "12 of 12 queries: by a second opinion ~ contradicted. The truth is not known.");
     has(&said.out, "Finding: The poses of mine are shifted by 1.6");
     has(&said.out, "All failures: ~ opinion = contradicted");
     let summary = text(photos.root.path().join("run/summary.json"));
@@ -274,10 +313,21 @@ fn a_file_of_poses_is_judged_where_no_query_has_a_true_one() {
     let failed = fs::read_dir(photos.root.path().join("run/failures")).expect("recordings");
     assert!(failed.count() >= 10);
     assert!(text(photos.root.path().join("run/results.jsonl")).contains("\"copied_from\":\"0001"));
+    photos.said("eval --rerun-failed run --out again").ok();
+    let again = text(photos.root.path().join("again/results.jsonl"));
+    assert!(again.lines().count() >= 10, "{again}");
 
-    // Poses that are right have no finding.
+    // Poses that are right have no finding, and the photos tell them from their rivals.
     photos.estimated("poses.txt", |_, pose| *pose);
+    photos.estimated("other.txt", |at, pose| match at {
+        3 | 8 => pose * Pose::translation(0.25, 0.0, 0.0),
+        _ => *pose,
+    });
+    let eval = eval.replace("--method mine", "--estimates other=other.txt --method mine,other");
     let said = photos.said(&format!("{eval} {near} --out sound {gate}")).ok();
     assert!(!said.out.contains("Finding") && !said.out.contains("Failures"), "{}", said.out);
-    has(&said.out, "12 confirmed");
+    has(&said.out, "No mistake is common to the poses of mine: 12 were compared");
+    has(&said.out, "the photos support mine in 2 and other in 0; 10 stay");
+    let rivals = photos.said("results sound --table rivals --as csv").ok().out;
+    has(&rivals, "IMG_0002,open ~ IMG_0003,mine ~ IMG_0008,mine");
 }

@@ -35,6 +35,10 @@ impl fmt::Debug for Foreign {
 }
 
 impl Foreign {
+    /// The name under which a file of poses takes the place of the queries' true poses. Second opinions judge it like the
+    /// poses of any other system.
+    pub const TRUTH: Method = Method::named("truth");
+
     /// The same, and the poses of one more system under the name of a method.
     #[must_use]
     pub fn with_estimates(mut self, method: Method, estimates: Estimates) -> Self {

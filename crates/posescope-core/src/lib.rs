@@ -226,6 +226,7 @@ pub mod text;
 #[doc(hidden)]
 pub mod trace;
 
+mod directions;
 mod input;
 mod memo;
 mod stats;

@@ -14,6 +14,7 @@ use serde::{Deserialize, Serialize};
 use crate::covariance::error_vector;
 use crate::diagnosis::confidence::{TRUSTED_FROM, Within, percent};
 use crate::diagnosis::{PoseConfidence, Tolerance};
+use crate::directions;
 use crate::geometry::{Pose, PoseError, matrix_from_pose, pose_from_matrix};
 use crate::method::Method;
 use crate::text::words;
@@ -74,6 +75,9 @@ pub struct Opinion {
     pub offset_m: Option<[f64; 3]>,
     /// How far it is turned against that \[°\].
     pub offset_deg: Option<f64>,
+    /// The same turn about the axes of the camera as posescope has it: up, right, clockwise \[°\].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub turned_deg: Option<[f64; 3]>,
     /// How far off it is, at least and at most, if posescope's own pose is right, in 95 % of such cases \[m\].
     pub interval_m: Option<[f64; 2]>,
     /// Where the photos agree, for a pose that is contradicted.
@@ -95,13 +99,16 @@ pub struct Opinion {
 pub struct BetterPose {
     /// `[R|t]`, row by row.
     pub world_from_camera: [[f64; 4]; 3],
+    /// How far off posescope's own pose is in 95 % of cases, if it is right.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub within_95: Option<Within>,
 }
 
 impl From<&Pose> for BetterPose {
     fn from(pose: &Pose) -> Self {
         let matrix = matrix_from_pose(pose);
         let row = |row: usize| std::array::from_fn(|column| matrix[(row, column)]);
-        Self { world_from_camera: std::array::from_fn(row) }
+        Self { world_from_camera: std::array::from_fn(row), within_95: None }
     }
 }
 
@@ -191,6 +198,7 @@ impl Opinion {
             within: right.into(),
             offset_m: None,
             offset_deg: None,
+            turned_deg: None,
             interval_m: None,
             better: None,
             own: None,
@@ -257,17 +265,23 @@ impl Opinion {
         Some(parts.iter().map(|part| part * part).sum::<f64>().sqrt())
     }
 
+    /// How far off the pose is, as a share of what counts as right; turns count like distances.
+    pub fn share(&self) -> Option<f64> {
+        let shares = [self.distance_m()? / self.within.m, self.offset_deg? / self.within.deg];
+        Some(shares.into_iter().fold(0.0, f64::max))
+    }
+
     /// How far off the pose is, with the directions that matter.
     fn off(&self) -> Option<String> {
         let (offset, distance, angle) = (self.offset_m?, self.distance_m()?, self.offset_deg?);
-        let names = [["left", "right"], ["up", "down"], ["back", "forward"]];
-        let parts = offset.iter().zip(names).filter(|(part, _)| part.abs() >= 0.3 * distance);
-        let parts: Vec<String> = parts
-            .map(|(part, [less, more])| {
-                format!("{:.2} m {}", part.abs(), if *part < 0.0 { less } else { more })
-            })
-            .collect();
-        Some(format!("{distance:.2} m off ({}) and {angle:.1}°", parts.join(", ")))
+        // The direction of hardly a turn means nothing.
+        let turned = self.turned_deg.filter(|_| angle >= 0.1);
+        let turned = turned.map(|turned| format!(" ({})", directions::of_turn(turned)));
+        Some(format!(
+            "{distance:.2} m ({}) and {angle:.2}°{} off",
+            directions::of_shift(offset),
+            turned.unwrap_or_default()
+        ))
     }
 }
 
@@ -327,9 +341,13 @@ fn best_known(
         probability,
         offset_m: Some([offset[3], offset[4], offset[5]]),
         offset_deg: Some(error.rotation_deg),
+        turned_deg: Some([offset[0], offset[1], offset[2]].map(f64::to_degrees)),
         interval_m: Some([less_m, error.translation_m + own.m]),
         better: (standing == Standing::Contradicted).then(|| BetterPose::from(&best.pose)),
-        own: best.is_trusted().then(|| BetterPose::from(&best.pose)),
+        own: best.is_trusted().then(|| BetterPose {
+            within_95: best.confidence.as_ref().and_then(|known| known.within_95),
+            ..BetterPose::from(&best.pose)
+        }),
         by: Some(best.method),
         ..undecided(because)
     }
@@ -370,9 +388,13 @@ mod tests {
             assert_eq!(far.better, Some(BetterPose::from(&own[0].pose)));
         }
         assert!(of(3.0, &own).probability < 0.05);
-        assert!(of(2.0, &own).words().contains("2.00 m off (2.00 m right)"));
+        assert!(of(2.0, &own).words().contains("2.00 m (2.00 m right) and 0.00° off"));
         let turned = Pose::rotation(nalgebra::Vector3::y() * 8_f64.to_radians());
-        assert_eq!(Opinion::of(&turned, RIGHT, &own, "").standing, Standing::Contradicted);
+        let turned = Opinion::of(&turned, RIGHT, &own, "");
+        assert_eq!(turned.standing, Standing::Contradicted);
+        assert!(turned.words().contains("8.00° (8.00° right)"), "{}", turned.words());
+        // A turn counts like a distance.
+        assert!((turned.share().expect("an offset") - 8.0 / 5.0).abs() < 1e-9);
     }
 
     #[test]

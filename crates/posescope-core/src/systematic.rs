@@ -11,6 +11,7 @@ use nalgebra::Vector3;
 
 use self::model::{Both, Model};
 use crate::diagnosis::Tolerance;
+use crate::directions;
 use crate::geometry::{Pose, PoseError};
 use crate::stats::upper_median;
 
@@ -21,6 +22,13 @@ pub struct Answered {
     pub given: Option<Pose>,
     /// Posescope's own pose, where it is trusted.
     pub own: Option<Pose>,
+}
+
+impl Answered {
+    /// Whether both are there to compare.
+    pub fn is_comparable(&self) -> bool {
+        self.given.is_some() && self.own.is_some()
+    }
 }
 
 /// What the poses of a file have in common.
@@ -75,7 +83,7 @@ pub struct Systematic {
 }
 
 /// The fewest queries that can be compared.
-const FEWEST: usize = 8;
+pub const FEWEST: usize = 8;
 /// The share of what counts as right within which poses are the same.
 const NEAR: f64 = 0.2;
 /// The share of the queries that a mistake must explain, and how many more than were explained without it.
@@ -304,8 +312,10 @@ impl Mistake {
             Self::Mounting { shift_m, turn_deg } => {
                 let shift = Vector3::from(*shift_m).norm();
                 let turn = Vector3::from(*turn_deg).norm();
-                let of_shift = || format!("shifted by {shift:.2} m ({})", directions(*shift_m));
-                let of_turn = || format!("turned by {turn:.2}° ({})", turns(*turn_deg));
+                let of_shift =
+                    || format!("shifted by {shift:.2} m ({})", directions::of_shift(*shift_m));
+                let of_turn =
+                    || format!("turned by {turn:.2}° ({})", directions::of_turn(*turn_deg));
                 match (shift > 0.0, turn > 0.0) {
                     (true, false) => format!("are {} in the camera's frame", of_shift()),
                     (false, _) => format!("are {} in the camera's frame", of_turn()),
@@ -350,32 +360,6 @@ impl Mistake {
             Self::Drift { .. } => "localise against the map anew on the way, or close loops",
         }
     }
-}
-
-/// The parts of a shift that matter, by direction.
-fn directions(shift_m: [f64; 3]) -> String {
-    let names = [["left", "right"], ["up", "down"], ["back", "forward"]];
-    let length = Vector3::from(shift_m).norm();
-    let parts = shift_m.iter().zip(names).filter(|(part, _)| part.abs() >= 0.15 * length);
-    let parts: Vec<String> = parts
-        .map(|(part, [less, more])| {
-            format!("{:.2} m {}", part.abs(), if *part < 0.0 { less } else { more })
-        })
-        .collect();
-    parts.join(", ")
-}
-
-/// The parts of a turn that matter, by axis.
-fn turns(turn_deg: [f64; 3]) -> String {
-    let names = [["down", "up"], ["left", "right"], ["anticlockwise", "clockwise"]];
-    let angle = Vector3::from(turn_deg).norm();
-    let parts = turn_deg.iter().zip(names).filter(|(part, _)| part.abs() >= 0.15 * angle);
-    let parts: Vec<String> = parts
-        .map(|(part, [less, more])| {
-            format!("{:.2}° {}", part.abs(), if *part < 0.0 { less } else { more })
-        })
-        .collect();
-    parts.join(", ")
 }
 
 #[cfg(test)]

@@ -31,7 +31,7 @@ pub struct ResultsArgs {
     /// ros a PoseWithCovarianceStamped in YAML for each pose.
     #[arg(long = "as", value_name = "FORM", value_enum, default_value = "text")]
     pub form: Form,
-    /// The table: rows, summary, verdicts, or paper:1 … paper:6
+    /// The table: rows, summary, verdicts, rivals, or paper:1 … paper:6
     #[arg(long, value_name = "TABLE", value_enum, default_value = "rows")]
     pub table: TableName,
     #[arg(long, value_name = "NAME", value_enum, conflicts_with = "form", help = plots())]

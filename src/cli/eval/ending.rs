@@ -15,7 +15,7 @@ use posescope::table::{Table, wrapped};
 /// The most characters of a line.
 const WIDEST: usize = 100;
 /// The most failures that are listed, each with the command that opens it.
-const WORST: usize = 3;
+const WORST: usize = 5;
 
 /// The text, in lines that fit a terminal of this width.
 pub fn ending(run: &RunFile, report: &Report, folder: &Path, width: Option<usize>) -> String {
@@ -29,6 +29,9 @@ pub fn ending(run: &RunFile, report: &Report, folder: &Path, width: Option<usize
     text += &(meanings.lines().map(lines).collect::<String>() + "\n");
     for Finding { text: found, .. } in &report.findings {
         text += &lines(&format!("Finding: {found}"));
+    }
+    for remark in &overview.remarks {
+        text += &lines(remark);
     }
     for one in &report.gate_results {
         let verdict = if one.passed { "passed" } else { "FAILED" };

@@ -111,7 +111,8 @@ impl Field {
         })
         .called("distance"),
         number("probability", "probability of being right", "", 3, |r| {
-            Some(r.confidence.as_ref()?.probability)
+            let own = r.confidence.as_ref().map(|known| known.probability);
+            own.or_else(|| Some(r.opinion.as_ref()?.probability))
         })
         .called("confidence")
         .wide(76.0),
@@ -124,6 +125,13 @@ impl Field {
             "m",
             3,
             |r| r.opinion.as_ref()?.distance_m(),
+        ),
+        number(
+            "turned",
+            "angle of another system's pose from that where posescope has it",
+            "°",
+            2,
+            |r| r.opinion.as_ref()?.offset_deg,
         ),
         number("keypoints", "keypoints of the query", "", 0, |r| {
             Some(r.counts?.query_keypoints as f64)

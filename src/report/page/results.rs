@@ -68,7 +68,7 @@ pub(super) fn columns(report: &RunReport) -> Vec<(Column, bool)> {
         Column::Where => report.has_several_groups(),
         Column::Change => report.baseline.is_some(),
         Column::Photo => !report.thumbnails.is_empty(),
-        Column::Field(field) if ["opinion", "off"].contains(&field.name) => {
+        Column::Field(field) if ["opinion", "off", "turned"].contains(&field.name) => {
             report.results.iter().any(|one| one.result.opinion.is_some())
         }
         Column::Field(_) => true,

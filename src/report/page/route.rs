@@ -13,8 +13,8 @@ use crate::opinion::{BetterPose, Opinion, Standing};
 use crate::palette;
 use crate::route::from_above;
 
-/// The routes of all other systems whose poses have a second opinion.
-pub(super) fn routes(report: &RunReport) -> Markup {
+/// The routes of all other systems whose poses have a second opinion, with remarks on them.
+pub(super) fn routes(report: &RunReport, remarks: &[String]) -> Markup {
     let is_foreign = |method: &&Method| estimator::find(**method).is_none();
     let methods = report.run.protocol.methods.iter().filter(is_foreign);
     let charts: Vec<(Chart, usize)> = methods.filter_map(|method| route(report, *method)).collect();
@@ -24,6 +24,7 @@ pub(super) fn routes(report: &RunReport) -> Markup {
                 h2 id="route" { "Where poses seem off" }
                 p { "Each dot is a query, seen from above, where posescope has it, or else where its pose is. A line leads to the \
                      pose that is contradicted. Rest the pointer on a dot for its second opinion." }
+                @for remark in remarks { p { (remark) } }
                 @for (chart, left_out) in charts {
                     figure.plot style="max-width:48rem" {
                         (chart.svg(None))

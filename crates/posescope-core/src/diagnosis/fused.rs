@@ -3,7 +3,7 @@
 use super::case::{FusionCase, Member, RankingCase, heaviest};
 use super::confidence::PoseConfidence;
 use super::rules::{RULES, Test, low};
-use super::{Diagnosis, Tolerance};
+use super::{Code, Diagnosis, Tolerance};
 use crate::estimator::Failure;
 use crate::fusion::ShareOutcome;
 use crate::geometry::{Pose, PoseError};
@@ -37,7 +37,10 @@ pub fn diagnose_fusion(
     let is_of_members = !is_right && (!is_joint || pose.is_ok() && truth.is_some());
     if is_of_members {
         let verdicts = heaviest(members).map_or(&[][..], |member| member.verdicts);
-        let failures = verdicts.iter().filter(|verdict| verdict.code.is_failure());
+        // What a second opinion says of one pose, it says anew of the fused one.
+        let is_opinion = |code: Code| matches!(code, Code::E3 | Code::E4 | Code::E6);
+        let is_kept = |code: Code| code.is_failure() && !is_opinion(code);
+        let failures = verdicts.iter().filter(|verdict| is_kept(verdict.code));
         found.extend(failures.cloned());
     }
     if let (Err(failure), true) = (pose, found.is_empty()) {

@@ -160,6 +160,14 @@ impl<'a> Localizer<'a> {
         &self.references
     }
 
+    /// The true pose of a query: of the file that takes the place of the scene's poses, if there is one.
+    fn truth(&self, query: usize) -> Option<Pose> {
+        match self.foreign.estimates(Foreign::TRUTH) {
+            Some(truth) => truth.get(&self.queries.frames()[query]).copied(),
+            None => self.queries.pose(query),
+        }
+    }
+
     /// Localises one query and hands out the results by method, then request, then fusion (or
     /// reference). A problem that two requests share is solved once.
     ///
@@ -211,9 +219,9 @@ impl<'a> Localizer<'a> {
         }
         let mut work = QueryWork {
             query: &loaded,
-            truth: self.queries.pose(query),
+            truth: self.truth(query),
             matches: vec![None; problems.len()],
-            own: vec![None; problems.len()],
+            own: vec![BTreeMap::new(); problems.len()],
             candidates: BTreeMap::new(),
             problems,
             frame: query,
@@ -266,19 +274,19 @@ impl<'a> Localizer<'a> {
                     for fusion in lines {
                         let result = self.of_pose(work, method, fusion, Err(&failure));
                         let result =
-                            self.with_ranking_assessed(result, request, work.truth.as_ref());
+                            self.with_ranking_assessed(result, request, work.truth_for(method));
                         emit(result, StageTimes::default(), request.clone())?;
                     }
                     continue;
                 }
                 for &problem in members {
-                    self.solve(work, problem, method, request, observer)?;
+                    self.solve(work, problem, method, (request, members), observer)?;
                     if let (true, Some(candidate)) =
                         (request.fusions.is_empty(), work.candidate(problem, method))
                     {
                         let result = candidate.result.clone();
                         let result =
-                            self.with_ranking_assessed(result, request, work.truth.as_ref());
+                            self.with_ranking_assessed(result, request, work.truth_for(method));
                         let asked = work.asked_alone(problem);
                         emit(result, candidate.times.clone(), asked)?;
                     }
@@ -286,9 +294,20 @@ impl<'a> Localizer<'a> {
                 if !request.fusions.is_empty() {
                     self.count_matches(work, members, observer)?;
                 }
+                // They are known by now.
+                let is_given = self.foreign.estimates(method).is_some();
+                let has_pose = |problem: &usize| {
+                    let candidate = work.candidate(*problem, method);
+                    candidate.is_some_and(|one| one.outcome.pose.is_ok())
+                };
+                let own = if is_given && members.iter().any(has_pose) {
+                    self.own_answers(work, members, observer)?.0
+                } else {
+                    Vec::new()
+                };
                 for &fusion in &request.fusions {
                     let (result, times) =
-                        self.fuse(work, members, method, fusion, request, observer)?;
+                        self.fuse(work, members, method, fusion, (request, &own), observer)?;
                     let asked = Request { fusions: vec![fusion], ..request.clone() };
                     emit(result, times, asked)?;
                 }
@@ -358,7 +377,7 @@ impl<'a> Localizer<'a> {
                 method,
                 self.seed,
                 pose,
-                work.truth.as_ref(),
+                work.truth_for(method),
                 self.tolerance,
             )
         }
@@ -370,7 +389,7 @@ impl<'a> Localizer<'a> {
         work: &mut QueryWork<'_>,
         problem: usize,
         method: Method,
-        request: &Request,
+        (request, members): (&Request, &[usize]),
         observer: &mut dyn LocalizeObserver,
     ) -> Result<(), Cancelled> {
         if work.candidate(problem, method).is_some() {
@@ -404,11 +423,11 @@ impl<'a> Localizer<'a> {
             None => self.estimate(work, problem, method, observer)?,
         };
         if self.foreign.estimates(method).is_some() && candidate.outcome.pose.is_ok() {
-            let (own, times) = self.own_answers(work, problem, observer)?;
-            candidate = self.with_opinion(&work.problems[problem], candidate, own, &times);
+            let (own, times) = self.own_answers(work, members, observer)?;
+            candidate = self.with_opinion(work, candidate, &own, &times);
         }
         let mut reported =
-            self.with_ranking_assessed(candidate.result.clone(), request, work.truth.as_ref());
+            self.with_ranking_assessed(candidate.result.clone(), request, work.truth_for(method));
         reported.put_into_words_of(self.params.scale.unit());
         observer.end_method(&reported, &candidate.times);
         let of_method = work.candidates.entry(method).or_default();

@@ -493,6 +493,29 @@ impl QueryResult {
             let place = self.diagnosis.iter().take_while(|one| one.code == Code::X1).count();
             verdict.into_iter().for_each(|verdict| self.diagnosis.insert(place, verdict));
         }
+        let is_confirmed = |one: &&Opinion| one.standing == Standing::Confirmed;
+        if let Some(opinion) = opinion.as_ref().filter(is_confirmed)
+            && let Some(error) = self.error.filter(|_| self.grade == Grade::Wrong)
+        {
+            // The truth alone stands against two that found the pose independently, but with the same camera. What is
+            // said of clouds and conventions rests on the truth.
+            let is_kept = |one: &Diagnosis| {
+                let is_of = |key: &str| one.evidence.get(key).is_some();
+                one.code != Code::X1 || is_of("error") || is_of("explained")
+            };
+            self.diagnosis.retain(is_kept);
+            if !self.diagnosis.iter().any(|one| one.code == Code::X1) {
+                let text = format!(
+                    "The ground truth is suspect, or the query's camera: two systems find this pose, which is {} from \
+                     the truth. {}",
+                    error.greater(),
+                    opinion.because
+                );
+                let probability = opinion.probability;
+                let evidence = serde_json::json!({ "error": error, "probability": probability });
+                self.diagnosis.insert(0, Diagnosis { code: Code::X1, text, evidence });
+            }
+        }
         self.opinion = opinion;
     }
 

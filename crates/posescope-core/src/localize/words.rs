@@ -77,7 +77,7 @@ impl QueryResult {
         let also = others.iter().map(|one| format!("also {}: {}", one.code, one.text));
         let mut paragraphs: Vec<String> = also.collect();
         let Some(explanation) = &self.explanation else {
-            if self.grade.is_failure() {
+            if self.is_suspect() {
                 paragraphs.push(format!("try: {}", self.advice(primary)));
             }
             return paragraphs;

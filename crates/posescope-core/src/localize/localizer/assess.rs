@@ -37,7 +37,7 @@ impl Localizer<'_> {
         let Estimated { outcome: estimated, evidence, times, verdicts } = estimated;
         let solved = &work.problems[problem];
         let subject = Subject::new(solved, method, self.params, &estimated, &evidence)
-            .against(work.truth.as_ref(), self.tolerance);
+            .against(work.truth_for(method), self.tolerance);
         let outcome = confidence::accepted(&subject, self.least_probability);
         let subject = subject.answering(&outcome);
         let assessment = match verdicts {
@@ -52,6 +52,6 @@ impl Localizer<'_> {
         if let Ok(pose) = &outcome.pose {
             result.agreement = work.agreement(problem, method, pose);
         }
-        MethodOutcome { estimated, outcome, evidence, result, times, own: None }
+        MethodOutcome { estimated, outcome, evidence, result, times }
     }
 }

@@ -1,5 +1,6 @@
 //! One pose from those of several references.
 
+use super::opinion::SharedAnswer;
 use super::work::{MethodOutcome, QueryWork};
 use super::{Localizer, Request};
 use crate::diagnosis::{Member, diagnose_fusion, fused_confidence};
@@ -51,7 +52,7 @@ impl Localizer<'_> {
         members: &[usize],
         method: Method,
         fusion: Fusion,
-        request: &Request,
+        (request, own): (&Request, &[SharedAnswer]),
         observer: &mut dyn LocalizeObserver,
     ) -> Result<(QueryResult, StageTimes), Cancelled> {
         let solved: Vec<(&Problem, usize, &MethodOutcome)> = members
@@ -89,7 +90,7 @@ impl Localizer<'_> {
                 confidence: candidate.result.confidence.as_ref(),
             })
             .collect();
-        let truth = work.truth.as_ref();
+        let truth = work.truth_for(method);
         // Where one would start from with a single reference: the one with the most matches.
         let best = solved.iter().rev().max_by_key(|(_, matches, _)| *matches);
         let result = QueryResult {
@@ -113,12 +114,8 @@ impl Localizer<'_> {
             ),
             ..self.of_pose(work, method, Some(fusion), pose.as_ref())
         };
-        let own = solved.iter();
-        let own =
-            own.filter_map(|(problem, _, candidate)| Some((*problem, candidate.own.as_deref()?)));
-        let own: Vec<_> = own.collect();
         let opinion = pose.as_ref().ok().filter(|_| !own.is_empty());
-        let opinion = opinion.map(|pose| self.opinion(pose, &own));
+        let opinion = opinion.map(|pose| self.opinion(work, pose, own));
         let mut result = self.with_ranking_assessed(result, request, truth);
         result.take_opinion(opinion);
         result.put_into_words_of(self.params.scale.unit());

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use super::Request;
 use crate::diagnosis::{Diagnosis, Evidence};
 use crate::estimator::{self, Failure, Outcome};
+use crate::foreign::Foreign;
 use crate::geometry::{Pose, PoseError};
 use crate::localize::{Agreement, QueryResult, References, StageTimes};
 use crate::method::Method;
@@ -36,19 +37,15 @@ pub(super) struct MethodOutcome {
     pub(super) result: QueryResult,
     /// How long its stages took.
     pub(super) times: StageTimes,
-    /// What posescope answers itself, beside the pose of another system.
-    pub(super) own: Option<Arc<OwnAnswers>>,
 }
 
-/// What posescope's own methods answered to a problem.
-#[derive(Debug, Default)]
-pub(super) struct OwnAnswers {
-    /// The poses, in the order in which the methods were asked.
-    pub(super) found: Vec<OwnAnswer>,
-    /// What the search's answer costs, and how far the costs around the reference are spread.
+/// What one of posescope's own methods answered to a problem, beside the pose of another system.
+#[derive(Debug)]
+pub(super) struct OneAnswer {
+    /// The pose, or why there is none, as a sentence.
+    pub(super) found: Result<OwnAnswer, String>,
+    /// What a search's answer costs, and how far the costs around the reference are spread.
     pub(super) searched: Option<(f64, f64)>,
-    /// Why the last method without a pose has none; empty where each has one.
-    pub(super) missing: String,
 }
 
 /// A query at work, with all that was found out about it.
@@ -66,7 +63,7 @@ pub(super) struct QueryWork<'a> {
     /// Feature matches by problem, once they are known.
     pub(super) matches: Vec<Option<usize>>,
     /// What posescope's own methods answered to each problem, where another system's pose was compared with that.
-    pub(super) own: Vec<Option<Arc<OwnAnswers>>>,
+    pub(super) own: Vec<BTreeMap<Method, Arc<OneAnswer>>>,
     /// What each method made of each problem.
     pub(super) candidates: BTreeMap<Method, Vec<Option<MethodOutcome>>>,
 }
@@ -93,6 +90,11 @@ pub(super) struct Answer {
 }
 
 impl QueryWork<'_> {
+    /// The truth that measures a method's poses. Nothing measures the truth itself.
+    pub(super) fn truth_for(&self, method: Method) -> Option<&Pose> {
+        self.truth.as_ref().filter(|_| method != Foreign::TRUTH)
+    }
+
     /// How far the poses of the other methods that solved the problem are from this one.
     pub(super) fn agreement(&self, problem: usize, method: Method, pose: &Pose) -> Vec<Agreement> {
         let others = self.candidates.keys().copied();
