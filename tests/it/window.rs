@@ -4,13 +4,15 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use egui::{Key, Modifiers};
+use egui::{Key, Modifiers, Role};
 use egui_kittest::Harness;
-use egui_kittest::kittest::Queryable as _;
+use egui_kittest::kittest::{NodeT as _, Queryable as _};
 use posescope::app::{
     App, AppState, CompareMode, KnownResults, Results, SaveTarget, Setup, Tab, ViewName,
 };
+use posescope::diagnosis::Grade;
 use posescope::event::{Event, Stage};
+use posescope::geometry::Pose;
 use posescope::localize::{Localizer, NoObserver, QueryResult, Request};
 use posescope::method::Method;
 use posescope::params::Params;
@@ -272,6 +274,36 @@ fn what_went_wrong_is_explained_at_a_key_and_no_longer_at_the_next() {
     assert_eq!(explanation(&window), None);
 }
 
+/// Walls whose photos nobody has the poses of.
+struct Unmeasured {
+    scene: Walls,
+}
+
+impl Scene for Unmeasured {
+    posescope::inner_scene!(scene: name, frames, intrinsics, time_s, has_cloud, photo, cloud);
+
+    fn pose(&self, _: usize) -> Option<Pose> {
+        None
+    }
+}
+
+#[test]
+fn without_the_truth_its_button_is_off_and_a_key_that_needs_it_says_so() {
+    let is_off = |window: &Harness<'_, App>| {
+        let mut buttons = window.query_all_by_role_and_label(Role::Button, "Truth");
+        buttons.next().expect("a button").accesskit_node().is_disabled()
+    };
+    let mut setup = setup();
+    assert!(!is_off(&finished(setup.clone())));
+    setup.queries = Arc::new(Unmeasured { scene: Walls::new() });
+    let mut window = finished(setup);
+    assert!(is_off(&window));
+    press(&mut window, Modifiers::NONE, Key::E);
+    assert!(is_said(&window, "is judged by the truth, which is not known here"));
+    assert_eq!(app(&window).setup.task.protocol.explain, 0);
+    assert!(results(&window).iter().all(|result| result.grade != Grade::Right));
+}
+
 #[test]
 fn the_filter_takes_the_keyboard_once_and_lets_it_go() {
     let mut window = window(setup());
@@ -429,6 +461,37 @@ fn the_next_failure_is_found_once_all_queries_were_run() {
     assert_eq!(app(&window).setup.query, GREY);
     run_until_idle(&mut window);
     press(&mut window, Modifiers::NONE, Key::K);
+    assert_eq!(app(&window).setup.query, 2);
+}
+
+#[test]
+fn a_bar_filters_the_batch_whose_rows_and_failures_keys_go_through() {
+    let mut window = finished(setup());
+    send(&mut window, |app| app.act("Run all queries, or stop"));
+    wait(&mut window, |app| app.app_state().results.len() == 3);
+    press(&mut window, Modifiers::NONE, Key::F4);
+    let click_bar = |window: &mut Harness<'_, App>| {
+        window.query_all_by_label_contains("fb: ").next().expect("a bar").click();
+        window.run_steps(3);
+    };
+    click_bar(&mut window);
+    assert_eq!(app(&window).options.results_filter, "method = fb");
+    let shown = |window: &Harness<'_, App>| {
+        let row = app(window).options.selected_row.expect("a row");
+        (row.query, app(window).results[&row.query][row.place].method)
+    };
+    for query in [1, 2, GREY, GREY] {
+        press(&mut window, Modifiers::NONE, Key::ArrowDown);
+        assert_eq!(shown(&window), (query, Method::FB));
+    }
+    press(&mut window, Modifiers::NONE, Key::ArrowUp);
+    assert_eq!(shown(&window), (2, Method::FB));
+    click_bar(&mut window);
+    assert_eq!(app(&window).options.results_filter, "");
+    // What the filter hides is no next failure.
+    send(&mut window, |app| app.app_state_mut().options.results_filter = "grade = right".into());
+    press(&mut window, Modifiers::NONE, Key::N);
+    assert!(is_said(&window, "No result that the filter shows is known to be wrong"));
     assert_eq!(app(&window).setup.query, 2);
 }
 

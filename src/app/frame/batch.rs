@@ -41,6 +41,9 @@ pub(crate) fn left(ui: &mut Ui, context: &ViewContext<'_>, panes: &mut Panes) {
             .on_hover_text(help)
             .sends(context, const { Action::named("Run all queries, or stop") }.run);
     });
+    for remark in &overview.remarks {
+        ui.label(remark);
+    }
     ui.add_space(4.0);
     let rows = overview.bars.len().max(overview.causes.len()).min(MAX);
     let (area, _) =

@@ -11,22 +11,38 @@ use crate::app::action::{Action, button, toggle};
 use crate::app::memo::Memo;
 use crate::app::text_field::text_field;
 use crate::app::{App, ResultRow, Sends, ViewContext, theme};
-use crate::measure::{Field, Order, verdict_name};
+use crate::measure::{Field, Order, Overview, verdict_name};
 use crate::method::Method;
 
-/// The columns of the table.
-const COLUMNS: [&Field; 10] = [
+/// All columns of the table.
+const COLUMNS: [&Field; 13] = [
     Field::named("query"),
     Field::named("method"),
     Field::named("grade"),
     Field::named("error"),
+    Field::named("opinion"),
+    Field::named("off"),
     Field::named("code"),
     Field::named("cause"),
     Field::named("rotation"),
+    Field::named("turned"),
     Field::named("start"),
     Field::named("probability"),
     Field::named("reference"),
 ];
+
+/// The columns that have any value: those of errors need the truth, and those of opinions another system.
+fn columns(overview: &Overview) -> Vec<&'static Field> {
+    let bars = &overview.bars;
+    let has_truth = bars.iter().any(|bar| bar.median_m.is_some());
+    let has_opinions = bars.iter().any(|bar| bar.opinions.iter().any(|count| *count > 0));
+    let has_values = |field: &&Field| match field.name {
+        "error" | "rotation" | "start" => has_truth,
+        "opinion" | "off" | "turned" => has_opinions,
+        _ => true,
+    };
+    COLUMNS.into_iter().filter(has_values).collect()
+}
 
 /// Width of the column with the verdicts of the results A \[points\].
 const WAS: f32 = 40.0;
@@ -78,12 +94,13 @@ impl View for BatchView {
             (rows, words)
         });
         ui.weak(words);
+        let columns = columns(&context.state.results.overview(context.options.shows_truth));
         let (height, has_before) =
             (ui.spacing().interact_size.y, context.state.results.has_before());
         // The names of the columns move sideways with the rows, and stay above them.
         ScrollArea::horizontal().auto_shrink(false).show(ui, |ui| {
             let mut table = TableBuilder::new(ui).striped(true).sense(Sense::click());
-            for field in COLUMNS {
+            for field in &columns {
                 table = table.column(match field.name {
                     // It has the rest of the room.
                     "cause" => Column::remainder().at_least(field.width).clip(true),
@@ -94,7 +111,7 @@ impl View for BatchView {
                 table = table.column(Column::exact(WAS));
             }
             let table = table.header(height, |mut names| {
-                for field in COLUMNS {
+                for field in &columns {
                     names.col(|ui| header(ui, context, field, &mut order));
                 }
                 if has_before {
@@ -107,7 +124,7 @@ impl View for BatchView {
             table.body(|body| {
                 body.rows(height, rows.len(), |mut row| {
                     let at = rows[row.index()];
-                    draw(&mut row, context, at);
+                    draw(&mut row, context, &columns, at);
                 });
             });
         });
@@ -135,17 +152,21 @@ fn changes(ui: &mut Ui, context: &ViewContext<'_>) {
     });
 }
 
-/// How many results are shown, and how many of each method are wrong or missing.
+/// How many results are shown, and how many of each method are to be looked at first.
 fn words(context: &ViewContext<'_>, rows: &[ResultRow]) -> String {
     let results: usize = context.state.results.values().map(Vec::len).sum();
     let mut failed: BTreeMap<Method, usize> = BTreeMap::new();
+    let mut contradicted = "";
     for result in rows.iter().filter_map(|row| context.state.results.result(*row)) {
-        let is_failed = result.grade.is_failure();
-        *failed.entry(result.method).or_default() += usize::from(is_failed);
+        *failed.entry(result.method).or_default() += usize::from(result.is_suspect());
+        if result.is_suspect() && !result.grade.is_failure() {
+            contradicted = ", contradicted";
+        }
     }
     let failed: Vec<String> =
         failed.iter().map(|(method, count)| format!("{} {count}", method.label())).collect();
-    format!("{} of {results} results; wrong or without a pose: {}", rows.len(), failed.join(", "))
+    let failed = failed.join(", ");
+    format!("{} of {results} results; wrong{contradicted} or without a pose: {failed}", rows.len())
 }
 
 /// The name of a column by which conditions call it, with its unit.
@@ -176,7 +197,12 @@ fn header(
     }
 }
 
-fn draw(row: &mut TableRow<'_, '_>, context: &ViewContext<'_>, at: ResultRow) {
+fn draw(
+    row: &mut TableRow<'_, '_>,
+    context: &ViewContext<'_>,
+    columns: &[&'static Field],
+    at: ResultRow,
+) {
     let Some(result) = context.state.results.result(at) else {
         return;
     };
@@ -185,7 +211,7 @@ fn draw(row: &mut TableRow<'_, '_>, context: &ViewContext<'_>, at: ResultRow) {
     let label = |ui: &mut Ui, text: RichText| {
         ui.add(egui::Label::new(text).truncate().selectable(false));
     };
-    for field in COLUMNS {
+    for field in columns {
         row.col(|ui| {
             let (grade, visuals) = (result.grade, ui.visuals());
             let text = match field.name {
