@@ -113,8 +113,8 @@ fn evidence(found: &Systematic) -> Value {
     let of_mistake = |mistake: &Mistake| match mistake {
         Mistake::Reading(reading) => json!({ "reading": reading }),
         Mistake::Lines(by) => json!({ "lines": by }),
-        Mistake::Mounting { shift_m, turn_deg } => {
-            json!({ "camera": { "shift_m": shift_m, "turn_deg": turn_deg } })
+        Mistake::Mounting { shift_m, turn_deg, varies } => {
+            json!({ "camera": { "shift_m": shift_m, "turn_deg": turn_deg, "varies": varies } })
         }
         Mistake::World { scale, turn_deg, shift_m } => {
             json!({ "world": { "scale": scale, "turn_deg": turn_deg, "shift_m": shift_m } })

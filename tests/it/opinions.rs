@@ -2,17 +2,19 @@
 
 use std::fs;
 use std::path::Path;
+use std::sync::Arc;
 
 use posescope::diagnosis::{Code, Grade};
-use posescope::foreign::Foreign;
+use posescope::features::{FoundMatches, PairMatches};
+use posescope::foreign::{Foreign, MatchSource};
 use posescope::fusion::Fusion;
 use posescope::geometry::Pose;
 use posescope::localize::{LocalizeError, Localizer, NoObserver, QueryResult, Request};
 use posescope::method::Method;
 use posescope::opinion::{Opinion, Standing};
 use posescope::params::Params;
-use posescope::scene::Scene;
 use posescope::scene::street::{Size, Street};
+use posescope::scene::{Scene, SceneError};
 use tempfile::TempDir;
 
 use crate::binary::{Said, command_in, has, text, write};
@@ -135,6 +137,61 @@ fn a_truth_that_a_confirmed_pose_contradicts_is_suspect() {
     let [estimate, stated] = results(0.0);
     assert_eq!((estimate.grade, estimate.diagnosis.len()), (Grade::Right, 0));
     assert_eq!(opinion(&stated).standing, Standing::Confirmed);
+}
+
+/// Matches as if the photo had been taken at a wrong pose.
+struct Misleading {
+    query_from_reference: Pose,
+}
+
+impl MatchSource for Misleading {
+    fn matches(&self, _: &str, reference: &str) -> Result<Option<PairMatches>, SceneError> {
+        let street = street();
+        let camera = street.intrinsics(0);
+        let scene: &dyn Scene = &street;
+        let cloud = scene.cloud(scene.find(reference)?)?;
+        let sees = |point: &nalgebra::Point3<f64>| {
+            let at = camera.project(point)?;
+            let is_inside = at.x > 0.0 && at.y > 0.0;
+            let is_within =
+                at.x < f64::from(camera.width - 1) && at.y < f64::from(camera.height - 1);
+            (is_inside && is_within).then_some([at.x as f32, at.y as f32])
+        };
+        let points = cloud.points.iter().step_by(97).map(|point| point.cast::<f64>());
+        let seen = points
+            .filter_map(|point| Some((sees(&(self.query_from_reference * point))?, sees(&point)?)));
+        let (query, reference): (Vec<_>, Vec<_>) = seen.take(300).unzip();
+        let matched: Vec<Option<usize>> = (0..query.len()).map(Some).collect();
+        Ok(Some(PairMatches::Found(FoundMatches::new(&query, &reference, &matched))))
+    }
+}
+
+#[test]
+fn matches_of_the_other_system_confirm_no_pose_that_they_lead_to() {
+    let street = street();
+    let other = Method::called("other").expect("a plain name");
+    let pose = |frame: usize| street.pose(frame).expect("a pose");
+    let wrong = pose(70) * Pose::translation(3.0, 0.0, 0.0);
+    let matches = Misleading { query_from_reference: wrong.inverse() * pose(66) };
+    let foreign = Foreign::default()
+        .with_estimates(other, [(street.frames()[70].clone(), wrong)].into())
+        .with_matches(Arc::new(matches));
+    let hidden = Hidden { scene: &street, shows_truth: false };
+    let params = Params::default();
+    let localizer = Localizer::new(&street, &hidden, &params, 0).with_foreign(foreign);
+    let references = vec![66].into();
+    let request = Request { radius_m: 12.0, references, fusions: vec![], setting: None };
+    let mut results = Vec::new();
+    let keep = |result: QueryResult, _| {
+        results.push(result);
+        Ok::<(), LocalizeError>(())
+    };
+    let methods = [Method::FB, other];
+    localizer.localize(0, 70, &[request], &methods, &mut NoObserver, keep).expect("localised");
+    let [by_matches, given]: [QueryResult; 2] = results.try_into().expect("two");
+    let found = by_matches.pose.expect("the matches agree").to_pose().expect("a pose");
+    assert!((found.translation.vector - wrong.translation.vector).norm() < 0.3);
+    assert_eq!(opinion(&given).standing, Standing::Contradicted, "{}", opinion(&given).because);
 }
 
 #[test]

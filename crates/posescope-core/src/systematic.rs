@@ -44,6 +44,8 @@ pub enum Mistake {
         shift_m: [f64; 3],
         /// The turn.
         turn_deg: [f64; 3],
+        /// Whether both are so on average only, as with another focal length, which shifts by a share of the depths.
+        varies: bool,
     },
     /// Their world is another.
     World {
@@ -96,6 +98,9 @@ const LESS: f64 = 3.0;
 const LESS_BY_FREEDOM: f64 = 2.0;
 const WORTH_IT: f64 = 0.75;
 
+/// How far poses may be from what a mistake of the camera makes of them on average, as a share of the mistake.
+const ABOUT: f64 = 0.4;
+
 /// What is near.
 pub(crate) struct Nearness {
     metres: f64,
@@ -103,6 +108,19 @@ pub(crate) struct Nearness {
 }
 
 impl Nearness {
+    fn of_right(right: Tolerance) -> Self {
+        let radians = NEAR * right.rotation_deg.to_radians();
+        Self { metres: NEAR * right.translation_m, radians }
+    }
+
+    /// What is near where the camera is shifted and turned so far on average; `None` where that is not far.
+    fn about(self, given_from_right: &Pose) -> Option<Self> {
+        let shift = ABOUT * given_from_right.translation.vector.norm();
+        let turn = ABOUT * given_from_right.rotation.angle();
+        (shift > self.metres || turn > self.radians)
+            .then(|| Self { metres: self.metres.max(shift), radians: self.radians.max(turn) })
+    }
+
     /// How far apart two poses are, in units of near.
     fn of(&self, one: &Pose, other: &Pose) -> f64 {
         let metres = (one.translation.vector - other.translation.vector).norm();
@@ -161,20 +179,37 @@ pub fn systematic(queries: &[Answered], right: Tolerance) -> Option<Systematic> 
     if both.len() < FEWEST {
         return None;
     }
-    let nearness = Nearness {
-        metres: NEAR * right.translation_m,
-        radians: NEAR * right.rotation_deg.to_radians(),
-    };
+    let exact = || Nearness::of_right(right);
+    found_within(queries, &both, right, &exact()).or_else(|| {
+        let on_average = exact().about(&model::shift_and_turn(&both)?)?;
+        let about = found_within(queries, &both, right, &on_average)?;
+        match about.mistake {
+            Mistake::Mounting { shift_m, turn_deg, .. } => {
+                let mistake = Mistake::Mounting { shift_m, turn_deg, varies: true };
+                Some(Systematic { mistake, or: None, ..about })
+            }
+            _ => None,
+        }
+    })
+}
+
+/// The mistake that brings poses near.
+fn found_within(
+    queries: &[Answered],
+    both: &[Both],
+    right: Tolerance,
+    nearness: &Nearness,
+) -> Option<Systematic> {
     let half =
         |parity: usize| -> Vec<Both> { both.iter().skip(parity).step_by(2).copied().collect() };
     let (fitted_to, tested_on) = (half(0), half(1));
-    let score = |model: &Model| Score::of(model, queries, &tested_on, &nearness);
+    let score = |model: &Model| Score::of(model, queries, &tested_on, nearness);
     let as_given = score(&Model::AsGiven);
-    let models = Model::fitted(queries, &fitted_to, &nearness);
+    let models = Model::fitted(queries, &fitted_to, nearness);
     let mut scored: Vec<(u32, Score, Model)> =
         models.into_iter().map(|(freedom, model)| (freedom, score(&model), model)).collect();
     scored.sort_by_key(|(freedom, ..)| *freedom);
-    scored.retain(|(_, score, model)| score.explains(as_given) && model.is_telling(&both));
+    scored.retain(|(_, score, model)| score.explains(as_given) && model.is_telling(both));
     let mut best: Option<usize> = None;
     for at in 0..scored.len() {
         let Some(known) = best else {
@@ -193,13 +228,13 @@ pub fn systematic(queries: &[Answered], right: Tolerance) -> Option<Systematic> 
     }
     let best = best?;
     let (freedom, best_score, _) = &scored[best];
-    let mistake = scored[best].2.mistake(&both)?;
+    let mistake = scored[best].2.mistake(both)?;
     // The least free of them.
     let rivals = scored.iter().filter(|(other_freedom, score, _)| {
         *other_freedom <= freedom + 3 && score.is_as_good_as(*best_score)
     });
     let or = rivals
-        .filter_map(|(_, _, model)| model.mistake(&both))
+        .filter_map(|(_, _, model)| model.mistake(both))
         .find(|other| !other.is_kin_of(&mistake));
     let model = &scored[best].2;
     let errors = |model: &Model| -> Vec<PoseError> {
@@ -246,6 +281,7 @@ impl Model {
                 Mistake::Mounting {
                     shift_m: right_from_given.translation.vector.into(),
                     turn_deg: turn.into(),
+                    varies: false,
                 }
             }
             Self::World { scale, pose } => {
@@ -309,13 +345,15 @@ impl Mistake {
                     if lines == 1 { "one" } else { "ones" }
                 )
             }
-            Self::Mounting { shift_m, turn_deg } => {
+            Self::Mounting { shift_m, turn_deg, varies } => {
+                let about = if *varies { "about " } else { "" };
                 let shift = Vector3::from(*shift_m).norm();
                 let turn = Vector3::from(*turn_deg).norm();
-                let of_shift =
-                    || format!("shifted by {shift:.2} m ({})", directions::of_shift(*shift_m));
+                let of_shift = || {
+                    format!("shifted by {about}{shift:.2} m ({})", directions::of_shift(*shift_m))
+                };
                 let of_turn =
-                    || format!("turned by {turn:.2}° ({})", directions::of_turn(*turn_deg));
+                    || format!("turned by {about}{turn:.2}° ({})", directions::of_turn(*turn_deg));
                 match (shift > 0.0, turn > 0.0) {
                     (true, false) => format!("are {} in the camera's frame", of_shift()),
                     (false, _) => format!("are {} in the camera's frame", of_turn()),
@@ -351,7 +389,10 @@ impl Mistake {
         match self {
             Self::Reading(_) => "write the poses in the convention of the map",
             Self::Lines(_) => "check which line belongs to which photo",
-            Self::Mounting { .. } => {
+            Self::Mounting { varies: true, .. } => {
+                "the size differs from pose to pose: check the camera's focal length and centre, and the size of the photos"
+            }
+            Self::Mounting { varies: false, .. } => {
                 "check what the poses are of (a body, another camera, an antenna), and the camera's focal length and \
                  centre"
             }

@@ -126,18 +126,22 @@ fn delay(queries: &[Answered], to: &[Both], nearness: &Nearness) -> Option<Model
 
 /// A shift of the camera, a turn of it, and both.
 fn mounting(to: &[Both]) -> Vec<(u32, Model)> {
+    let Some(both) = shift_and_turn(to) else { return Vec::new() };
+    let model = |shift: Translation3<f64>, turn| Model::Mounting(Pose::from_parts(shift, turn));
+    vec![
+        (3, model(both.translation, UnitQuaternion::identity())),
+        (3, model(Translation3::identity(), both.rotation)),
+        (6, Model::Mounting(both)),
+    ]
+}
+
+/// The middle of where the right cameras are in the frames of the given ones.
+pub(super) fn shift_and_turn(to: &[Both]) -> Option<Pose> {
     let turned: Vec<Pose> = to.iter().map(|both| both.given.inverse() * both.own).collect();
     let shifts: Vec<Vector3<f64>> = turned.iter().map(|pose| pose.translation.vector).collect();
     let turns: Vec<UnitQuaternion<f64>> = turned.iter().map(|pose| pose.rotation).collect();
-    let (Some(shift), Some(turn)) = (middle_of(&shifts), middle_turn(&turns)) else {
-        return Vec::new();
-    };
-    let model = |shift: Vector3<f64>, turn| Model::Mounting(Pose::from_parts(shift.into(), turn));
-    vec![
-        (3, model(shift, UnitQuaternion::identity())),
-        (3, model(Vector3::zeros(), turn)),
-        (6, model(shift, turn)),
-    ]
+    let shift = middle_of(&shifts)?;
+    Some(Pose::from_parts(shift.into(), middle_turn(&turns)?))
 }
 
 /// The least-squares motion, or similarity, from their world to the map's, with little weight for what is far off.

@@ -93,9 +93,28 @@ fn other_conventions_are_named() {
 }
 
 #[test]
+fn another_focal_length_shifts_poses_by_a_share_of_the_depths() {
+    // What the cameras see is 7 to 15 m away.
+    let back = |at: usize| 0.1 * (11.0 + 4.0 * (at as f64 * 1.7).sin());
+    let shifted = |poses: &[Pose], at: usize| poses[at] * Pose::translation(0.0, 0.0, -back(at));
+    let found_one = found(shifted, 4).expect("a mistake");
+    let Mistake::Mounting { shift_m, varies: true, .. } = found_one.mistake.clone() else {
+        panic!("{found_one:?}");
+    };
+    assert!((shift_m[2] + 1.1).abs() < 0.25, "{shift_m:?}");
+    assert!(found_one.mistake.words().contains("about"), "{}", found_one.mistake.words());
+    // Errors of that size in all directions are no mistake of the camera.
+    let scattered = |poses: &[Pose], at: usize| {
+        let along = at as f64 * 2.399;
+        poses[at] * Pose::translation(1.2 * along.cos(), 0.2, 1.2 * along.sin())
+    };
+    assert_eq!(found(scattered, 5), None);
+}
+
+#[test]
 fn a_shifted_or_turned_camera_has_its_size() {
     let arm = found_of(|pose| pose * Pose::translation(0.3, -1.2, 0.6), 1).expect("a mistake");
-    let Mistake::Mounting { shift_m, turn_deg } = arm.mistake.clone() else {
+    let Mistake::Mounting { shift_m, turn_deg, varies: false } = arm.mistake.clone() else {
         panic!("{arm:?}");
     };
     assert!(is_close(shift_m[0], 0.3) && is_close(shift_m[1], -1.2) && is_close(shift_m[2], 0.6));
@@ -105,7 +124,7 @@ fn a_shifted_or_turned_camera_has_its_size() {
 
     let turn = turned(Vector3::y(), 7.0);
     let turn = found_of(|pose| pose * turn, 2).expect("a mistake");
-    let Mistake::Mounting { shift_m, turn_deg } = turn.mistake.clone() else {
+    let Mistake::Mounting { shift_m, turn_deg, varies: false } = turn.mistake.clone() else {
         panic!("{turn:?}");
     };
     assert_eq!(shift_m, [0.0; 3]);

@@ -89,13 +89,16 @@ impl Localizer<'_> {
         timings: &mut StageTimings,
         observer: &mut dyn LocalizeObserver,
     ) -> Result<OneAnswer, Cancelled> {
-        let solved = &work.problems[problem];
+        // Whoever trusts the matches of another system repeats its mistakes.
+        let solved = Problem { matches: None, ..work.problems[problem].clone() };
         // What the run asks for anyway is not done twice.
-        let (outcome, evidence) = match work.candidate(problem, method) {
+        let has_own_matches = work.problems[problem].matches.is_none();
+        let known = work.candidate(problem, method).filter(|_| has_own_matches);
+        let (outcome, evidence) = match known {
             Some(known) => (known.estimated.clone(), known.evidence.clone()),
-            None => self.asked(solved, method, timings, observer)?,
+            None => self.asked(&solved, method, timings, observer)?,
         };
-        let subject = Subject::new(solved, method, self.params, &outcome, &evidence)
+        let subject = Subject::new(&solved, method, self.params, &outcome, &evidence)
             .against(None, self.tolerance);
         let found = match &outcome.pose {
             Ok(pose) => Ok(OwnAnswer {
