@@ -284,8 +284,8 @@ impl AppState {
         }
     }
 
-    /// Goes to the first method that is wrong and shows why; where all are right, to the end of the first. The fused
-    /// pose of a method answers for its references.
+    /// Goes to the first method that is wrong or contradicted and shows why; where all are right, to the end of the first.
+    /// The fused pose of a method answers for its references.
     fn go_to_cause(&mut self) {
         let run = self.session.run();
         let has_result = |part: Part| run.span_of(part).is_some_and(|span| span.result.is_some());
@@ -296,7 +296,7 @@ impl AppState {
         let results = run.spans().iter().filter(answers);
         let mut results = results.filter_map(|span| Some((span.part, span.result.as_ref()?)));
         let has_failed = |(_, result): &(Part, &QueryResult)| {
-            result.grade_shown(self.options.shows_truth).is_failure()
+            result.shown(self.options.shows_truth).is_suspect()
         };
         let failed = results.clone().find(has_failed).map(|(part, _)| (part, true));
         let first = results.next().map(|(part, _)| (part, false));

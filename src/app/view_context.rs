@@ -95,6 +95,12 @@ impl<'a> ViewContext<'a> {
         self.run.truth().filter(|_| self.options.shows_truth)
     }
 
+    /// Where the photos agree, if a second opinion contradicts the pose at whose end the cursor is.
+    pub fn better_pose(&self) -> Option<Pose> {
+        let result = self.state.outcome(self.span()?)?;
+        result.opinion?.better?.to_pose()
+    }
+
     /// The latest event of a type at or before the cursor, reported by the estimator there.
     pub fn latest<E: DebugEvent + 'static>(&self) -> Option<&'a E> {
         self.run.latest(self.cursor)

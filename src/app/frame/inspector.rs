@@ -14,8 +14,10 @@ use crate::app::theme;
 use crate::app::view_options::Tab;
 use crate::app::{Sends, ViewContext, ViewName};
 use crate::diagnosis::{Code, Confidence, Diagnosis, Grade, confidence};
-use crate::localize::{Explanation, Helped, QueryResult};
-use crate::session::Run;
+use crate::geometry::PoseError;
+use crate::localize::{Explanation, Helped, PoseReport, QueryResult};
+use crate::method::Method;
+use crate::session::{Part, Run};
 
 pub(crate) fn ui(ui: &mut Ui, context: &ViewContext<'_>, panes: &mut Panes) {
     let tab = context.options.tab;
@@ -106,17 +108,42 @@ fn why(ui: &mut Ui, context: &ViewContext<'_>) {
             "Posescope localises the query itself, without the truth, and compares the poses",
         );
     }
-    if !result.agreement.is_empty() {
-        heading(ui, "Poses of the other methods");
-        for one in &result.agreement {
-            let words = format!(
-                "{}: {:.2} m and {:.1}° away",
-                one.method.label(),
-                one.translation_m,
-                one.rotation_deg
-            );
-            ui.label(result.unit.words(&words));
+    if let Some(pose) = &result.pose {
+        if result.grade == Grade::Unmeasured {
+            heading(ui, "Pose");
+            let ([x, y, z], [qx, qy, qz, qw]) = (pose.position_m, pose.quaternion_xyzw);
+            ui.label(result.unit.words(&format!("x {x:.3}, y {y:.3}, z {z:.3} m")))
+                .on_hover_text("The camera's position in the world");
+            ui.weak(format!("quaternion x y z w: {qx:.5} {qy:.5} {qz:.5} {qw:.5}"));
         }
+        others(ui, context, span.part, pose);
+    }
+}
+
+/// How far the poses of the other methods are, whichever ran first.
+fn others(ui: &mut Ui, context: &ViewContext<'_>, part: Part, pose: &PoseReport) {
+    let is_beside = |other: Part| match (part, other) {
+        (Part::Reference(own, here), Part::Reference(method, there)) => {
+            own != method && here == there
+        }
+        (Part::Fusion(own), Part::Fusion(method)) => own != method,
+        _ => false,
+    };
+    let beside = context.run.spans().iter().filter(|span| is_beside(span.part));
+    let errors = beside.filter_map(|span| {
+        let result = span.result.as_ref()?;
+        let other = result.pose.as_ref()?.to_pose()?;
+        Some((result.method, PoseError::between(&other, &pose.to_pose()?)))
+    });
+    let errors: Vec<(Method, PoseError)> = errors.collect();
+    if errors.is_empty() {
+        return;
+    }
+    heading(ui, "Poses of the other methods");
+    for (method, error) in errors {
+        let (metres, degrees) = (error.translation_m, error.rotation_deg);
+        let words = format!("{}: {metres:.2} m and {degrees:.1}° away", method.label());
+        ui.label(context.in_unit(&words));
     }
 }
 
@@ -256,7 +283,7 @@ pub(crate) fn capital(text: &str) -> String {
 
 /// What made the result right, in groups; what may, where nothing was tried.
 fn helped(ui: &mut Ui, context: &ViewContext<'_>, result: &QueryResult, primary: &Diagnosis) {
-    if !result.grade.is_failure() {
+    if !result.is_suspect() {
         return;
     }
     let Some(explanation) = &result.explanation else {

@@ -128,7 +128,7 @@ fn why(ui: &mut Ui, context: &ViewContext<'_>, row: &Row<'_>, size: egui::Vec2, 
     let Some(span) = row.span else { return };
     let result = context.state.outcome(span).filter(|result| result.grade != Grade::Right);
     let Some(result) = result else { return };
-    let caption = if result.grade.is_failure() { "why" } else { "what decided" };
+    let caption = if result.is_suspect() { "why" } else { "what decided" };
     let picture = context.state.shown_pictures().proof(span.part).map(|picture| {
         let texture = proof::texture(ui, &context.state.textures, &picture.large);
         (texture.id(), texture.size_vec2())

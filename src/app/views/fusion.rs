@@ -103,7 +103,7 @@ fn table(ui: &mut Ui, context: &ViewContext<'_>, fused: &[&ReferencesFused]) {
 }
 
 /// Seen from above, in the frame of the first reference: references, what each gives alone (larger with more
-/// weight), the fused pose, the truth.
+/// weight), the fused pose, where the photos agree with a contradicted query, the truth.
 fn map(ui: &mut Ui, context: &ViewContext<'_>, fused: &[&ReferencesFused], height: f32) {
     let problems = context.run.problems();
     let Some(first) = problems.first() else { return };
@@ -149,6 +149,9 @@ fn map(ui: &mut Ui, context: &ViewContext<'_>, fused: &[&ReferencesFused], heigh
             if let Some(pose) = &present.pose {
                 let name = format!("◇ fused ({})", present.fusion);
                 mark(plot, &name, pose, result(context, pose), 10.0);
+            }
+            if let Some(better) = context.better_pose() {
+                mark(plot, "● where the photos agree", &better, Thing::Dot(palette::TRUTH), 7.0);
             }
             if let Some(truth) = context.truth() {
                 mark(plot, "+ truth", truth, Thing::Truth, 7.0);

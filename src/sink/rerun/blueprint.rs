@@ -81,7 +81,7 @@ pub(super) fn recorded_with(method: Method) -> Vec<Method> {
 /// Whether a result is wrong or missing, or has a failure verdict.
 pub(super) fn is_wrong(result: &QueryResult) -> bool {
     let mut verdicts = result.diagnosis.iter();
-    result.grade.is_failure() || verdicts.any(|one| one.code.is_failure())
+    result.is_suspect() || verdicts.any(|one| one.code.is_failure())
 }
 
 /// Sends the layout for a run.

@@ -244,8 +244,7 @@ impl Recording {
 
     fn result_in_words(&mut self, result: &QueryResult) {
         let outcome = result.words();
-        let level =
-            if !result.grade.is_failure() { TextLogLevel::INFO } else { TextLogLevel::WARN };
+        let level = if result.is_suspect() { TextLogLevel::WARN } else { TextLogLevel::INFO };
         self.say(&format!("{} result: {outcome}", result.method), level);
     }
 

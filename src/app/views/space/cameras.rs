@@ -22,6 +22,8 @@ use crate::proof::Thing;
 pub(super) enum CameraKind {
     Reference,
     Truth,
+    /// Where the photos agree, for a pose of another system that is contradicted.
+    Better,
     Estimate(Method),
     /// The best pose so far of a method that is not finished.
     BestSoFar(Method),
@@ -37,6 +39,7 @@ impl CameraKind {
         match self {
             Self::Reference => "Reference".to_owned(),
             Self::Truth => "Truth".to_owned(),
+            Self::Better => "Where the photos agree".to_owned(),
             Self::Estimate(method) => method.label(),
             Self::BestSoFar(method) => format!("{}, best so far", method.label()),
             Self::Hand => "In hand".to_owned(),
@@ -48,7 +51,7 @@ impl CameraKind {
     fn look(self) -> (f64, f32) {
         match self {
             Self::Reference | Self::Hand => (1.0, 2.5),
-            Self::Truth => (1.24, 2.5),
+            Self::Truth | Self::Better => (1.24, 2.5),
             Self::Estimate(method) => (1.0 + 0.08 * rank(method) as f64, 2.5),
             Self::BestSoFar(_) | Self::Pointer => (0.7, 1.0),
         }
@@ -131,6 +134,7 @@ pub(super) fn cameras(context: &ViewContext<'_>, geometry: &SceneGeometry) -> Ve
         let thing = match kind {
             CameraKind::Reference => Thing::Reference,
             CameraKind::Truth => Thing::Truth,
+            CameraKind::Better => Thing::Dot(palette::TRUTH),
             CameraKind::Estimate(_) => legend::result(context, &world),
             CameraKind::BestSoFar(_) => Thing::Result(palette::NO_POSE),
             CameraKind::Hand | CameraKind::Pointer => Thing::Dot(palette::UNDECIDED),
@@ -151,6 +155,7 @@ pub(super) fn cameras(context: &ViewContext<'_>, geometry: &SceneGeometry) -> Ve
     };
     let mut all = vec![camera(CameraKind::Reference, *problem.reference().world_from_camera())];
     all.extend(truth.map(|pose| camera(CameraKind::Truth, *pose)));
+    all.extend(context.better_pose().map(|pose| camera(CameraKind::Better, pose)));
     for &method in &context.setup.task.protocol.methods {
         if let Some(pose) = estimate(context, method) {
             all.push(camera(CameraKind::Estimate(method), pose));
