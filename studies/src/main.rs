@@ -27,6 +27,7 @@ mod pose_files;
 mod real_pairs;
 mod same_results;
 mod scene_statistics;
+mod signals;
 mod truth;
 
 use std::process::ExitCode;

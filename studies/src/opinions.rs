@@ -8,6 +8,7 @@ use posescope::localize::{LocalizeError, Localizer, NoObserver, Request};
 use posescope::method::Method;
 use posescope::opinion::{Opinion, Standing};
 use posescope::params::Params;
+use posescope::problem::Problem;
 use posescope::scene::street::{Condition, Size, Traversal, WORLD_SEED};
 use posescope::scene::{self, Scene, SceneSize};
 use rand::seq::IndexedRandom as _;
@@ -19,6 +20,7 @@ use crate::frames::{Frame, Frames};
 use crate::numbers::{at_places, median, percent, print_table};
 use crate::places::nearest;
 use crate::real_pairs;
+use crate::signals::{Matched, SIGNALS, print_curves};
 
 /// What is thought of poses that are right and of poses that are not?
 ///
@@ -81,6 +83,8 @@ struct Judged {
     error: PoseError,
     /// The length that stands for a metre.
     metre: f64,
+    /// What other signals say of the pose.
+    signals: [f64; SIGNALS.len()],
 }
 
 pub fn run(options: &Options) -> Result<(), Failure> {
@@ -204,6 +208,8 @@ fn judged(pair: &Pair, seed: usize) -> Result<Vec<Judged>, Failure> {
     let localizer = Localizer::new(&references, &queries, &pair.params, seed as u64)
         .with_tolerance(Tolerance::default().at(pair.params.scale))
         .with_foreign(foreign);
+    let problem = Problem::new(queries.query(0)?, references.reference(0)?, pair.radius_m)?;
+    let matched = Matched::of(&problem, &pair.params)?;
     let request = Request {
         radius_m: pair.radius_m,
         references: vec![0].into(),
@@ -218,7 +224,8 @@ fn judged(pair: &Pair, seed: usize) -> Result<Vec<Judged>, Failure> {
     let named = poses.into_iter().zip(opinions);
     let judged = named.filter_map(|((kind, pose), opinion)| {
         let error = PoseError::between(&truth, &pose);
-        Some(Judged { group: pair.group.clone(), kind, opinion: opinion?, error, metre })
+        let signals = matched.signals(&pose);
+        Some(Judged { group: pair.group.clone(), kind, opinion: opinion?, error, metre, signals })
     });
     Ok(judged.collect())
 }
@@ -279,6 +286,13 @@ fn report(judged: &[Judged], prints_misses: bool) {
             &rows,
         );
     }
+    println!("\n## Other signals: wrong poses that are named, by the rate of false alarms\n");
+    let cases = judged.iter().filter(|one| one.is_right() || one.is_wrong()).map(|one| {
+        let doubt = 1.0 - one.opinion.probability;
+        (one.is_wrong(), [&[doubt], one.signals.as_slice()].concat())
+    });
+    let names = [&["second opinion"], SIGNALS.as_slice()].concat();
+    print_curves(&names, &cases.collect::<Vec<_>>());
     let is_miss = |one: &&Judged| {
         one.is_right() && one.opinion.standing == Standing::Contradicted
             || one.is_wrong() && one.opinion.standing == Standing::Confirmed
