@@ -344,7 +344,7 @@ impl AppState {
         const KEPT: usize = 5;
         /// Long enough to read two lines \[s\].
         const LASTING_S: f64 = 10.0;
-        /// An error stays longer, because whoever looked away must still find it \[s\].
+        /// An error stays longer, so that a user who looked elsewhere finds it \[s\].
         const ERROR_S: f64 = 60.0;
         let now_s = self.ctx.input(|input| input.time);
         self.notes.push(Note {

@@ -274,7 +274,7 @@ impl Opinion {
     /// How far off the pose is, with the directions that matter.
     fn off(&self) -> Option<String> {
         let (offset, distance, angle) = (self.offset_m?, self.distance_m()?, self.offset_deg?);
-        // The direction of hardly a turn means nothing.
+        // A turn this small has no meaningful direction.
         let turned = self.turned_deg.filter(|_| angle >= 0.1);
         let turned = turned.map(|turned| format!(" ({})", directions::of_turn(turned)));
         Some(format!(

@@ -89,7 +89,7 @@ impl Localizer<'_> {
         timings: &mut StageTimings,
         observer: &mut dyn LocalizeObserver,
     ) -> Result<OneAnswer, Cancelled> {
-        // Whoever trusts the matches of another system repeats its mistakes.
+        // The matches of the other system would repeat its mistakes.
         let solved = Problem { matches: None, ..work.problems[problem].clone() };
         // What the run asks for anyway is not done twice.
         let has_own_matches = work.problems[problem].matches.is_none();
