@@ -36,10 +36,11 @@ const TELLING: f64 = 1.0;
 /// All pairs of other systems that have poses of the same queries.
 pub fn rivals(results: &[&QueryResult]) -> Vec<Rivals> {
     // Other radii and fusions compare the same poses.
-    let mut by_query: BTreeMap<(&Option<String>, &str), BTreeMap<Method, &QueryResult>> =
-        BTreeMap::new();
+    let mut by_query: BTreeMap<(&str, &str), BTreeMap<Method, &QueryResult>> = BTreeMap::new();
     for result in results.iter().filter(|result| estimator::find(result.method).is_none()) {
-        let of_query = by_query.entry((&result.query_scene, &result.query)).or_default();
+        // Frames of two scenes may have one name.
+        let scene = result.query_scene.as_ref().unwrap_or(&result.scene);
+        let of_query = by_query.entry((scene, &result.query)).or_default();
         of_query.entry(result.method).or_insert(result);
     }
     let mut found: BTreeMap<[Method; 2], Rivals> = BTreeMap::new();
@@ -175,6 +176,11 @@ mod tests {
         rows.extend(rows.clone());
         rows.reverse();
         assert_eq!(rivals(&rows), found);
+        // Those of another scene whose frames have the same names count beside them.
+        let others = rows.iter().map(|row| QueryResult { scene: "other".into(), ..(*row).clone() });
+        let others: Vec<QueryResult> = others.collect();
+        let both: Vec<&QueryResult> = rows.iter().copied().chain(&others).collect();
+        assert!(rivals(&both)[0].words().contains("support a in 2 and b in 2; 4 stay open"));
         let alone: Vec<&QueryResult> =
             rows.into_iter().filter(|row| row.method.to_string() == "a").collect();
         assert_eq!(rivals(&alone), []);
