@@ -1,8 +1,9 @@
 //! Sentences for decisions, for logs.
 
+use crate::diagnosis::confidence::percent;
 use crate::event::{
-    CandidatesJudged, Event, MinimumAssessed, Moment, ReferencesFused, ReferencesRanked, Side,
-    Stage, StartsRefined, ViewRendered,
+    CandidatesJudged, Event, MinimumAssessed, Moment, OwnAnswered, ReferencesFused,
+    ReferencesRanked, Side, Stage, StartsRefined, ViewRendered,
 };
 use crate::features::MatchVerdict;
 use crate::fusion::ShareOutcome;
@@ -102,6 +103,10 @@ pub(crate) fn sentence(event: &Event) -> Option<String> {
         ),
         Event::StartsRefined(event) => refined(event)?,
         Event::CandidatesJudged(event) => judged(event),
+        Event::OwnAnswered(event) => own_answer(event),
+        Event::OpinionFormed(event) => {
+            format!("{}. {}", event.opinion.words(), event.opinion.because)
+        }
         Event::ReferencesFused(event) => fused(event),
         Event::ReferencesRanked(event) => ranked(event),
         _ => return None,
@@ -176,6 +181,9 @@ pub(crate) fn about(stage: Stage) -> &'static str {
             "How good is the minimum? It is compared with its rivals and with shuffled pixels."
         }
         Stage::Fuse => "The poses from all references become one.",
+        Stage::Opinion => {
+            "Posescope finds the query itself, and compares its pose with the given one."
+        }
         _ => stage.name(),
     }
 }
@@ -235,6 +243,19 @@ fn judged(event: &CandidatesJudged) -> String {
         event.deviations,
         event.needed
     )
+}
+
+fn own_answer(event: &OwnAnswered) -> String {
+    let (method, reference) = (event.by, &event.from);
+    if event.world_from_camera.is_none() {
+        return format!("{method} has no pose from {reference}");
+    }
+    let likely = event.probability.map_or_else(
+        || "of unknown confidence".to_owned(),
+        |probability| format!("{} likely right", percent(probability)),
+    );
+    let apart = event.apart.map(|apart| format!(", {apart} from the given pose"));
+    format!("{method} has a pose from {reference}, {likely}{}", apart.unwrap_or_default())
 }
 
 fn fused(event: &ReferencesFused) -> String {

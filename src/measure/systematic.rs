@@ -145,14 +145,14 @@ fn copied(of: &str, results: &[&QueryResult]) -> Option<Finding> {
     let queries = results.iter().filter(is_copied).count();
     let is_common = queries as f64 >= COPIED.0 * given as f64 && queries >= COPIED.1;
     is_common.then(|| Finding {
-        code: Code::E6,
+        code: Code::E2,
         of: of.to_owned(),
         about: Subject::Poses,
         queries,
         doctor: false,
         text: format!(
             "{queries} of {given} poses of {of} are those of frames of the map, and not confirmed: {}.",
-            Code::E6.rule().advice
+            Code::E2.rule().advice
         ),
         evidence: json!({ "copied": queries, "of": given }),
     })

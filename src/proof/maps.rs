@@ -352,7 +352,7 @@ impl Seen {
             None if self.comparison.score.covered == 0 => {
                 format!("{}, where the map is out of view", self.label)
             }
-            None => format!("{}: too little of the map in view", self.label),
+            None => format!("{}: what is in view gives no cost", self.label),
         }
     }
 }

@@ -121,7 +121,7 @@ impl Breakpoint {
             .chain(&phases)
             .chain(&[Stage::Descend, Stage::MatchGuided, Stage::SearchCoarse])
             .chain(&[Stage::RefinePlane, Stage::RefineSix])
-            .chain(&[Stage::Judge, Stage::Assess, Stage::Fuse])
+            .chain(&[Stage::Judge, Stage::Assess, Stage::Fuse, Stage::Opinion])
             .map(|stage| stage.name())
             .collect()
     }

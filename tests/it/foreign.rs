@@ -41,7 +41,7 @@ fn codes(result: &QueryResult) -> BTreeSet<Code> {
 }
 
 #[test]
-fn an_estimate_that_is_our_own_pose_gets_the_verdicts_that_need_a_pose_alone() {
+fn an_estimate_that_is_our_own_pose_gets_no_verdicts_on_a_search() {
     let folder = TempDir::new().expect("a folder");
     let file = folder.path().join("poses.txt");
     // Night and rain against an overcast reference: MI is wrong in many ways.
@@ -68,14 +68,10 @@ fn an_estimate_that_is_our_own_pose_gets_the_verdicts_that_need_a_pose_alone() {
             let at_pose = at_pose.expect("every cost is asked");
             assert!((at_pose.cost.expect("is covered") - costs.best).abs() < 1e-6);
             assert_eq!(at_pose.truth, costs.truth);
-            // What MI found beside its result it alone can say: other minima (D2 for D3), the grid
-            // (D4, D8), and how far it is to be believed (L1 and X1 that rests on it).
-            let alone = [Code::D1, Code::D5, Code::D6, Code::D7];
+            // Another system searched no cost, so nothing is said of one.
             let (needed, said) = (codes(&ours), codes(&other));
             println!("{queries} {query} {reference}: {needed:?} → {said:?}");
-            for code in alone {
-                assert!(!needed.contains(&code) || said.contains(&code), "{query}: {code}");
-            }
+            assert!(!said.iter().any(|code| code.name().starts_with('D')), "{query}: {said:?}");
             let is_wrong = needed.iter().any(|code| code.is_failure());
             assert_eq!(is_wrong, !said.is_empty(), "{query}");
         }

@@ -166,17 +166,22 @@ impl MatchSource for Misleading {
     }
 }
 
-#[test]
-fn matches_of_the_other_system_confirm_no_pose_that_they_lead_to() {
+/// What FB makes of matches as if the photo had been taken at one pose, and the result for another system's pose. Both
+/// are stated beside the truth.
+fn by_matches_and_given(
+    matched_at: Pose,
+    given_at: Pose,
+    shows_truth: bool,
+) -> (Pose, [QueryResult; 2]) {
     let street = street();
     let other = Method::called("other").expect("a plain name");
     let pose = |frame: usize| street.pose(frame).expect("a pose");
-    let wrong = pose(70) * Pose::translation(3.0, 0.0, 0.0);
-    let matches = Misleading { query_from_reference: wrong.inverse() * pose(66) };
+    let (matched, given) = (pose(70) * matched_at, pose(70) * given_at);
+    let matches = Misleading { query_from_reference: matched.inverse() * pose(66) };
     let foreign = Foreign::default()
-        .with_estimates(other, [(street.frames()[70].clone(), wrong)].into())
+        .with_estimates(other, [(street.frames()[70].clone(), given)].into())
         .with_matches(Arc::new(matches));
-    let hidden = Hidden { scene: &street, shows_truth: false };
+    let hidden = Hidden { scene: &street, shows_truth };
     let params = Params::default();
     let localizer = Localizer::new(&street, &hidden, &params, 0).with_foreign(foreign);
     let references = vec![66].into();
@@ -188,10 +193,67 @@ fn matches_of_the_other_system_confirm_no_pose_that_they_lead_to() {
     };
     let methods = [Method::FB, other];
     localizer.localize(0, 70, &[request], &methods, &mut NoObserver, keep).expect("localised");
-    let [by_matches, given]: [QueryResult; 2] = results.try_into().expect("two");
+    (matched, results.try_into().expect("two"))
+}
+
+#[test]
+fn matches_of_the_other_system_confirm_no_pose_that_they_lead_to() {
+    let off = || Pose::translation(3.0, 0.0, 0.0);
+    let (wrong, [by_matches, given]) = by_matches_and_given(off(), off(), false);
     let found = by_matches.pose.expect("the matches agree").to_pose().expect("a pose");
     assert!((found.translation.vector - wrong.translation.vector).norm() < 0.3);
     assert_eq!(opinion(&given).standing, Standing::Contradicted, "{}", opinion(&given).because);
+    let of_matches = opinion(&given).matches.as_ref().expect("matches");
+    assert!(10 * of_matches.by_pose > 9 * of_matches.with_depth, "{of_matches:?}");
+    // The truth says that their consensus is wrong.
+    let (_, [_, given]) = by_matches_and_given(off(), off(), true);
+    let codes: Vec<Code> = given.diagnosis.iter().map(|one| one.code).collect();
+    assert!(codes.starts_with(&[Code::E3, Code::R8]), "{codes:?}");
+}
+
+#[test]
+fn an_opinion_says_how_many_of_its_matches_a_pose_explains() {
+    let (off, none) = (Pose::translation(3.0, 0.0, 0.0), Pose::identity());
+    let (_, [_, given]) = by_matches_and_given(none, off, false);
+    let said = opinion(&given);
+    let of_matches = said.matches.as_ref().expect("matches");
+    assert!(10 * of_matches.by_pose < of_matches.with_depth, "{of_matches:?}");
+    assert!(10 * of_matches.at_most > 9 * of_matches.with_depth, "{of_matches:?}");
+    let apart = of_matches.apart.expect("a pose for the matches");
+    assert!((apart.translation_m - 3.0).abs() < 0.1, "{apart}");
+    has(&said.because, &format!("It explains {} of the", of_matches.by_pose));
+    has(&said.because, &format!("explains {}.", of_matches.at_most));
+    // Nothing is wrong with the matches.
+    assert_eq!(given.diagnosis.len(), 1, "{:?}", given.diagnosis);
+
+    // Of a right pose nothing is said against its matches.
+    let (_, [_, given]) = by_matches_and_given(none, none, true);
+    assert_eq!((given.grade, given.diagnosis.len()), (Grade::Right, 0));
+    let of_matches = opinion(&given).matches.as_ref().expect("matches");
+    assert!(10 * of_matches.by_pose > 9 * of_matches.with_depth, "{of_matches:?}");
+}
+
+#[test]
+fn every_own_answer_of_an_opinion_is_an_event() {
+    let folder = TempDir::new().expect("a folder");
+    let poses = "000070 1 0 0 40  0 1 0 0  0 0 1 40\n";
+    write(folder.path().join("poses.txt"), poses);
+    let asked = "run street --query 70 --reference 62 --method mine --estimates mine=poses.txt \
+                 --events events.jsonl";
+    command_in(folder.path(), asked).output().expect("it runs");
+    let events = text(folder.path().join("events.jsonl"));
+    let events: Vec<serde_json::Value> =
+        events.lines().map(|line| serde_json::from_str(line).expect("an object")).collect();
+    let of_kind = |kind: &str| events.iter().filter(|one| one["kind"] == kind).collect::<Vec<_>>();
+    let own = of_kind("OwnAnswered");
+    assert!(!own.is_empty() && own.iter().all(|one| one["method"] == "mine"), "{own:?}");
+    assert!(own[0]["apart"]["translation_m"].as_f64().expect("a distance") > 5.0);
+    let [formed] = of_kind("OpinionFormed")[..] else { panic!("one opinion") };
+    assert_eq!(formed["opinion"]["standing"], "contradicted");
+    assert!(formed["depth"].as_u64() > Some(1), "inside of the stage `opinion`");
+    assert!(of_kind("StageStarted").iter().any(|one| one["stage"] == "opinion"));
+    // What the own methods do on the way is kept from whoever watches the other system.
+    assert!(of_kind("FeaturesDetected").is_empty());
 }
 
 #[test]

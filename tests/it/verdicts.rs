@@ -98,7 +98,7 @@ fn the_window_counts_the_failures_that_the_run_counts() {
     let mut window = window_with_results(setup, results);
     run_until_idle(&mut window);
     send(&mut window, |app| app.app_state_mut().show_alone(Some(ViewName::Queries)));
-    assert!(is_said(&window, &format!("{failed} of 6 wrong")));
+    assert!(is_said(&window, &format!("{failed} of 6 failed")));
 }
 
 /// Photos of a camera whose focal length is stated too short: the verdict names the camera, not the cloud, although

@@ -1,12 +1,17 @@
 //! What the window does beside what it is asked for: what it tells, how long, and what it leaves out.
 
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex};
+
 use egui::{Key, Modifiers};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
-use posescope::app::{ACTIONS, App};
+use posescope::app::{ACTIONS, App, Arrangement, Opener};
+use posescope::event::Event;
 use posescope::geometry::Pose;
+use posescope::lesson::Lesson;
 
-use crate::window::{app, is_said, press, run_until_idle, send, setup, wait, window};
+use crate::window::{app, finished, is_said, press, run_until_idle, send, setup, wait, window};
 
 /// On most keyboards a question mark is a key with Shift and a text at once.
 #[test]
@@ -85,6 +90,9 @@ fn what_is_told_goes_by_itself_and_what_went_wrong_stays() {
     assert!(!is_said(&window, "MI has not begun yet"));
     let notes = &app(&window).notes;
     assert!(notes.len() == 1 && notes[0].is_error);
+    // After a minute nobody looks for it any more.
+    window.run_steps(200);
+    assert!(app(&window).notes.is_empty());
 }
 
 /// A reference that was named for one query is one of all queries too.
@@ -117,4 +125,107 @@ fn any_action_is_found_by_its_words_and_done_with_enter() {
     window.run_steps(3);
     assert!(!app(&window).options.shows_truth);
     assert!(!is_said(&window, "Search for an action"));
+}
+
+/// A window that only notes what it is asked to open.
+fn noting() -> (Harness<'static, App>, Arc<Mutex<Vec<String>>>) {
+    let asked = Arc::new(Mutex::new(Vec::new()));
+    let opener: Opener = {
+        let asked = Arc::clone(&asked);
+        Arc::new(move |name: &str| {
+            asked.lock().expect("no panic").push(name.to_owned());
+            Err("nothing is opened here".to_owned())
+        })
+    };
+    let mut window = Harness::builder()
+        .with_size([1500.0, 950.0])
+        .build_eframe(|creation| App::new(creation, setup()).with_opener(opener));
+    run_until_idle(&mut window);
+    (window, asked)
+}
+
+#[test]
+fn a_lesson_is_opened_from_the_menu() {
+    let (mut window, asked) = noting();
+    let lesson = Lesson::all().expect("our own").swap_remove(1);
+    for label in ["Menu", "Open a lesson", &lesson.title] {
+        window.get_by_label_contains(label).click();
+        window.run_steps(3);
+    }
+    wait(&mut window, |app| !app.app_state().is_opening());
+    assert_eq!(*asked.lock().expect("no panic"), [lesson.name]);
+    assert!(!is_said(&window, &lesson.title), "the menu is closed");
+}
+
+/// A file that is dropped on a window.
+#[derive(Debug)]
+struct Dropped(PathBuf);
+
+impl egui::DroppedFile for Dropped {
+    fn path(&self) -> &Path {
+        &self.0
+    }
+
+    fn bytes(&self) -> Result<Vec<u8>, String> {
+        std::fs::read(&self.0).map_err(|error| error.to_string())
+    }
+}
+
+#[test]
+fn what_is_dropped_on_the_window_is_opened_and_a_report_stands_for_its_folder() {
+    let (mut window, asked) = noting();
+    for dropped in ["/data/street", "/data/run/report.html"] {
+        window.input_mut().dropped_files.push(Arc::new(Dropped(dropped.into())));
+        window.step();
+        wait(&mut window, |app| !app.app_state().is_opening());
+    }
+    assert_eq!(*asked.lock().expect("no panic"), ["/data/street", "/data/run"]);
+}
+
+#[test]
+fn a_double_click_opens_a_result_of_the_batch() {
+    let mut window = finished(setup());
+    send(&mut window, |app| app.act("Run all queries, or stop"));
+    wait(&mut window, |app| app.app_state().results.len() == 3);
+    press(&mut window, Modifiers::NONE, Key::F4);
+    window.run_steps(2);
+    assert_eq!(app(&window).options.layout, Arrangement::Batch);
+    // Errors have their unit in the name of the column.
+    assert!(is_said(&window, "error (m)"));
+    let row = |window: &Harness<'_, App>| {
+        window.query_all_by_label("000002").next().expect("a row").rect().center()
+    };
+    let at = row(&window);
+    for pressed in [true, false, true, false] {
+        window.event(egui::Event::PointerMoved(at));
+        window.event(egui::Event::PointerButton {
+            pos: at,
+            button: egui::PointerButton::Primary,
+            pressed,
+            modifiers: Modifiers::NONE,
+        });
+    }
+    window.run_steps(3);
+    assert_eq!(app(&window).setup.query, 2);
+    assert_eq!(app(&window).options.layout, Arrangement::Inspect);
+}
+
+#[test]
+fn a_hypothesis_is_named_with_its_cost_beside_the_lowest_so_far() {
+    let mut window = finished(setup());
+    let records = app(&window).run().records();
+    let is_worse = |event: &Event| matches!(event, Event::PoseScored(one) if !one.is_best);
+    let at = records.iter().position(|record| is_worse(&record.event)).expect("a worse one");
+    let Event::PoseScored(tried) = records[at].event.clone() else { panic!("a hypothesis") };
+    send(&mut window, |app| app.app_state_mut().move_cursor(at));
+    let words = match tried.score.cost {
+        Some(cost) => format!("hypothesis {}: cost {cost:.4}", tried.evaluation),
+        None => format!("hypothesis {}", tried.evaluation),
+    };
+    for layout in [Arrangement::Inspect, Arrangement::Lecture] {
+        send(&mut window, |app| app.arrange(layout));
+        let said = window.query_all_by_label_contains(&words).next();
+        assert!(said.is_some(), "{layout:?}: {words}");
+        assert!(is_said(&window, "the lowest so far is"), "{layout:?}");
+    }
 }

@@ -171,8 +171,7 @@ pub fn diagnose(subject: &Subject<'_>) -> Vec<Diagnosis> {
         return failure.map(Diagnosis::of_failure).into_iter().collect();
     };
     let estimator = search::estimator_of(subject, family).filter(|_| grade != Grade::Right);
-    let search =
-        estimator.as_ref().and_then(|one| FinishedSearch::of(subject, family, one.as_ref()));
+    let search = estimator.as_ref().and_then(|one| FinishedSearch::of(subject, one.as_ref()));
     let mut found = tried(&Case::new(subject, family, search.as_ref()), grade);
     // A method's own failure, unless a rule says more than that something else is suspect.
     let is_suspicion = |one: &Diagnosis| matches!(one.code, Code::X1 | Code::N1);

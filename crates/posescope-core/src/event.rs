@@ -16,10 +16,11 @@ pub use crate::search::{Freedoms, Refined, Start};
 
 use crate::features::{FeatureState, Features, Match, MatchVerdict};
 use crate::fusion::share::Share;
-use crate::geometry::Pose;
+use crate::geometry::{Pose, PoseError};
 use crate::grid::{Offset, Phase, Score, Scored, ScoredLattice};
 use crate::image::Photo;
 use crate::method::Method;
+use crate::opinion::Opinion;
 use crate::retrieval::ReferenceRanking;
 use crate::robust::{Acceptance, Counted, Trial};
 
@@ -71,6 +72,8 @@ pub enum Stage {
     Assess,
     /// One pose from those of several references.
     Fuse,
+    /// A second opinion on another system's pose, once the own answers are known.
+    Opinion,
 }
 
 impl Stage {
@@ -97,6 +100,7 @@ impl Stage {
             Self::Judge => "judge",
             Self::Assess => "assess",
             Self::Fuse => "fusion",
+            Self::Opinion => "opinion",
         }
     }
 }
@@ -415,6 +419,27 @@ events! {
         pub needed: f64,
         /// What the best candidate of each method costs, in words.
         pub why: String,
+    }
+
+    /// Posescope's own answer to the query from one reference, for a second opinion on another system's pose.
+    pub struct OwnAnswered {
+        /// The method that was asked.
+        pub by: Method,
+        /// The reference that it was asked about.
+        pub from: String,
+        /// The pose, `world_from_camera`; `None` where there is none.
+        #[serde(serialize_with = "columns::rows_if_any")]
+        pub world_from_camera: Option<Pose>,
+        /// How likely it is right; `None` where that cannot be known.
+        pub probability: Option<f64>,
+        /// How far the other system's pose is from it.
+        pub apart: Option<PoseError>,
+    }
+
+    /// The second opinion on another system's pose.
+    pub struct OpinionFormed {
+        /// The opinion.
+        pub opinion: Arc<Opinion>,
     }
 
     /// A step downhill by the derivatives of a smooth cost.

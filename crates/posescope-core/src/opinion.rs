@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::covariance::error_vector;
 use crate::diagnosis::confidence::{TRUSTED_FROM, Within, percent};
-use crate::diagnosis::{PoseConfidence, Tolerance};
+use crate::diagnosis::{Diagnosis, PoseConfidence, Tolerance};
 use crate::directions;
 use crate::geometry::{Pose, PoseError, matrix_from_pose, pose_from_matrix};
 use crate::method::Method;
@@ -90,6 +90,9 @@ pub struct Opinion {
     pub copied_from: Option<String>,
     /// The method of posescope whose answer this rests on.
     pub by: Option<Method>,
+    /// What the pose explains of the matches that the other system gave with it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub matches: Option<ExplainedMatches>,
     /// Why, in a sentence.
     pub because: String,
 }
@@ -118,6 +121,47 @@ impl BetterPose {
         let rows = &self.world_from_camera;
         pose_from_matrix(&Matrix3x4::from_fn(|row, column| rows[row][column])).ok()
     }
+}
+
+/// How many of another system's matches its own pose explains. It is evidence on what that system made of them; what
+/// misleads its matches misleads both poses, so it decides nothing.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ExplainedMatches {
+    /// Matches whose point in the reference has a depth.
+    pub with_depth: usize,
+    /// Those that the pose explains.
+    pub by_pose: usize,
+    /// Those that the best pose for them explains.
+    pub at_most: usize,
+    /// How far that pose is from the given one.
+    pub apart: Option<PoseError>,
+}
+
+impl ExplainedMatches {
+    /// The same as a sentence; lengths in metres.
+    pub fn words(&self) -> String {
+        let Self { with_depth, by_pose, at_most, apart } = self;
+        let best = match apart {
+            Some(apart) if at_most > by_pose => format!(
+                "; the best pose for them, {} and {} away, explains {at_most}",
+                apart.translation(),
+                apart.rotation()
+            ),
+            _ => String::new(),
+        };
+        format!(
+            "It explains {by_pose} of the {with_depth} matches with a depth that came with it{best}."
+        )
+    }
+}
+
+/// What another system's own matches say of its pose.
+#[derive(Clone, Debug)]
+pub struct MatchesOfPose {
+    /// How many the pose explains.
+    pub explained: ExplainedMatches,
+    /// What is wrong with the consensus of the matches.
+    pub verdicts: Vec<Diagnosis>,
 }
 
 /// A pose that posescope itself found for the query.
@@ -204,6 +248,7 @@ impl Opinion {
             own: None,
             copied_from: None,
             by: None,
+            matches: None,
             because,
         };
         // Of equals, the first.

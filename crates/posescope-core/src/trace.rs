@@ -236,6 +236,44 @@ impl<'a> Trace<'a> {
         observer.wanted = observer.sink.wanted();
         outcome.unwrap_or_else(|panic| resume_unwind(panic))
     }
+
+    /// Runs `body` with a trace of its own, whose events go to `sink` alone. The sink of this trace may still pause or stop
+    /// the run.
+    ///
+    /// # Errors
+    /// The errors of `body`.
+    pub(crate) fn aside<T, X>(
+        &mut self,
+        sink: &mut dyn Sink,
+        body: impl FnOnce(&mut Trace<'_>) -> Result<T, X>,
+    ) -> Result<T, X> {
+        let Some(observer) = &mut self.observer else {
+            return body(&mut Trace::to(sink));
+        };
+        let mut quiet = Quiet(&mut *observer.sink);
+        let mut both = Fanout::new(vec![sink, &mut quiet]);
+        let outcome = body(&mut Trace::watched(&mut both, observer.attention));
+        // The sink may have been attended to meanwhile.
+        observer.wanted = observer.sink.wanted();
+        outcome
+    }
+}
+
+/// Keeps events from a sink, which may still pause or stop the run.
+struct Quiet<'a>(&'a mut dyn Sink);
+
+impl Sink for Quiet<'_> {
+    fn wanted(&self) -> KindSet {
+        KindSet::NONE
+    }
+
+    fn accept(&mut self, _record: &Record) -> Result<(), Cancelled> {
+        Ok(())
+    }
+
+    fn attend(&mut self) -> Result<(), Cancelled> {
+        self.0.attend()
+    }
 }
 
 /// Passes each event to the sinks that want it, in their order.

@@ -224,8 +224,8 @@ fn evidence(ui: &mut Ui, found: &Diagnosis) {
 
 /// Fields of evidence whose key says too little, as people read them; of one verdict, or of all.
 const NAMES: &[(&str, &str)] = &[
-    ("after", "Keypoints after that step"),
-    ("before", "Keypoints before that step"),
+    ("after", "Keypoints left after the worst step"),
+    ("before", "Keypoints before the worst step"),
     ("chance_deviation", "Spread of chance"),
     ("chance_level", "Cost of shuffled pixels"),
     ("deviation", "Contrast of the costs"),

@@ -19,6 +19,7 @@ pub(super) fn scene(stage: Option<Stage>) -> &'static [ViewName] {
             Stage::Assess => &[Synthetic, Surface, Histogram],
             Stage::RefineSix | Stage::Judge => &[Synthetic, Histogram, Space],
             Stage::Fuse => &[Fusion, Space],
+            Stage::Opinion => &[Space, Images],
             // The estimator, and the steps of FB before the consensus.
             _ => &[Images],
         },
@@ -89,6 +90,7 @@ fn number(stage: Stage, event: &Event) -> Option<String> {
         (Stage::Judge, Event::CandidatesJudged(event)) => {
             format!("{} poses judged", event.candidates.len())
         }
+        (Stage::Opinion, Event::OpinionFormed(event)) => event.opinion.standing.to_string(),
         (Stage::Fuse, Event::ReferencesFused(event)) => format!("{} poses", event.shares.len()),
         (Stage::Retrieve, Event::ReferencesRanked(event)) => {
             format!("{} ranked", event.ranking.candidates)

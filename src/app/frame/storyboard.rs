@@ -302,11 +302,18 @@ fn scrub(ui: &mut Ui, context: &ViewContext<'_>) {
         });
         let records = bar.map(|bar| bar.records.clone()).or(span.map(|span| span.records.clone()));
         let records = records.unwrap_or(0..0);
-        let width = (ui.available_width() - 250.0).max(60.0);
+        let width = (ui.available_width() - 310.0).max(60.0);
         line(ui, context, &records, cursor, width, color);
         let position = match run.len() {
             0 => words,
-            len => format!("step {cursor} of {} · {words}", len - 1),
+            len => {
+                let inside = cursor.saturating_sub(records.start) + 1;
+                format!(
+                    "{inside} of {} in this stage, step {cursor} of {} · {words}",
+                    records.len(),
+                    len - 1
+                )
+            }
         };
         ui.add(egui::Label::new(RichText::new(position).size(12.0)).truncate());
     });

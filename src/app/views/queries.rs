@@ -35,7 +35,7 @@ impl View for QueriesView {
         let run = context.state.results.len();
         let is_measured = |one: &QueryResult| one.grade != Grade::Unmeasured;
         let words = if run == 0 || context.state.results.values().flatten().any(is_measured) {
-            format!("{failed} of {run} wrong")
+            format!("{failed} of {run} failed")
         } else if failed > 0 {
             format!("{failed} of {run} contradicted")
         } else {

@@ -80,6 +80,11 @@ pub fn interval(method: Method) -> String {
     format!("{}/interval", estimate(method))
 }
 
+/// The root of the pose at which the photos agree, where a second opinion contradicts an estimate.
+pub fn better(method: Method) -> String {
+    format!("{}/better", estimate(method))
+}
+
 /// The root of a method's estimate.
 pub fn estimate(method: Method) -> String {
     format!("{WORLD}/estimate/{}", method.name())

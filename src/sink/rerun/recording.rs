@@ -18,6 +18,7 @@ use crate::geometry::Pose;
 use crate::localize::{PoseReport, QueryResult};
 use crate::method::Method;
 use crate::narration;
+use crate::opinion::BetterPose;
 use crate::palette;
 use crate::params::Params;
 use crate::problem::{Problem, ReferenceTuple};
@@ -229,6 +230,20 @@ impl Recording {
                     label: method.name().to_owned(),
                 };
                 camera.log(&mut self.stream, origin);
+                if let Some(opinion) = &result.opinion {
+                    let owner = entities::better(method);
+                    match opinion.better.as_ref().and_then(BetterPose::to_pose) {
+                        Some(better) => PlacedCamera {
+                            owner: &owner,
+                            world_from_camera: &better,
+                            color: palette::TRUTH,
+                            label: "where the photos agree".to_owned(),
+                            ..camera
+                        }
+                        .log(&mut self.stream, origin),
+                        None => self.stream.log(&owner, &rerun::Clear::recursive()),
+                    }
+                }
                 let path = entities::interval(method);
                 match result.confidence.as_ref().and_then(|one| one.covariance) {
                     Some(covariance) => {

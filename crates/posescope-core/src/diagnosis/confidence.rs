@@ -179,9 +179,12 @@ impl PoseConfidence {
         }
     }
 
-    /// How far such poses are off, as people read it; lengths in metres.
+    /// How far such poses are off, as people read it; lengths in metres. `None` where that tells nothing.
     pub fn interval(&self) -> Option<String> {
-        Some(format!("95 % of such poses within {}", self.within_95?))
+        /// A pose that may be so many times as far off as a right one has no place.
+        const TELLING: f64 = 10.0;
+        let known = self.within_95.filter(|known| known.m <= TELLING * self.within.m)?;
+        Some(format!("95 % of such poses within {known}"))
     }
 
     /// The probability as people read it, with the glyph of a low one before it.

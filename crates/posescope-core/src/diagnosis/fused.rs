@@ -38,7 +38,7 @@ pub fn diagnose_fusion(
     if is_of_members {
         let verdicts = heaviest(members).map_or(&[][..], |member| member.verdicts);
         // What a second opinion says of one pose, it says anew of the fused one.
-        let is_opinion = |code: Code| matches!(code, Code::E3 | Code::E4 | Code::E6);
+        let is_opinion = |code: Code| matches!(code, Code::E2 | Code::E3 | Code::E4);
         let is_kept = |code: Code| code.is_failure() && !is_opinion(code);
         let failures = verdicts.iter().filter(|verdict| is_kept(verdict.code));
         found.extend(failures.cloned());

@@ -24,7 +24,7 @@ pub fn remedies(
     let rule = code.rule();
     // A rule about features says nothing of a method that has none, and one about costs nothing of features.
     let is_of = |family: &Family| {
-        [Family::MATCHING, Family::COSTED]
+        [Family::MATCHING, Family::SEARCHING]
             .iter()
             .any(|kind| kind.contains(family) && rule.applies_to.iter().any(|of| kind.contains(of)))
     };

@@ -223,11 +223,6 @@ impl Code {
     /// What to try against what was found, for a method of a family. Another system does not read our parameters.
     pub fn advice(self, family: Option<Family>, evidence: &serde_json::Value) -> &'static str {
         let rule = self.rule();
-        let is_of_a_cost = !rule.applies_to.contains(&Family::Features);
-        if family == Some(Family::Given) && is_of_a_cost && rule.applies_to.contains(&Family::Given)
-        {
-            return "compare it with --method robust, or use another reference";
-        }
         let of_family = || family.and_then(rule.advice_of);
         let of_matches = rule.advice_of_matches.filter(|_| evidence.get(GIVEN_MATCHES).is_some());
         (rule.advice_on)(evidence).or(of_matches).or_else(of_family).unwrap_or(rule.advice)
@@ -260,7 +255,7 @@ impl Code {
             Failure::NoReferenceSucceeded { failure, .. } => Self::of(failure),
             Failure::NotJoint { .. } => Self::F2,
             Failure::NotAnswered { .. } => Self::E1,
-            Failure::UnknownMethod { .. } | Failure::Parameter(_) => Self::E2,
+            Failure::UnknownMethod { .. } | Failure::Parameter(_) => Self::E6,
             Failure::LowConfidence { .. } => Self::L1,
             Failure::Internal { .. } => Self::X9,
             Failure::Unreadable { .. } => Self::I1,

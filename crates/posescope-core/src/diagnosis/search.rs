@@ -3,8 +3,6 @@
 //! That a result costs more than the exact truth says nothing: right results do too, because height, pitch
 //! and roll are not searched and the grid has steps. So the result is compared with the best pose near the
 //! truth that the search could have reached, and with the best in all six freedoms.
-//!
-//! Another system's pose is looked at in the same way, as if a search by the cost of MI had ended there.
 
 use std::sync::{Mutex, OnceLock, PoisonError};
 
@@ -16,15 +14,11 @@ use super::confidence;
 use crate::cost::shuffled;
 use crate::estimator::{self, Estimator};
 use crate::geometry::{Pose, PoseError, yaw};
-use crate::grid::{GridParams, Offset, Phase, least_covered};
-use crate::method::Method;
+use crate::grid::{GridParams, Offset, Phase};
 use crate::render::{Score, Scorer};
 use crate::search::compass::compass_search;
 use crate::search::moved;
 use crate::stats::mean_and_squares;
-
-/// The method by whose cost the poses of other systems are compared: it bears the greatest changes of appearance.
-pub(super) const COST_OF_GIVEN: Method = Method::MI;
 
 /// Coarse minima beside the result from which the cost is descended, to see whether a better search
 /// would have found the truth or only another wrong place.
@@ -96,40 +90,31 @@ pub(super) struct FinishedSearch<'a> {
     pub(super) truth: Pose,
     /// The pose that it ended in.
     pub(super) result: Offset,
-    /// The cost there; `None` where too little is covered.
-    pub(super) result_cost: Option<f64>,
+    /// The cost there.
+    pub(super) result_cost: f64,
     /// Pixels that a pose must cover.
     pub(super) least_covered: u32,
-    /// The method by whose cost another system's pose is compared.
-    pub(super) compared_by: Option<Method>,
     near_truth: OnceLock<Option<PoseCost>>,
     rivals: OnceLock<Option<Rivals>>,
     /// What was shuffled already: several rules ask for the same poses.
     against_chance: Mutex<Vec<(Offset, Option<AgainstChance>)>>,
 }
 
-/// The estimator whose cost is compared at the result and the truth: that of the method, or of [`COST_OF_GIVEN`].
+/// The estimator whose cost is compared at the result and the truth.
 pub(super) fn estimator_of(subject: &Subject<'_>, family: Family) -> Option<Box<dyn Estimator>> {
     let method = match family {
         Family::Grid => confidence::responsible(subject.method, subject.outcome),
-        Family::Given => COST_OF_GIVEN,
-        Family::Features | Family::Guided | Family::MultiStart | Family::Descent => return None,
+        _ => return None,
     };
     Some(estimator::find(method)?.make(subject.params))
 }
 
 impl<'a> FinishedSearch<'a> {
-    /// The search that the subject's method ended, or what stands for one; `None` without the truth.
-    pub(super) fn of(
-        subject: &'a Subject<'a>,
-        family: Family,
-        estimator: &'a dyn Estimator,
-    ) -> Option<Self> {
+    /// The search that the subject's method ended; `None` without the truth.
+    pub(super) fn of(subject: &'a Subject<'a>, estimator: &'a dyn Estimator) -> Option<Self> {
         let truth = subject.reference_from_truth()?;
         let scorer = estimator.scorer(subject.problem)?;
-        let is_given = family == Family::Given;
-        let ended = if is_given { ended_as_given(subject, &scorer) } else { ended(subject) };
-        let (result, result_cost, least_covered) = ended?;
+        let (result, result_cost, least_covered) = ended(subject)?;
         Some(Self {
             subject,
             scorer,
@@ -138,7 +123,6 @@ impl<'a> FinishedSearch<'a> {
             result,
             result_cost,
             least_covered,
-            compared_by: is_given.then_some(COST_OF_GIVEN),
             near_truth: OnceLock::new(),
             rivals: OnceLock::new(),
             against_chance: Mutex::default(),
@@ -151,7 +135,7 @@ impl<'a> FinishedSearch<'a> {
             if self.out_of_reach() != (false, false) {
                 return None;
             }
-            let (near, result_cost) = (self.near_truth()?, self.result_cost?);
+            let (near, result_cost) = (self.near_truth()?, self.result_cost);
             let is_lower = near.cost < result_cost;
             let elsewhere = is_lower.then(|| self.lower_elsewhere(near.cost)).flatten();
             let is_changed = self.is_changed(&near);
@@ -324,16 +308,6 @@ impl<'a> FinishedSearch<'a> {
         self.scorer.score(&[offset.reference_from_camera()])[0].covered as usize
     }
 
-    /// The cost at the truth itself, whatever it covers.
-    pub(super) fn cost_at_truth(&self) -> Option<f64> {
-        self.scorer.score(&[self.truth])[0].cost
-    }
-
-    /// The cost at the truth itself; `None` where too little is covered.
-    pub(super) fn eligible_cost_at_truth(&self) -> Option<f64> {
-        self.eligible(self.scorer.score(&[self.truth])).into_iter().next().flatten()
-    }
-
     /// What chance gives at a pose, and what the images cost there.
     pub(super) fn against_chance(&self, offset: &Offset) -> Option<AgainstChance> {
         let known = || {
@@ -381,13 +355,13 @@ impl<'a> FinishedSearch<'a> {
         let (reach_m, _) = self.reach();
         let is_allowed = |offset: &Offset| offset.distance_m() <= reach_m + beyond_m;
         let minimum = self.descended(self.result, &is_allowed);
-        minimum.zip(self.result_cost).is_some_and(|(minimum, cost)| {
+        minimum.is_some_and(|minimum| {
             let is_outside = minimum.offset.distance_m()
                 > self.subject.problem.uncertainty_radius_m
                 || minimum.offset.yaw_rad.abs() > self.grid.yaw_range_deg.to_radians();
             let against = self.against_chance(&minimum.offset);
             let is_beyond = against.is_some_and(|against| against.deviations() >= BEYOND_CHANCE);
-            is_outside && minimum.cost < cost && is_beyond
+            is_outside && minimum.cost < self.result_cost && is_beyond
         })
     }
 
@@ -416,23 +390,14 @@ impl<'a> FinishedSearch<'a> {
 }
 
 /// Where a search ended: the pose, its cost, and the pixels that a pose must cover.
-type Ended = (Offset, Option<f64>, u32);
+type Ended = (Offset, f64, u32);
 
 fn ended(subject: &Subject<'_>) -> Option<Ended> {
     subject.outcome.pose.as_ref().ok()?;
     let offset = subject.evidence.minimum?.offset;
     let surface = subject.evidence.surfaces.first();
     let least_covered = surface.map_or(0, |surface| surface.least_covered);
-    Some((offset, Some(subject.outcome.cost?.best), least_covered))
-}
-
-/// What stands for a search that ended in another system's pose.
-fn ended_as_given(subject: &Subject<'_>, scorer: &Scorer<'_>) -> Option<Ended> {
-    let pose = subject.problem.reference_from_query(subject.outcome.pose.as_ref().ok()?);
-    let start = Offset::default().reference_from_camera();
-    let [at_pose, at_reference] = scorer.score(&[pose, start]).try_into().ok()?;
-    let least_covered = least_covered(subject.params.grid.coverage_floor, at_reference.covered);
-    Some((Offset::of(&pose), at_pose.eligible_cost(least_covered), least_covered))
+    Some((offset, subject.outcome.cost?.best, least_covered))
 }
 
 /// The searched pose with the height, pitch and roll of the truth.

@@ -35,8 +35,6 @@ impl Family {
     pub const MATCHING: &[Self] = &[Self::Features, Self::Guided];
     /// Those that search a cost.
     pub const SEARCHING: &[Self] = &[Self::Grid, Self::MultiStart, Self::Descent];
-    /// Those whose pose has a cost: searched, or given by another system.
-    pub const COSTED: &[Self] = &[Self::Grid, Self::MultiStart, Self::Descent, Self::Given];
 
     /// The family in one phrase.
     pub fn words(self) -> &'static str {

@@ -20,17 +20,19 @@ impl Given {
     pub fn new(method: Method, estimates: Arc<Estimates>) -> Self {
         Self { method, estimates }
     }
+
+    /// The pose of a query, or that there is none.
+    pub(crate) fn answer(&self, query: &str) -> Outcome {
+        let pose = self.estimates.get(query).copied();
+        Outcome::of(pose.ok_or_else(|| Failure::NotAnswered {
+            answers: self.method.name().to_owned(),
+            missing: format!("pose of {query}"),
+        }))
+    }
 }
 
 impl Estimator for Given {
     fn estimate(&self, problem: &Problem, trace: &mut Trace<'_>) -> Result<Outcome, Cancelled> {
-        let query = &problem.query.name;
-        trace.stage(Stage::Estimator(self.method), |_| {
-            let pose = self.estimates.get(query).copied();
-            Ok(Outcome::of(pose.ok_or_else(|| Failure::NotAnswered {
-                answers: self.method.name().to_owned(),
-                missing: format!("pose of {query}"),
-            })))
-        })
+        trace.stage(Stage::Estimator(self.method), |_| Ok(self.answer(&problem.query.name)))
     }
 }

@@ -301,7 +301,7 @@ impl<'a> Localizer<'a> {
                     candidate.is_some_and(|one| one.outcome.pose.is_ok())
                 };
                 let own = if is_given && members.iter().any(has_pose) {
-                    self.own_answers(work, members, observer)?.0
+                    self.own_answers(work, members, None, &mut Trace::off())?
                 } else {
                     Vec::new()
                 };
@@ -396,7 +396,7 @@ impl<'a> Localizer<'a> {
             return Ok(());
         }
         observer.begin_method(problem, method);
-        let mut candidate = match work.hybrid_parts(problem, method) {
+        let candidate = match work.hybrid_parts(problem, method) {
             Some((feature, direct)) => {
                 let runs = [&feature.times, &direct.times];
                 let used = if feature.outcome.pose.is_ok() { 1 } else { 2 };
@@ -420,12 +420,14 @@ impl<'a> Localizer<'a> {
                 let estimated = Estimated { outcome, evidence, times, verdicts };
                 self.assessed(work, problem, method, estimated)
             }
-            None => self.estimate(work, problem, method, observer)?,
+            None => match self.foreign.estimates(method) {
+                Some(estimates) => {
+                    let given = Given::new(method, Arc::clone(estimates));
+                    self.take_given(work, problem, (method, &given), members, observer)?
+                }
+                None => self.estimate(work, problem, method, observer)?,
+            },
         };
-        if self.foreign.estimates(method).is_some() && candidate.outcome.pose.is_ok() {
-            let (own, times) = self.own_answers(work, members, observer)?;
-            candidate = self.with_opinion(work, candidate, &own, &times);
-        }
         let mut reported =
             self.with_ranking_assessed(candidate.result.clone(), request, work.truth_for(method));
         reported.put_into_words_of(self.params.scale.unit());
@@ -450,13 +452,7 @@ impl<'a> Localizer<'a> {
         let mut fanout = Fanout::new(sinks);
         let mut trace = Trace::watched(&mut fanout, attention.as_deref());
         let current = &work.problems[problem];
-        let outcome = match self.foreign.estimates(method) {
-            Some(estimates) => {
-                let given = Given::new(method, Arc::clone(estimates));
-                localize_by(&given, current, &mut trace)?
-            }
-            None => self.ask(current, method, &mut trace)?,
-        };
+        let outcome = self.ask(current, method, &mut trace)?;
         let estimated =
             Estimated { outcome, evidence, times: timings.into_times(), verdicts: None };
         Ok(self.assessed(work, problem, method, estimated))

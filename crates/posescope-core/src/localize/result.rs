@@ -15,7 +15,7 @@ use crate::grid::GridParams;
 use crate::grid::{Basin, Offset, Phase};
 use crate::image::Degradation;
 use crate::method::Method;
-use crate::opinion::{Opinion, Standing};
+use crate::opinion::{MatchesOfPose, Opinion, Standing};
 use crate::params::Params;
 use crate::scale::LengthUnit;
 use crate::text::words;
@@ -476,13 +476,26 @@ impl QueryResult {
         self.error.map(|error| error.translation_m).or(estimated)
     }
 
-    /// Takes the opinion on its pose. Where no truth says more, what speaks against the pose is a verdict.
-    pub(super) fn take_opinion(&mut self, opinion: Option<Opinion>) {
-        if self.grade == Grade::Unmeasured {
+    /// Takes the opinion on its pose, with what the matches say that came with it. What speaks against a pose that is not
+    /// known to be right is a verdict.
+    pub(super) fn take_opinion(
+        &mut self,
+        opinion: Option<Opinion>,
+        its_matches: Option<MatchesOfPose>,
+    ) {
+        let opinion = opinion.map(|opinion| match &its_matches {
+            Some(MatchesOfPose { explained, .. }) => Opinion {
+                because: format!("{} {}", opinion.because, explained.words()),
+                matches: Some(explained.clone()),
+                ..opinion
+            },
+            None => opinion,
+        });
+        if self.grade != Grade::Right {
             let verdict = opinion.as_ref().and_then(|opinion| {
                 let code = match opinion.standing {
                     Standing::Confirmed => return None,
-                    Standing::Contradicted if opinion.copied_from.is_some() => Code::E6,
+                    Standing::Contradicted if opinion.copied_from.is_some() => Code::E2,
                     Standing::Contradicted => Code::E3,
                     Standing::Undecided => Code::E4,
                 };
@@ -491,7 +504,14 @@ impl QueryResult {
             });
             // The convention of a file explains why its poses are contradicted.
             let place = self.diagnosis.iter().take_while(|one| one.code == Code::X1).count();
-            verdict.into_iter().for_each(|verdict| self.diagnosis.insert(place, verdict));
+            let of_matches = |one: &Diagnosis| {
+                let is_resized =
+                    one.code == Code::X1 && one.evidence.pointer("/query/part").is_some();
+                is_resized || one.code.rule().applies_to == Family::MATCHING
+            };
+            let said = its_matches.into_iter().flat_map(|said| said.verdicts).filter(of_matches);
+            let said: Vec<Diagnosis> = verdict.as_ref().map_or(Vec::new(), |_| said.collect());
+            self.diagnosis.splice(place..place, verdict.into_iter().chain(said));
         }
         let is_confirmed = |one: &&Opinion| one.standing == Standing::Confirmed;
         if let Some(opinion) = opinion.as_ref().filter(is_confirmed)

@@ -112,7 +112,7 @@ fn what_is_asked_for_wrongly_is_no_bug() {
     let (problem, mut params) = (solvable(), Params::default());
     let refused = |method, params: &Params| {
         let failure = localize(&problem, method, params).pose.expect_err("refused");
-        assert_eq!(Code::of(&failure).name(), "E2");
+        assert_eq!(Code::of(&failure).name(), "E6");
         failure.to_string()
     };
     let words = "There is no method `robst` (did you mean `robust`?).";

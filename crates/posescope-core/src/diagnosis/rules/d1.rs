@@ -16,7 +16,7 @@ const NEXT_TO_NOTHING: f64 = 0.15;
 pub(super) const RULE: Rule = Rule {
     title: "the lowest cost covers too little",
     advice: "raise grid.coverage_floor",
-    applies_to: &[Family::Grid, Family::Given],
+    applies_to: &[Family::Grid],
     needs_truth: false,
     test: Test::Method(test),
     decided_at: DecidedAt::Stage(Stage::Search(Phase::PositionCoarse)),
@@ -27,25 +27,10 @@ pub(super) const RULE: Rule = Rule {
 
 fn test(case: &Case<'_>) -> Option<Diagnosis> {
     match case.search {
-        Some(search) if search.result_cost.is_none() => Some(out_of_view(search)),
         Some(search) => too_few_pixels(search),
         None => next_to_nothing(case),
     }
 }
-
-/// At another system's pose, next to nothing of the reference's cloud is in view.
-fn out_of_view(search: &FinishedSearch<'_>) -> Diagnosis {
-    RULE.found(&OutOfView {
-        judge: search.compared_by.map(|method| method.name()),
-        covered: search.covered(&search.result),
-        covered_at_reference: search.covered(&Default::default()),
-    })
-}
-
-evidence!(OutOfView { judge: Option<&'static str>, covered: usize, covered_at_reference: usize } =>
-    "Almost nothing of the reference's cloud is in view at this pose: {covered} px. The reference \
-     itself sees {covered_at_reference} px."
-);
 
 /// So few pixels match by chance.
 fn too_few_pixels(search: &FinishedSearch<'_>) -> Option<Diagnosis> {
@@ -59,7 +44,6 @@ fn too_few_pixels(search: &FinishedSearch<'_>) -> Option<Diagnosis> {
     let gain_at_result = search.gain(&rivals.winner.offset)?;
     (gain_at_result + MORE_GAIN < gain_at_truth).then(|| {
         RULE.found(&TooFewPixels {
-            judge: search.compared_by.map(|method| method.name()),
             covered_at_result: at_result,
             covered_at_truth: at_truth,
             gain_at_result,
@@ -75,7 +59,6 @@ fn is_hardly_covered(at_result: usize, at_truth: usize) -> bool {
 }
 
 evidence!(TooFewPixels {
-    judge: Option<&'static str>,
     covered_at_result: usize,
     covered_at_truth: usize,
     gain_at_result: f64,

@@ -5,7 +5,7 @@ use super::*;
 pub(super) const RULE: Rule = Rule {
     title: "the cost prefers another place",
     advice: "use another method or another reference",
-    applies_to: Family::COSTED,
+    applies_to: Family::SEARCHING,
     test: Test::Method(test),
     decided_at: DecidedAt::Stage(Stage::Search(Phase::PositionCoarse)),
     proof: Proof::CostMap(MapOverlay::Preference),
@@ -22,56 +22,37 @@ fn test(case: &Case<'_>) -> Option<Diagnosis> {
 
 /// Tried last of all causes, it holds wherever none of the others ended the list.
 fn by_grid(search: &FinishedSearch<'_>) -> Option<Diagnosis> {
-    let judge = search.compared_by.map(|method| method.name());
-    let cost_at_result = search.result_cost?;
-    let Some(rivals) = search.rivals() else {
-        // Where the truth is out of a search's reach, its own cost still says which of both is preferred.
-        let cost_near_truth = search.cost_at_truth().filter(|_| judge.is_some())?;
-        return (cost_near_truth >= cost_at_result).then(|| {
-            RULE.found(&Preferred {
-                judge,
-                cost_near_truth,
-                cost_at_result,
-                cost_elsewhere: cost_at_result,
-                distance_m: search.distance_from_truth(&search.result),
-                near_truth: None,
-                elsewhere: None,
-            })
-        });
-    };
+    let rivals = search.rivals()?;
     Some(RULE.found(&Preferred {
-        judge,
         cost_near_truth: rivals.near.cost,
-        cost_at_result,
+        cost_at_result: search.result_cost,
         cost_elsewhere: rivals.winner.cost,
         distance_m: search.distance_from_truth(&rivals.winner.offset),
-        near_truth: Some(rivals.near.offset),
-        elsewhere: Some(rivals.winner.offset),
+        near_truth: rivals.near.offset,
+        elsewhere: rivals.winner.offset,
     }))
 }
 
 evidence!(Preferred {
-    judge: Option<&'static str>,
     cost_near_truth: f64,
     cost_at_result: f64,
     cost_elsewhere: f64,
     /// How far elsewhere is from the truth \[m\].
     distance_m: f64,
-    near_truth: Option<Offset>,
-    elsewhere: Option<Offset>,
+    near_truth: Offset,
+    elsewhere: Offset,
 } => {
     let (lowest, near) = pair(*cost_elsewhere, *cost_near_truth);
-    let of = judge.map(|judge| format!(" of {judge}")).unwrap_or_default();
     // The heights and tilts that are searched may leave no right pose near the truth.
     if cost_near_truth < cost_elsewhere {
         format!(
-            "The lowest cost{of} near the truth, {near}, is at a pose that is not right. The result \
+            "The lowest cost near the truth, {near}, is at a pose that is not right. The result \
              costs {lowest} (lower is better)."
         )
     } else {
         let off = metres(*distance_m);
         format!(
-            "The cost{of} prefers a wrong place: {lowest} at {off} from the truth. The lowest near the \
+            "The cost prefers a wrong place: {lowest} at {off} from the truth. The lowest near the \
              truth is {near} (lower is better)."
         )
     }
@@ -139,13 +120,12 @@ mod tests {
     fn a_lower_cost_near_the_truth_is_not_called_preferred_elsewhere() {
         let said = |cost_near_truth| {
             let preferred = Preferred {
-                judge: None,
                 cost_near_truth,
                 cost_at_result: 0.8,
                 cost_elsewhere: 0.8,
                 distance_m: 1.5,
-                near_truth: None,
-                elsewhere: None,
+                near_truth: Offset::default(),
+                elsewhere: Offset::default(),
             };
             preferred.to_string()
         };

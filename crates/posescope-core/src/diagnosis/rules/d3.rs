@@ -22,7 +22,7 @@ pub(super) const RULE: Rule = Rule {
             .get("fine_range_m")
             .map(|_| "raise grid.fine_range to half of grid.coarse_step at least")
     },
-    applies_to: Family::COSTED,
+    applies_to: Family::SEARCHING,
     is_conclusive: true,
     test: Test::Method(test),
     decided_at: DecidedAt::Stage(Stage::Search(Phase::PositionCoarse)),
@@ -34,7 +34,6 @@ pub(super) const RULE: Rule = Rule {
 fn test(case: &Case<'_>) -> Option<Diagnosis> {
     match case.family {
         Family::MultiStart | Family::Descent => in_six_freedoms(case.free_search()?),
-        Family::Given => by_given(case.search?),
         _ => by_grid(case.search?),
     }
 }
@@ -46,7 +45,7 @@ fn by_grid(search: &FinishedSearch<'_>) -> Option<Diagnosis> {
     let is_narrow = 2.0 * search.grid.fine_range_m < search.grid.coarse_step_m;
     Some(RULE.found(&Missed {
         cost_near_truth: rivals.near.cost,
-        cost_at_result: search.result_cost?,
+        cost_at_result: search.result_cost,
         distance_m: search.distance_from_truth(&rivals.near.offset),
         near_truth: rivals.near.offset,
         lost_in: lost.phase.map(Phase::name),
@@ -90,33 +89,6 @@ evidence!(Missed {
     };
     format!(
         "The search missed it: cost {near} near the truth, {result} at the result (lower is better).{why}"
-    )
-});
-
-/// Another system's pose costs more than the truth.
-fn by_given(search: &FinishedSearch<'_>) -> Option<Diagnosis> {
-    let cost_at_result = search.result_cost?;
-    let cost_near_truth = match search.rivals() {
-        // Its pose has all freedoms, and the pose near the truth only those of a search on the ground.
-        Some(rivals) if rivals.is_missed => {
-            let at_truth = search.eligible_cost_at_truth().unwrap_or(f64::INFINITY);
-            at_truth.min(rivals.near.cost)
-        }
-        Some(_) => return None,
-        None => search.cost_at_truth().filter(|cost| *cost < cost_at_result)?,
-    };
-    Some(RULE.found(&CheaperTruth {
-        judge: search.compared_by?.name(),
-        cost_near_truth,
-        cost_at_result,
-    }))
-}
-
-evidence!(CheaperTruth { judge: &'static str, cost_near_truth: f64, cost_at_result: f64 } => {
-    let (near, here) = pair(*cost_near_truth, *cost_at_result);
-    format!(
-        "The photos agree better near the truth: the cost of {judge} is {near} there and {here} here \
-         (lower is better)."
     )
 });
 

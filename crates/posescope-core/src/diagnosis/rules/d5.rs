@@ -8,7 +8,7 @@ const TEXTURELESS: f64 = 2.0;
 pub(super) const RULE: Rule = Rule {
     title: "no pose stands out: the query shows nothing",
     advice: "use another photo, or another reference",
-    applies_to: Family::COSTED,
+    applies_to: Family::SEARCHING,
     needs_truth: false,
     is_conclusive: true,
     test: Test::Method(test),
@@ -19,7 +19,7 @@ pub(super) const RULE: Rule = Rule {
 
 /// Whether the query is the same everywhere: costs may differ, but by nothing that it shows.
 pub(super) fn is_textureless(case: &Case<'_>) -> bool {
-    Family::COSTED.contains(&case.family)
+    Family::SEARCHING.contains(&case.family)
         && case.subject.outcome.pose.is_ok()
         && case.contrast() < TEXTURELESS
 }

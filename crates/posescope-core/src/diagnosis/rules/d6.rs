@@ -5,7 +5,7 @@ use super::*;
 pub(super) const RULE: Rule = Rule {
     title: "the photos look too different",
     advice: "use another method, or a reference of similar light",
-    applies_to: &[Family::Grid, Family::Given],
+    applies_to: &[Family::Grid],
     test: Test::Method(test),
     decided_at: DecidedAt::Stage(Stage::Assess),
     proof: Proof::CostMap(MapOverlay::Light),
@@ -19,7 +19,6 @@ fn test(case: &Case<'_>) -> Option<Diagnosis> {
     let rivals = search.rivals().filter(|rivals| rivals.is_changed)?;
     let against = search.against_chance(&rivals.near.offset)?;
     Some(RULE.found(&Changed {
-        judge: search.compared_by.map(|method| method.name()),
         cost_near_truth: rivals.near.cost,
         chance_level: against.mean,
         chance_deviation: against.deviation,
@@ -28,7 +27,6 @@ fn test(case: &Case<'_>) -> Option<Diagnosis> {
 }
 
 evidence!(Changed {
-    judge: Option<&'static str>,
     cost_near_truth: f64,
     chance_level: f64,
     chance_deviation: f64,

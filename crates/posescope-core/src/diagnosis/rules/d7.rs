@@ -10,7 +10,7 @@ const OFF_PLANE_DEG: f64 = 0.5;
 pub(super) const RULE: Rule = Rule {
     title: "height, pitch or roll are off, which are not searched",
     advice: "use mi6 or robust, which search all six freedoms",
-    applies_to: &[Family::Grid, Family::Given],
+    applies_to: &[Family::Grid],
     test: Test::Method(test),
     proof: Proof::FreedViews,
     remedies: d2::remedies,
@@ -43,7 +43,6 @@ fn found(
     won: Option<(f64, f64)>,
 ) -> Diagnosis {
     RULE.found(&Frozen {
-        judge: search.compared_by.map(|method| method.name()),
         height_m: -search.truth.translation.y,
         frozen_error,
         cost_in_six_freedoms: won.map(|(best, _)| best),
@@ -53,7 +52,6 @@ fn found(
 }
 
 evidence!(Frozen {
-    judge: Option<&'static str>,
     height_m: f64,
     /// How far the truth is from the searched pose at its place with its heading.
     frozen_error: PoseError,

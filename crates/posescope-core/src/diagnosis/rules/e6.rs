@@ -1,11 +1,10 @@
-//! E6: another system's pose is that of a reference, and posescope's own trusted pose is elsewhere.
+//! E6: a method that is none, or a parameter outside its range.
 
 use super::*;
 
 pub(super) const RULE: Rule = Rule {
-    title: "another system's pose is that of a reference",
-    advice: "check whether the other system fell back to the pose of the reference that it retrieved",
-    proof: Proof::BothPoses,
+    title: "no such method, or a parameter outside its range",
+    advice: "correct the name or the value",
     needs_truth: false,
     ..Rule::new(Code::E6)
 };

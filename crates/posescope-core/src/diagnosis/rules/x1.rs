@@ -64,12 +64,15 @@ fn test(case: &Case<'_>) -> Option<Diagnosis> {
                 .or_else(|| camera_by_matches(case, matches))
                 .or_else(|| camera_cloud_or_truth(case, matches))
         }
-        Family::Grid | Family::Given => {
-            if let Some(found) = given_pose(case) {
-                return Some(found);
-            }
+        Family::Given => {
+            case.subject.truth?;
+            given_pose(case).or_else(|| poses(case)).or_else(|| {
+                let by_fb = SaidByFb::of(case)?;
+                by_fb.certain.or(by_fb.hint)
+            })
+        }
+        Family::Grid => {
             let search = case.search?;
-            search.result_cost?;
             let by_fb = OnceCell::new();
             let by_fb = || by_fb.get_or_init(|| SaidByFb::of(case));
             poses(case)
@@ -95,9 +98,10 @@ struct SaidByFb {
 impl SaidByFb {
     fn of(case: &Case<'_>) -> Option<Self> {
         // Where the truth is not searched, that alone explains the result.
-        let is_searched = match case.search {
-            Some(search) => search.near_truth().is_some(),
-            None => case.free_search()?.near.is_some(),
+        let is_searched = match (case.family, case.search) {
+            (Family::Given, _) => true,
+            (_, Some(search)) => search.near_truth().is_some(),
+            (_, None) => case.free_search()?.near.is_some(),
         };
         if !is_searched {
             return None;

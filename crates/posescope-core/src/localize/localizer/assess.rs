@@ -16,7 +16,9 @@ impl Localizer<'_> {
         request: &Request,
         truth: Option<&Pose>,
     ) -> QueryResult {
-        let ranking = request.references.ranking.as_ref().zip(truth);
+        // Another system found its pose from references of its own.
+        let is_ours = self.foreign.estimates(result.method).is_none();
+        let ranking = request.references.ranking.as_ref().zip(truth).filter(|_| is_ours);
         if result.grade != Grade::Right
             && let Some(verdict) = ranking
                 .and_then(|(ranking, truth)| diagnose_ranking(ranking, truth, request.radius_m))

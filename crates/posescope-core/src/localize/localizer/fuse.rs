@@ -117,7 +117,7 @@ impl Localizer<'_> {
         let opinion = pose.as_ref().ok().filter(|_| !own.is_empty());
         let opinion = opinion.map(|pose| self.opinion(work, pose, own));
         let mut result = self.with_ranking_assessed(result, request, truth);
-        result.take_opinion(opinion);
+        result.take_opinion(opinion, None);
         result.put_into_words_of(self.params.scale.unit());
         observer.end_fusion(&result);
         let own_times = own_timings.into_times();

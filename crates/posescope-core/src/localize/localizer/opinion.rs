@@ -1,20 +1,23 @@
 //! Localising a query anew, for a second opinion on the pose of another system.
 
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
+
+use nalgebra::{Point2, Point3};
 
 use super::Localizer;
-use super::work::{MethodOutcome, OneAnswer, QueryWork};
-use crate::diagnosis::{Evidence, Subject};
-use crate::estimator::{self, Outcome};
-use crate::event::KindSet;
+use super::work::{Estimated, MethodOutcome, OneAnswer, QueryWork};
+use crate::depth::LiftedMatch;
+use crate::diagnosis::{Assessment, Evidence, Subject};
+use crate::estimator::{self, FeatureBased, Given};
+use crate::event::{OpinionFormed, OwnAnswered, Stage};
+use crate::features::PairMatches;
 use crate::geometry::{Pose, PoseError};
 use crate::grid::{Phase, ScoredLattice};
-use crate::localize::{LocalizeObserver, StageTimes, StageTimings};
+use crate::localize::{LocalizeObserver, StageTimings, localize_by};
 use crate::method::Method;
-use crate::opinion::{Opinion, OwnAnswer};
+use crate::opinion::{ExplainedMatches, MatchesOfPose, Opinion, OwnAnswer};
 use crate::problem::Problem;
-use crate::trace::{Cancelled, Fanout, Record, Sink, Trace};
+use crate::trace::{Cancelled, Fanout, Trace};
 
 /// The methods that are asked, until one has a pose that can be trusted; the quick one first, about all references.
 const ASKED: [Method; 2] = [Method::named("fb2"), SEARCHING];
@@ -25,33 +28,53 @@ const SEARCHING: Method = Method::named("robust");
 /// An answer, with the position of its problem.
 pub(super) type SharedAnswer = (usize, Arc<OneAnswer>);
 
-/// Keeps the events of another method's search from an observer, which may still stop it.
-struct Quiet<'a>(&'a mut dyn LocalizeObserver);
-
-impl Sink for Quiet<'_> {
-    fn wanted(&self) -> KindSet {
-        KindSet::NONE
-    }
-
-    fn accept(&mut self, _record: &Record) -> Result<(), Cancelled> {
-        Ok(())
-    }
-
-    fn attend(&mut self) -> Result<(), Cancelled> {
-        self.0.attend()
-    }
-}
-
 impl Localizer<'_> {
-    /// The own answers to the problems of a request, each found once for all given poses, and how long that took. The given
-    /// pose was not found from a reference, so each of them may say where the query is.
+    /// Takes the pose that another system has for the query, and forms an opinion on it.
+    pub(super) fn take_given(
+        &self,
+        work: &mut QueryWork<'_>,
+        problem: usize,
+        (method, given): (Method, &Given),
+        members: &[usize],
+        observer: &mut dyn LocalizeObserver,
+    ) -> Result<MethodOutcome, Cancelled> {
+        let (mut timings, mut opinion) = (StageTimings::default(), None);
+        let attention = observer.attention();
+        let mut fanout = Fanout::new(vec![&mut timings, observer]);
+        let mut trace = Trace::watched(&mut fanout, attention.as_deref());
+        let outcome = trace.stage(Stage::Estimator(method), |trace| {
+            let outcome = given.answer(&work.query.name);
+            if let Ok(pose) = &outcome.pose {
+                let formed = trace.stage(Stage::Opinion, |trace| {
+                    let own = self.own_answers(work, members, Some(pose), trace)?;
+                    let opinion = Arc::new(self.opinion(work, pose, &own));
+                    trace.emit(|| OpinionFormed { opinion: Arc::clone(&opinion) })?;
+                    Ok::<_, Cancelled>(opinion)
+                })?;
+                opinion = Some(formed);
+            }
+            Ok::<_, Cancelled>(outcome)
+        })?;
+        let (evidence, times) = (Evidence::default(), timings.into_times());
+        let its_matches = outcome.pose.as_ref().ok().and_then(|pose| {
+            let truth = work.truth_for(method);
+            self.of_its_matches(&work.problems[problem], pose, truth)
+        });
+        let estimated = Estimated { outcome, evidence, times, verdicts: None };
+        let mut candidate = self.assessed(work, problem, method, estimated);
+        candidate.result.take_opinion(opinion.map(Arc::unwrap_or_clone), its_matches);
+        Ok(candidate)
+    }
+
+    /// The own answers to the problems of a request, each found once for all given poses. The given pose was not found from a
+    /// reference, so each of them may say where the query is.
     pub(super) fn own_answers(
         &self,
         work: &mut QueryWork<'_>,
         members: &[usize],
-        observer: &mut dyn LocalizeObserver,
-    ) -> Result<(Vec<SharedAnswer>, StageTimes), Cancelled> {
-        let mut timings = StageTimings::default();
+        given: Option<&Pose>,
+        trace: &mut Trace<'_>,
+    ) -> Result<Vec<SharedAnswer>, Cancelled> {
         let mut answers: Vec<SharedAnswer> = Vec::new();
         let is_trusted =
             |answer: &SharedAnswer| answer.1.found.as_ref().is_ok_and(OwnAnswer::is_trusted);
@@ -63,13 +86,12 @@ impl Localizer<'_> {
                 let answer = match work.own[problem].get(&method) {
                     Some(known) => Arc::clone(known),
                     None => {
-                        let answer =
-                            self.own_answer(work, problem, method, &mut timings, observer)?;
-                        let answer = Arc::new(answer);
+                        let answer = Arc::new(self.own_answer(work, problem, method, trace)?);
                         work.own[problem].insert(method, Arc::clone(&answer));
                         answer
                     }
                 };
+                trace.emit(|| own_answered(&work.problems[problem], method, &answer, given))?;
                 answers.push((problem, answer));
                 // The quick method may contradict itself; a second search would take too long.
                 if method == SEARCHING && answers.last().is_some_and(is_trusted) {
@@ -77,7 +99,7 @@ impl Localizer<'_> {
                 }
             }
         }
-        Ok((answers, timings.into_times()))
+        Ok(answers)
     }
 
     /// What one of the own methods answers to a problem.
@@ -86,8 +108,7 @@ impl Localizer<'_> {
         work: &QueryWork<'_>,
         problem: usize,
         method: Method,
-        timings: &mut StageTimings,
-        observer: &mut dyn LocalizeObserver,
+        trace: &mut Trace<'_>,
     ) -> Result<OneAnswer, Cancelled> {
         // The matches of the other system would repeat its mistakes.
         let solved = Problem { matches: None, ..work.problems[problem].clone() };
@@ -96,7 +117,11 @@ impl Localizer<'_> {
         let known = work.candidate(problem, method).filter(|_| has_own_matches);
         let (outcome, evidence) = match known {
             Some(known) => (known.estimated.clone(), known.evidence.clone()),
-            None => self.asked(&solved, method, timings, observer)?,
+            None => {
+                let mut evidence = Evidence::default();
+                let asked = trace.aside(&mut evidence, |trace| self.ask(&solved, method, trace));
+                (asked?, evidence)
+            }
         };
         let subject = Subject::new(&solved, method, self.params, &outcome, &evidence)
             .against(None, self.tolerance);
@@ -117,36 +142,45 @@ impl Localizer<'_> {
         Ok(OneAnswer { found, searched })
     }
 
-    fn asked(
+    /// What the matches of the other system say of its pose; `None` where it gave none with a depth.
+    fn of_its_matches(
         &self,
         problem: &Problem,
-        method: Method,
-        timings: &mut StageTimings,
-        observer: &mut dyn LocalizeObserver,
-    ) -> Result<(Outcome, Evidence), Cancelled> {
+        given: &Pose,
+        truth: Option<&Pose>,
+    ) -> Option<MatchesOfPose> {
+        let PairMatches::Found(_) = problem.matches.as_deref()? else {
+            return None;
+        };
         let mut evidence = Evidence::default();
-        let attention = observer.attention();
-        let attention: Option<&AtomicBool> = attention.as_deref();
-        let mut quiet = Quiet(observer);
-        let mut fanout = Fanout::new(vec![timings, &mut evidence, &mut quiet]);
-        let mut trace = Trace::watched(&mut fanout, attention);
-        let outcome = self.ask(problem, method, &mut trace)?;
-        Ok((outcome, evidence))
-    }
-
-    /// What was made of a given pose, with the opinion on it.
-    pub(super) fn with_opinion(
-        &self,
-        work: &QueryWork<'_>,
-        candidate: MethodOutcome,
-        own: &[SharedAnswer],
-        took: &StageTimes,
-    ) -> MethodOutcome {
-        let mut result = candidate.result;
-        let pose = candidate.outcome.pose.as_ref().ok();
-        result.take_opinion(pose.map(|pose| self.opinion(work, pose, own)));
-        let times = StageTimes::inside(result.method.name(), [&candidate.times, took]);
-        MethodOutcome { result, times, ..candidate }
+        let estimator = FeatureBased::new(self.params);
+        let outcome = localize_by(&estimator, problem, &mut Trace::to(&mut evidence)).ok()?;
+        let (lifted, features) = (evidence.lifted.clone()?, evidence.query.clone()?);
+        let pixel = |one: &LiftedMatch| features.keypoints[one.query].pixel();
+        let pairs: Vec<_> =
+            lifted.iter().filter_map(|one| Some((pixel(one), one.point?))).collect();
+        let camera = &problem.query.intrinsics;
+        let explained = |reference_from_query: &Pose| {
+            let query_from_reference = reference_from_query.inverse();
+            let is_near = |(pixel, point): &&(Point2<f64>, Point3<f64>)| {
+                let seen = camera.project(&(query_from_reference * *point));
+                let most_px = self.params.fb.mlesac.inlier_threshold_px;
+                seen.is_some_and(|seen| (seen - *pixel).norm() <= most_px)
+            };
+            pairs.iter().filter(is_near).count()
+        };
+        let best = evidence.refined.as_ref().map(|refined| refined.reference_from_query);
+        let subject = Subject::new(problem, Method::FB, self.params, &outcome, &evidence)
+            .against(truth, self.tolerance);
+        (!pairs.is_empty()).then(|| MatchesOfPose {
+            explained: ExplainedMatches {
+                with_depth: pairs.len(),
+                by_pose: explained(&problem.reference_from_query(given)),
+                at_most: best.as_ref().map_or(0, explained),
+                apart: best.map(|best| PoseError::between(&problem.world_from_query(&best), given)),
+            },
+            verdicts: Assessment::of(&subject).verdicts,
+        })
     }
 
     /// The opinion on a given pose by the own answers to some problems.
@@ -200,5 +234,22 @@ impl Localizer<'_> {
             None => estimator.compare_at(problem, given)?.score.cost?,
         };
         Some((cost - best) / deviation)
+    }
+}
+
+/// The event of an own answer beside a given pose.
+fn own_answered(
+    problem: &Problem,
+    method: Method,
+    answer: &OneAnswer,
+    given: Option<&Pose>,
+) -> OwnAnswered {
+    let found = answer.found.as_ref().ok();
+    OwnAnswered {
+        by: method,
+        from: problem.reference.name.clone(),
+        world_from_camera: found.map(|found| found.pose),
+        probability: found.and_then(|found| Some(found.confidence.as_ref()?.probability)),
+        apart: found.zip(given).map(|(found, given)| PoseError::between(&found.pose, given)),
     }
 }
