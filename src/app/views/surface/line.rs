@@ -10,6 +10,10 @@ use crate::app::{CostAlong, CostLine, Sends, ViewContext, theme};
 use crate::geometry::Pose;
 use crate::proof::Thing;
 
+/// The least rise between the ends that is a wall, as a share of the difference of the costs there: less is hardly seen
+/// in the plot.
+const LEAST_WALL: f64 = 0.2;
+
 /// Height of the plot \[points\].
 const PLOT_HEIGHT: f32 = 124.0;
 
@@ -104,7 +108,7 @@ impl Profile {
             return format!("{costs}: nearer than the steps of the search, {step_m} m");
         }
         let is_missed = truth < result;
-        if highest > result.max(truth) {
+        if highest - result.max(truth) > LEAST_WALL * (result - truth).abs() {
             let wall = number(highest - result.min(truth));
             let meaning = if is_missed {
                 "the search did not cross this barrier"
@@ -206,6 +210,9 @@ mod tests {
         let wall = profile(&[0.5, 0.6, 0.7, 0.5, 0.3]).words();
         assert!(wall.contains("it is 0.4000 higher"), "{wall}");
         assert!(wall.contains("did not cross"), "{wall}");
+        // A curve that hardly rises before it falls is drawn without a wall.
+        let bump = profile(&[0.5, 0.51, 0.4, 0.3]).words();
+        assert!(bump.contains("falls from the result to the truth"), "{bump}");
         let slope = profile(&[0.5, 0.4, 0.3]).words();
         assert!(slope.contains("falls from the result to the truth"), "{slope}");
         let preferred = profile(&[0.3, 0.4, 0.5]).words();
