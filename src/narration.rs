@@ -150,7 +150,7 @@ pub(crate) fn about(stage: Stage) -> &'static str {
             "A first pose says where each point must be seen, so it may match more freely."
         }
         Stage::Consensus => {
-            "Three matches give a pose, a fourth tells which; the pose with most support wins."
+            "Three matches give up to four poses. The pose under which all matches are likeliest wins."
         }
         Stage::Accept => "Would chance alone explain as many matches? Then there is no pose.",
         Stage::Color => "The scan takes its colours from the reference photo.",

@@ -6,6 +6,7 @@ use super::action::Action;
 use super::frame::storyboard::part_name;
 use super::theme;
 use super::view_context::{Sends, ViewContext};
+use crate::event::Stage;
 use crate::narration;
 use crate::session::{Run, Span};
 
@@ -72,9 +73,19 @@ fn sentences(context: &ViewContext<'_>) -> (String, String) {
     let Some(span) = context.span() else {
         return ("I takes the first step, Space runs to the end.".to_owned(), String::new());
     };
-    let stage = context.run.stages_at(context.cursor).last().map(|bar| bar.stage);
-    let first = stage.map_or("", narration::about).to_owned();
+    let first = stage(context.run, span, context.cursor).map_or("", narration::about).to_owned();
     (first, latest(context.run, span, context.cursor).unwrap_or_default())
+}
+
+/// The innermost stage at the cursor. What a part reports after a stage belongs to that stage.
+fn stage(run: &Run, span: &Span, cursor: usize) -> Option<Stage> {
+    let mut begun = run.stages().iter().filter(|bar| {
+        (span.records.start..=cursor).contains(&bar.records.start)
+            && !matches!(bar.stage, Stage::Estimator(_))
+    });
+    let open = begun.clone().rfind(|bar| bar.records.contains(&cursor));
+    let bar = open.or_else(|| begun.next_back()).or_else(|| run.stages_at(cursor).last());
+    bar.map(|bar| bar.stage)
 }
 
 /// The latest decision of a part of a run, in words.
