@@ -2,10 +2,11 @@
 //!
 //! A lesson is one Markdown file. Its header, TOML between lines of `+++`, defines the run. Each heading of the
 //! second level begins a page. The page's own header, a code block called `page`, defines the moment of the run and
-//! the question. `docs/lessons.md` lists all fields.
+//! the question. Numbers of a run stand in the words as placeholders. `docs/lessons.md` lists all fields.
 
 mod file;
 mod moment;
+mod number;
 mod page;
 mod setting;
 mod turner;
@@ -18,6 +19,7 @@ use posescope_core::files;
 
 pub use file::LessonError;
 pub use moment::{Moment, MomentError, Watch};
+pub use number::Results;
 pub use page::{Answer, Page, Question};
 pub use setting::{Setting, SettingError, named_scenes};
 pub use turner::PageTurner;

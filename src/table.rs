@@ -351,6 +351,31 @@ fn escaped(text: &str) -> String {
     escaped
 }
 
+/// A number with its thousands marked.
+pub(crate) fn grouped(number: f64, digits: usize) -> String {
+    let text = format!("{:.digits$}", number.abs());
+    let whole = text.split('.').next().unwrap_or_default();
+    let mut words = String::new();
+    for (at, digit) in text.char_indices() {
+        if at > 0 && at < whole.len() && (whole.len() - at) % 3 == 0 {
+            words.push(',');
+        }
+        words.push(digit);
+    }
+    let sign = if number < 0.0 { "-" } else { "" };
+    format!("{sign}{words}")
+}
+
+/// A number with three digits that count.
+pub(crate) fn three_digits(number: f64) -> String {
+    match number.abs() {
+        100.0.. => format!("{number:.0}"),
+        10.0.. => format!("{number:.1}"),
+        1.0.. => format!("{number:.2}"),
+        _ => format!("{number:.3}"),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

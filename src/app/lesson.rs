@@ -9,16 +9,17 @@ use egui_commonmark::{CommonMarkCache, CommonMarkViewer};
 use super::App;
 use super::action::{Action, button};
 use super::command::Queue;
+use super::memo::Memo;
 use super::setup::Setup;
 use super::state::Opened;
 use super::theme;
 use super::view_context::{Sends, ViewContext};
 use crate::geometry::Pose;
 use crate::grid::Offset;
-use crate::lesson::{Answer, Lesson, Moment, Page, Question, named_scenes};
+use crate::lesson::{Answer, Lesson, Moment, Page, Question, Results, named_scenes};
 use crate::method::Method;
 use crate::scene::Scene;
-use crate::session::{Job, Part, RunState};
+use crate::session::{Job, Part, Run, RunState};
 
 /// Width of the panel \[points\].
 pub(super) const WIDTH: f32 = 330.0;
@@ -33,6 +34,10 @@ pub(super) struct OpenLesson {
     variant: String,
     /// Scenes by the names that the lesson calls them.
     scenes: BTreeMap<String, Arc<dyn Scene>>,
+    /// What was shown of each variant.
+    results: Results,
+    /// A page by its position, with the numbers of these results.
+    filled: Memo<usize, Page>,
     words: CommonMarkCache,
 }
 
@@ -54,6 +59,8 @@ impl OpenLesson {
             page: 0,
             given: BTreeMap::new(),
             scenes: BTreeMap::new(),
+            results: Results::new(),
+            filled: Memo::default(),
             words: CommonMarkCache::default(),
         };
         open.remember(setup);
@@ -163,8 +170,18 @@ impl OpenLesson {
         }
     }
 
+    /// Takes the results of the run that is shown, whose numbers the page says.
+    fn take_results(&mut self, run: &Run) {
+        let known = self.results.entry(self.variant.clone()).or_default();
+        if !run.results().eq(known.iter()) {
+            *known = run.results().cloned().collect();
+            self.filled = Memo::default();
+        }
+    }
+
     /// Draws the page.
     pub(super) fn ui(&mut self, ui: &mut Ui, context: &ViewContext<'_>) {
+        self.take_results(context.run);
         let (number, pages) = (self.page + 1, self.lesson.pages.len());
         ui.add_space(4.0);
         ui.horizontal_wrapped(|ui| {
@@ -194,7 +211,8 @@ impl OpenLesson {
         larger(ui);
         ScrollArea::vertical().id_salt(("page", self.page)).auto_shrink(false).show(ui, |ui| {
             ui.heading(self.lesson.pages[self.page].title.clone());
-            let page = &self.lesson.pages[self.page];
+            let page =
+                self.filled.get(self.page, || self.lesson.pages[self.page].filled(&self.results).0);
             CommonMarkViewer::new().show(ui, &mut self.words, &page.text);
             if let Some(question) = &page.question {
                 ui.separator();

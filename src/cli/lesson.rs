@@ -5,7 +5,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use posescope::estimator;
-use posescope::lesson::{Lesson, PageTurner, named_scenes};
+use posescope::lesson::{Lesson, PageTurner, Results, named_scenes};
 use posescope::method::Method;
 use posescope::scene::Scene;
 use posescope::session::Job;
@@ -84,12 +84,14 @@ fn save(lesson: &Lesson, path: &Path, terminal: &Terminal) -> Result<(), CliErro
     let mut observer = CliObserver::new(bar.clone(), interrupt.clone());
     observer.recorder = Some(recorder);
     let mut outcome = Ok(());
-    for (number, ((_, pages), job)) in groups.iter().zip(jobs).enumerate() {
+    let mut results = Results::new();
+    for (number, ((variant, pages), job)) in groups.iter().zip(jobs).enumerate() {
         observer.pages = Some(PageTurner::new(lesson, pages.clone()));
-        let worked = job.work(number, &mut observer, |_| {});
-        observer.turn_last_pages();
-        if let Err(error) = worked {
-            outcome = Err(CliError::from(error));
+        let worked = job.work(number, &mut observer, |_| {}).map_err(CliError::from);
+        let worked = worked.map(|found| drop(results.insert((*variant).to_owned(), found)));
+        let shown = observer.show_pages(&results).map_err(CliError::from);
+        outcome = worked.and(shown);
+        if outcome.is_err() {
             break;
         }
     }

@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use posescope::event::{Event, KindSet};
 use posescope::geometry::Pose;
-use posescope::lesson::PageTurner;
+use posescope::lesson::{LessonError, PageTurner, Results};
 use posescope::localize::{LocalizeObserver, QueryResult, StageTimes};
 use posescope::method::Method;
 use posescope::problem::Problem;
@@ -70,13 +70,18 @@ impl CliObserver {
         }
     }
 
-    /// Records the remaining pages of a lesson, which show the end of the run.
-    pub fn turn_last_pages(&mut self) {
-        if let (Some(pages), Some(recorder)) = (self.pages.take(), &mut self.recorder) {
-            for page in pages.rest() {
-                recorder.show_page(&page);
-            }
+    /// Turns the remaining pages of a lesson, which show the end of the run, and records all of them with the numbers
+    /// of its results.
+    pub fn show_pages(&mut self, results: &Results) -> Result<(), LessonError> {
+        let (Some(pages), Some(recorder)) = (self.pages.take(), &mut self.recorder) else {
+            return Ok(());
+        };
+        for _ in 0..pages.rest() {
+            recorder.turn_page();
         }
+        let (texts, is_filled) = pages.texts(results);
+        recorder.show_pages(texts);
+        is_filled
     }
 }
 
@@ -115,8 +120,8 @@ impl Sink for CliObserver {
             _ => {}
         }
         if let (Some(pages), Some(recorder)) = (&mut self.pages, &mut self.recorder) {
-            for page in pages.turn(record) {
-                recorder.show_page(&page);
+            for _ in 0..pages.turn(record) {
+                recorder.turn_page();
             }
         }
         if let (Some(export), Some(problem)) = (&mut self.export, problem) {

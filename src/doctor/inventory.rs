@@ -2,6 +2,7 @@
 
 use crate::geometry::Pose;
 use crate::scene::{MapFacts, Scene, why_no_cloud};
+use crate::table::grouped;
 
 /// How many clouds are examined.
 const CLOUDS: usize = 3;
@@ -277,21 +278,6 @@ fn range_words((least, most): (f64, f64)) -> String {
     let digits = if across > 0.0 { (1.0 - across.log10()).ceil().clamp(0.0, 6.0) } else { 2.0 };
     let [least, most] = [least, most].map(|end| grouped(end, digits as usize));
     format!("{least} to {most}")
-}
-
-/// A number with its thousands marked.
-fn grouped(number: f64, digits: usize) -> String {
-    let text = format!("{:.digits$}", number.abs());
-    let whole = text.split('.').next().unwrap_or_default();
-    let mut words = String::new();
-    for (at, digit) in text.char_indices() {
-        if at > 0 && at < whole.len() && (whole.len() - at) % 3 == 0 {
-            words.push(',');
-        }
-        words.push(digit);
-    }
-    let sign = if number < 0.0 { "-" } else { "" };
-    format!("{sign}{words}")
 }
 
 #[cfg(test)]

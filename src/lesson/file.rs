@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use serde::Deserialize;
 
 use super::moment::Moment;
+use super::number;
 use super::page::{Answer, Page, Question};
 use super::setting::{Fields, Setting};
 use super::{Claim, Lesson};
@@ -40,6 +41,14 @@ pub enum LessonError {
         line: usize,
         /// What was expected.
         why: String,
+    },
+    /// The results have no number for a placeholder.
+    #[error("lesson {name}: no result has a number for {placeholders}")]
+    Unfilled {
+        /// The lesson.
+        name: String,
+        /// The placeholders.
+        placeholders: String,
     },
 }
 
@@ -101,7 +110,8 @@ struct Section {
     title: String,
     line: usize,
     header: Option<Block>,
-    text: String,
+    /// Its text, with the number of each line.
+    text: Vec<(usize, String)>,
 }
 
 /// The name of the first setting of a lesson.
@@ -223,12 +233,12 @@ impl Source<'_> {
                     title: heading[3..].trim().to_owned(),
                     line,
                     header: None,
-                    text: String::new(),
+                    text: Vec::new(),
                 }),
                 words => {
                     is_code ^= words.starts_with("```");
                     if let Some(page) = sections.last_mut() {
-                        page.text += &format!("{text}\n");
+                        page.text.push((line, text.to_owned()));
                     }
                 }
             }
@@ -261,14 +271,23 @@ impl Source<'_> {
         let moment = moment.unwrap_or(Moment::Start);
         let question = header.question.map(|question| self.question(question, &moment, line));
         let shown = header.show.or_else(|| Some(before?.show.clone()));
+        let question = question.transpose()?;
+        let asked = question.iter().flat_map(Question::texts).map(|text| (line, text));
+        let told = section.text.iter().map(|(line, text)| (*line, text));
+        for (line, text) in told.chain(asked) {
+            for variant in number::variants(text).map_err(|why| self.malformed(line, &why))? {
+                known(variant, line)?;
+            }
+        }
+        let text: Vec<String> = section.text.into_iter().map(|(_, text)| text).collect();
         Ok(Page {
             title: section.title,
-            text: section.text.trim().to_owned(),
+            text: text.join("\n").trim().to_owned(),
             variant,
             at: moment,
             show: shown.unwrap_or_else(|| SHOWN.map(str::to_owned).to_vec()),
             lockstep: header.lockstep,
-            question: question.transpose()?,
+            question,
         })
     }
 
@@ -378,6 +397,9 @@ variant = "dark"
             ("right = 2", "right = 3", 18, "right"),
             ("```page\nvariant = \"dark\"", "```page\nvariant = \"fog\"", 37, "fog"),
             ("+++\ntitle", "title", 1, "header"),
+            ("More words.", "{fb.machtes}", 33, "machtes"),
+            ("More words.", "{fog:fb.matches}", 33, "fog"),
+            ("\"So.\"", "\"{sift.matches}\"", 18, "sift"),
         ] {
             assert!(LESSON.contains(from), "{from}");
             let broken = LESSON.replacen(from, to, 1);

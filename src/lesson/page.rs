@@ -3,6 +3,7 @@
 use crate::method::Method;
 
 use super::moment::Moment;
+use super::number::{self, Results};
 
 /// A page.
 #[derive(Clone, Debug, PartialEq)]
@@ -50,7 +51,36 @@ pub enum Answer {
     Place(Method),
 }
 
+impl Question {
+    /// All its words.
+    pub(super) fn texts(&self) -> impl Iterator<Item = &String> {
+        let choices = match &self.answer {
+            Answer::Choice { choices, .. } => choices.as_slice(),
+            Answer::Place(_) => &[],
+        };
+        [&self.ask, &self.because].into_iter().chain(choices)
+    }
+}
+
 impl Page {
+    /// The page with the numbers of these results, and the placeholders without a value, which show as `…`.
+    pub fn filled(&self, results: &Results) -> (Self, Vec<String>) {
+        let mut missing = Vec::new();
+        let mut page = self.clone();
+        let mut fill = |text: &mut String| {
+            *text = number::filled(text, &self.variant, results, &mut missing);
+        };
+        fill(&mut page.text);
+        if let Some(question) = &mut page.question {
+            fill(&mut question.ask);
+            fill(&mut question.because);
+            if let Answer::Choice { choices, .. } = &mut question.answer {
+                choices.iter_mut().for_each(fill);
+            }
+        }
+        (page, missing)
+    }
+
     /// The whole page as Markdown: title, text, and the question without its answer.
     pub fn markdown(&self, number: usize, pages: usize) -> String {
         let mut text = format!("# {}\n\n*Page {number} of {pages}*\n\n{}\n", self.title, self.text);

@@ -7,7 +7,6 @@ use egui::{Button, Frame, Grid, Label, RichText, ScrollArea, Sense, Stroke, Ui, 
 use serde_json::Value;
 
 use super::Panes;
-use super::stage::three_digits;
 use super::storyboard::part_name;
 use super::verdicts::{short, split, words_of};
 use crate::app::theme;
@@ -18,6 +17,7 @@ use crate::geometry::PoseError;
 use crate::localize::{Explanation, Helped, PoseReport, QueryResult};
 use crate::method::Method;
 use crate::session::{Part, Run};
+use crate::table::three_digits;
 
 pub(crate) fn ui(ui: &mut Ui, context: &ViewContext<'_>, panes: &mut Panes) {
     let tab = context.options.tab;

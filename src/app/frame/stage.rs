@@ -3,6 +3,7 @@
 use crate::app::ViewName;
 use crate::event::{Event, Stage};
 use crate::grid::Phase;
+use crate::table::three_digits;
 use crate::trace::Record;
 
 /// The views of a stage: the first is large, the others stand beside it.
@@ -97,14 +98,4 @@ fn number(stage: Stage, event: &Event) -> Option<String> {
         }
         _ => return None,
     })
-}
-
-/// A number with three digits that count.
-pub(crate) fn three_digits(number: f64) -> String {
-    match number.abs() {
-        100.0.. => format!("{number:.0}"),
-        10.0.. => format!("{number:.1}"),
-        1.0.. => format!("{number:.2}"),
-        _ => format!("{number:.3}"),
-    }
 }

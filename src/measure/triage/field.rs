@@ -5,7 +5,8 @@ use std::cmp::Ordering;
 use crate::diagnosis::{Code, Confidence, Grade};
 use crate::localize::QueryResult;
 use crate::opinion::Standing;
-use crate::table::Align;
+use crate::scale::LengthUnit;
+use crate::table::{Align, grouped, three_digits};
 use crate::text::UnknownWord;
 
 /// A field of a result, which is a column of tables. Tables list their fields; all else about a column is here.
@@ -136,11 +137,20 @@ impl Field {
         number("keypoints", "keypoints of the query", "", 0, |r| {
             Some(r.counts?.query_keypoints as f64)
         }),
+        number("reference_keypoints", "keypoints of the reference", "", 0, |r| {
+            Some(r.counts?.reference_keypoints as f64)
+        }),
+        number("unique", "unique matches, with a depth or not", "", 0, |r| {
+            Some(r.counts?.unique as f64)
+        }),
         number("matches", "matches with a depth", "", 0, |r| Some(r.counts?.with_depth as f64)),
         number("inliers", "inliers", "", 0, |r| Some(r.counts?.inliers as f64)),
         number("cost", "cost at the result", "", 4, |r| Some(r.cost.as_ref()?.best)),
         number("truth_cost", "cost at the truth", "", 4, |r| r.cost.as_ref()?.truth),
         number("shuffled", "cost of shuffled pixels", "", 4, |r| r.cost.as_ref()?.shuffled),
+        number("evaluations", "hypotheses that were scored", "", 0, |r| {
+            Some(r.cost.as_ref()?.evaluations as f64)
+        }),
         number("coverage", "share of the photo covered at the result", "", 3, |r| {
             Some(r.cost.as_ref()?.coverage_best)
         }),
@@ -272,6 +282,27 @@ impl Field {
             Value::None => String::new(),
         }
     }
+
+    /// Its value as a sentence says it, perhaps in percent: `1,648`, `4 cm`, `13.9 m`, `0.924`, `95 %`. Empty if
+    /// missing.
+    pub fn spoken(&self, result: &QueryResult, in_percent: bool) -> String {
+        let Value::Number(number) = self.of(result) else {
+            return self.text(result);
+        };
+        match self.unit {
+            _ if in_percent && number < 0.1 => format!("{:.1} %", 100.0 * number),
+            _ if in_percent => format!("{:.0} %", 100.0 * number),
+            "m" if number < 0.995 && result.unit == LengthUnit::Metre => {
+                let decimals = usize::from(number < 0.01);
+                format!("{:.decimals$} cm", 100.0 * number)
+            }
+            "m" => result.unit.words(&format!("{number:.1} m")),
+            "°" if number < 0.1 => format!("{number:.2}°"),
+            "°" => format!("{number:.1}°"),
+            _ if self.decimals == Some(0) => grouped(number, 0),
+            _ => three_digits(number),
+        }
+    }
 }
 
 fn position(result: &QueryResult, axis: usize) -> Option<f64> {
@@ -323,4 +354,39 @@ pub(crate) const fn is_equal(one: &str, other: &str) -> bool {
         at += 1;
     }
     at == one.len() && at == other.len()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::measure::metrics::tests::row;
+
+    #[test]
+    fn a_sentence_says_a_number_as_people_read_it() {
+        let said = |error_m: f64, field: &str| {
+            let mut result = row("1", "fb", Some(error_m));
+            result.unit = if field == "start" { LengthUnit::Model } else { LengthUnit::Metre };
+            result.initial_error = result.error;
+            Field::find(field).expect("a field").spoken(&result, false)
+        };
+        for (error_m, field, words) in [
+            (0.0041, "error", "0.4 cm"),
+            (0.0413, "error", "4 cm"),
+            (0.997, "error", "1.0 m"),
+            (13.94, "error", "13.9 m"),
+            (0.25, "start", "0.2 units"),
+            (0.25, "rotation", "0.2°"),
+            (0.04, "rotation", "0.04°"),
+            (0.25, "cost", ""),
+            (0.25, "method", "fb"),
+        ] {
+            assert_eq!(said(error_m, field), words, "{error_m} {field}");
+        }
+        let percent = |probability: f64| {
+            let share = number("share", "", "", 3, |r| Some(r.error?.translation_m));
+            share.spoken(&row("1", "fb", Some(probability)), true)
+        };
+        assert_eq!([0.016, 0.954].map(percent), ["1.6 %", "95 %"]);
+        assert_eq!([grouped(1648.0, 0), three_digits(0.9244)], ["1,648", "0.924"]);
+    }
 }

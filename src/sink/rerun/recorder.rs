@@ -81,10 +81,14 @@ impl Recorder {
         self
     }
 
-    /// Shows a page of a lesson, as Markdown, from now on.
-    pub fn show_page(&mut self, markdown: &str) {
-        let markdown = markdown.to_owned();
-        self.tell(move |recording| recording.show_page(&markdown));
+    /// Turns to the next page of a lesson, whose words are known later.
+    pub fn turn_page(&mut self) {
+        self.tell(Recording::turn_page);
+    }
+
+    /// Shows pages of a lesson, as Markdown, each where it was turned to.
+    pub fn show_pages(&mut self, pages: Vec<String>) {
+        self.tell(move |recording| recording.show_pages(pages));
     }
 
     /// Completes the recording.

@@ -11,7 +11,7 @@ use super::direct::DirectContext;
 use super::encode::jpeg;
 use super::feature::FeatureContext;
 use super::scene::{self, EventContext, Origin, PlacedCamera};
-use super::stream::Stream;
+use super::stream::{Now, Stream};
 use super::{Identity, RecordError, Targets, blueprint, entities, fusion, report, retrieval};
 use crate::event::{Event, ReferencesFused, ReferencesRanked, Stage};
 use crate::geometry::Pose;
@@ -44,6 +44,8 @@ pub(super) struct Recording {
     focus: Option<Focus>,
     /// Whether there are pages of a lesson.
     pub(super) has_pages: bool,
+    /// When pages were turned whose words are not known yet.
+    turned: Vec<Now>,
     query: CurrentQuery,
     /// The number of each estimator's hypotheses in earlier runs.
     evals: BTreeMap<Method, i64>,
@@ -103,6 +105,7 @@ impl Recording {
             origin: None,
             focus: None,
             has_pages: false,
+            turned: Vec::new(),
             query: CurrentQuery::default(),
             evals: BTreeMap::new(),
         })
@@ -113,11 +116,18 @@ impl Recording {
         self.stream.is_broken()
     }
 
-    /// Shows a page of a lesson, as Markdown, from now on.
-    pub(super) fn show_page(&mut self, markdown: &str) {
+    /// Turns to the next page of a lesson, whose words are known later.
+    pub(super) fn turn_page(&mut self) {
         self.stream.advance();
-        let page = TextDocument::from_markdown(markdown);
-        self.stream.log(entities::LESSON, &page);
+        self.turned.push(self.stream.now());
+    }
+
+    /// Shows pages of a lesson, as Markdown, each where it was turned to.
+    pub(super) fn show_pages(&mut self, pages: Vec<String>) {
+        for (time, page) in self.turned.drain(..).zip(pages) {
+            let page = TextDocument::from_markdown(page);
+            self.stream.log_at(time, entities::LESSON, &page);
+        }
     }
 
     /// Completes the recording.

@@ -38,7 +38,8 @@ pub(super) struct Stream {
 }
 
 /// The time of a row on each timeline.
-struct Now {
+#[derive(Clone, Copy)]
+pub(super) struct Now {
     query: i64,
     step: i64,
     eval: Option<i64>,
@@ -105,6 +106,18 @@ impl Stream {
     /// Advances to the next decision.
     pub(super) fn advance(&mut self) {
         self.now.step += 1;
+    }
+
+    /// The current time.
+    pub(super) fn now(&self) -> Now {
+        self.now
+    }
+
+    /// Records something at an earlier time.
+    pub(super) fn log_at(&mut self, time: Now, path: &str, what: &dyn AsComponents) {
+        let now = std::mem::replace(&mut self.now, time);
+        self.log(path, what);
+        self.now = now;
     }
 
     /// Records something at the current time.
