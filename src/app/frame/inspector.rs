@@ -79,7 +79,11 @@ fn why(ui: &mut Ui, context: &ViewContext<'_>) {
             }
         }
         None => {
-            ui.strong(format!("{}: {}", part_name(span.part), result.grade));
+            let truth = match result.grade {
+                Grade::Unmeasured => " (no ground truth)",
+                _ => "",
+            };
+            ui.strong(format!("{}: {}{truth}", part_name(span.part), result.grade));
             ui.label(words_of(&result));
             changed(ui, context.run);
         }
@@ -170,7 +174,7 @@ fn changed(ui: &mut Ui, run: &Run) {
     }
 }
 
-/// Where nothing that was tried helped.
+/// Where nothing that was tried helped against a cause that wrong data would have too.
 const NO_SETTING_HELPS: &str = "No setting and no other method made it right. The data may be wrong: check camera, \
                                 poses and clouds with `posescope doctor`.";
 
@@ -233,7 +237,7 @@ const NAMES: &[(&str, &str)] = &[
     ("D3.distance_m", "Pose near the truth, to it"),
     ("D4.distance_m", "Truth to the reference"),
     ("D8.distance_m", "Result to the reference"),
-    ("R9.distance_m", "Pose to the reference"),
+    ("R9.distance_m", "From the reference"),
     ("deviations", "Below chance by spreads"),
     ("explained", "Matches explained as stated"),
     ("explained_otherwise", "Matches explained otherwise"),
@@ -317,7 +321,9 @@ fn helped(ui: &mut Ui, context: &ViewContext<'_>, result: &QueryResult, primary:
     } else if explanation.complete {
         heading(ui, "What may help");
         ui.label(result.advice(primary));
-        ui.label(NO_SETTING_HELPS);
+        if matches!(primary.code, Code::R3 | Code::R8 | Code::D2 | Code::D6) {
+            ui.label(NO_SETTING_HELPS);
+        }
     }
 }
 

@@ -119,11 +119,11 @@ pub struct Explanation {
 }
 
 impl Explanation {
-    /// What brought the pose nearest to the truth, the first of equal ones.
+    /// The remedy to recommend. They are tried in the order of what mends most, so it is the first that helped; one frame
+    /// of the map in the place of another says the least about the cause.
     pub fn best(&self) -> Option<&Helped> {
-        let off_m = |helped: &&Helped| helped.error.translation_m;
-        let helped = self.helped.iter();
-        helped.min_by(|a, b| off_m(a).total_cmp(&off_m(b)))
+        let names_no_frame = |helped: &&Helped| !helped.args.iter().any(|arg| arg == "--reference");
+        self.helped.iter().find(names_no_frame).or(self.helped.first())
     }
 }
 
@@ -552,14 +552,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_best_of_what_helped_is_nearest_to_the_truth_and_the_first_of_equals() {
-        let helped = |arg: &str, translation_m: f64| Helped {
-            args: vec![arg.to_owned()],
+    fn the_best_of_what_helped_is_the_first_that_is_more_than_another_frame() {
+        let helped = |option: &str, translation_m: f64| Helped {
+            args: vec![option.to_owned(), "a".to_owned()],
             error: PoseError { translation_m, rotation_deg: 1.0, max_euler_deg: 1.0 },
         };
-        let helped = vec![helped("a", 0.5), helped("b", 0.2), helped("c", 0.2)];
-        let explanation = Explanation { helped, failed: Vec::new(), runs: 3, complete: true };
-        assert_eq!(explanation.best().expect("two helped").args, ["b"]);
+        let frame = helped("--reference", 0.1);
+        let all = vec![frame.clone(), helped("--set", 0.5), helped("--method", 0.2)];
+        let explanation = |helped| Explanation { helped, failed: vec![], runs: 3, complete: true };
+        assert_eq!(explanation(all).best().expect("it helped").args[0], "--set");
+        assert_eq!(explanation(vec![frame.clone()]).best(), Some(&frame));
         assert_eq!(Explanation::default().best(), None);
     }
 
