@@ -11,6 +11,7 @@ mod groups;
 #[cfg(feature = "cli")]
 mod junit;
 mod known;
+mod mended;
 mod metrics;
 mod overview;
 #[cfg(feature = "cli")]

@@ -1,10 +1,9 @@
 //! Many results at a glance: one sentence, a bar for each method, and the causes by how often they occur.
 
-use std::collections::BTreeMap;
-
 use super::finding::Finding;
 use super::findings::findings;
 use super::groups::grouped;
+use super::mended::mended;
 use super::metrics::median;
 use super::rivals::{Rivals, rivals};
 use super::systematic::nothing_in_common;
@@ -12,6 +11,9 @@ use crate::diagnosis::{Code, Confidence, Grade};
 use crate::estimator;
 use crate::localize::QueryResult;
 use crate::opinion::Standing;
+
+/// Remedies that the headline names, at most.
+const REMEDIES: usize = 3;
 
 /// What a run came to.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -208,14 +210,12 @@ fn best_in_words(results: &[&QueryResult], bars: &[Bar], is_named: bool) -> Stri
             failed.len()
         );
     }
-    let mut mends: BTreeMap<String, usize> = BTreeMap::new();
-    let explained = failed.iter().filter_map(|result| result.explanation.as_ref());
-    for helped in explained.flat_map(|explanation| &explanation.helped) {
-        let args = helped.args.iter().map(String::as_str).filter(|arg| *arg != "--set");
-        *mends.entry(args.collect::<Vec<_>>().join(" ")).or_default() += 1;
-    }
-    if let Some((args, times)) = mends.iter().rev().max_by_key(|(_, times)| **times) {
-        words += &format!(" `{args}` mends {times}.");
+    let explained: Vec<&QueryResult> = failed.into_iter().copied().collect();
+    let mends = mended(&explained).into_iter().take(REMEDIES);
+    let mends: Vec<String> =
+        mends.map(|(remedy, queries)| format!("{remedy} ({queries})")).collect();
+    if !mends.is_empty() {
+        words += &format!(" What mends most: {}.", mends.join(", "));
     }
     words
 }
@@ -223,6 +223,7 @@ fn best_in_words(results: &[&QueryResult], bars: &[Bar], is_named: bool) -> Stri
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::localize::{Explanation, Helped};
     use crate::measure::metrics::tests::row;
     use crate::method::Method;
 
@@ -259,6 +260,25 @@ mod tests {
         let words = "No method is right for the query. Most frequent cause of the failures:";
         assert_eq!(wrong.headline, format!("{words} {title} (1 of 2)."));
         assert_eq!(Overview::of(&[], &[]).headline, "There are no results yet.");
+    }
+
+    #[test]
+    fn the_headline_ranks_remedies_and_names_no_frame() {
+        let explained = |query: &str, helped: &[&str]| {
+            let error = row(query, "mi", Some(0.1)).error.expect("an error");
+            let args = |words: &&str| words.split(' ').map(str::to_owned).collect();
+            let helped = helped.iter().map(|one| Helped { args: args(one), error }).collect();
+            let explanation = Explanation { helped, complete: true, ..Explanation::default() };
+            QueryResult { explanation: Some(explanation), ..row(query, "mi", Some(9.0)) }
+        };
+        let rows = [
+            explained("1", &["--reference 000133", "--method pm"]),
+            explained("2", &["--set grid.rounds=2", "--reference 000140"]),
+            explained("3", &["--set grid.rounds=2", "--reference 000007"]),
+        ];
+        let said = Overview::of(&rows.iter().collect::<Vec<_>>(), &[]).headline;
+        let mends = "What mends most: a reference farther away (3), `grid.rounds=2` (2), `--method pm` (1).";
+        assert_eq!(said, format!("No method is right for any of 3 queries. {mends}"));
     }
 
     #[test]

@@ -25,6 +25,7 @@ mod planted;
 mod planted_scene;
 mod pose_files;
 mod real_pairs;
+mod remedies;
 mod same_results;
 mod scene_statistics;
 mod signals;
@@ -56,6 +57,7 @@ enum Study {
     PoseFiles(pose_files::Options),
     Growth(growth::Options),
     Peers(peers::Options),
+    Remedies(remedies::Options),
     SameResults(same_results::Options),
 }
 
@@ -77,6 +79,7 @@ fn main() -> ExitCode {
         Study::PoseFiles(options) => pose_files::run(&options),
         Study::Growth(options) => growth::run(&options),
         Study::Peers(options) => peers::run(&options),
+        Study::Remedies(options) => remedies::run(&options),
         Study::SameResults(options) => match same_results::run(&options) {
             Ok(0) => Ok(()),
             Ok(_) => return ExitCode::FAILURE,

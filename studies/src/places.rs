@@ -41,7 +41,7 @@ impl Chosen {
                 work(&Place { ground: Ground::Real(&pairs[number]), number })
             });
         }
-        let drives = Drives::new();
+        let drives = Drives::of_town(WORLD_SEED, Size::Full);
         at_places(self.places, |number| work(&Place::numbered(&drives, number, self.seed)))
     }
 }
@@ -70,12 +70,13 @@ pub struct Drives {
 }
 
 impl Drives {
-    fn new() -> Self {
-        let drive = |seed, condition| Traversal::new(seed, condition, Size::Full);
+    /// The drives through a town, with photos of a size.
+    pub fn of_town(world_seed: u64, size: Size) -> Self {
+        let drive = |seed, condition| Traversal::new(seed, condition, size);
         Self {
-            day: drive(WORLD_SEED, Condition::Overcast),
-            night: drive(WORLD_SEED, Condition::Night),
-            elsewhere: drive(WORLD_SEED + 1, Condition::Overcast),
+            day: drive(world_seed, Condition::Overcast),
+            night: drive(world_seed, Condition::Night),
+            elsewhere: drive(world_seed + 1, Condition::Overcast),
         }
     }
 }
@@ -115,7 +116,7 @@ pub struct Case {
 
 impl<'a> Place<'a> {
     /// The place of the street with a number: a frame anywhere, and one 3 to 7 m before or behind it.
-    fn numbered(drives: &'a Drives, number: usize, seed: u64) -> Self {
+    pub fn numbered(drives: &'a Drives, number: usize, seed: u64) -> Self {
         let mut rng = Pcg64::seed_from_u64(seed.wrapping_mul(1009).wrapping_add(number as u64));
         let frames = drives.day.frame_count();
         let query = rng.random_range(0..frames);

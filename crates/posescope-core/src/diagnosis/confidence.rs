@@ -308,7 +308,7 @@ pub fn responsible(method: Method, outcome: &Outcome) -> Method {
 }
 
 /// The method whose pose a result has: of a hybrid the one that it took.
-pub(super) fn responsible_of(method: Method, fell_back: bool) -> Method {
+pub fn responsible_of(method: Method, fell_back: bool) -> Method {
     match estimator::find(method).and_then(|entry| entry.hybrid()) {
         Some(parts) if fell_back => parts.second,
         Some(parts) => parts.first,

@@ -55,6 +55,22 @@ pub fn remedies(
     tried
 }
 
+/// Everything that may help a method against any verdict: what each rule lists, every other method, and other
+/// references.
+pub fn candidates(method: Method, fell_back: bool, params: &Params, radius_m: f64) -> Vec<Remedy> {
+    let listed =
+        Code::ALL.iter().flat_map(|&code| remedies(code, method, fell_back, params, radius_m));
+    let others = estimator::methods().filter(|other| *other != method);
+    let all = listed.chain(others.map(|other| vec![Change::Method(other)]));
+    let mut candidates: Vec<Remedy> = Vec::new();
+    for remedy in all {
+        if !candidates.contains(&remedy) {
+            candidates.push(remedy);
+        }
+    }
+    candidates
+}
+
 /// Whether a remedy changes how features are detected or matched. It does nothing for matches of another system.
 pub fn changes_matching(remedy: &Remedy) -> bool {
     const MATCHING: [&str; 3] = ["surf.", "fb.ratio=", "fb.unique="];

@@ -59,7 +59,7 @@ impl Localizer<'_> {
         });
         let candidates: Vec<Changed> = candidates
             .iter()
-            .filter_map(|remedy| self.changed(answer, query, remedy))
+            .filter_map(|remedy| self.changed(result.method, asked, query, remedy))
             .take(self.runs_to_explain)
             .collect();
         for (tried, changed) in candidates.iter().enumerate() {
@@ -77,11 +77,19 @@ impl Localizer<'_> {
         Ok(())
     }
 
-    fn changed(&self, answer: &Answer, query: usize, remedy: &Remedy) -> Option<Changed> {
+    /// What a remedy makes of a query that a method localised; `None` where it cannot be tried.
+    #[doc(hidden)]
+    pub fn changed(
+        &self,
+        method: Method,
+        asked: &Request,
+        query: usize,
+        remedy: &Remedy,
+    ) -> Option<Changed> {
         let mut changed = Changed {
             params: self.params().clone(),
-            method: answer.result.method,
-            request: Request { setting: None, ..answer.asked.clone() },
+            method,
+            request: Request { setting: None, ..asked.clone() },
             args: Vec::new(),
         };
         let mut option = |name: &str, value: String| {
@@ -107,7 +115,7 @@ impl Localizer<'_> {
                     option("method", method.to_string());
                 }
                 Change::Reference(farther) => {
-                    let frame = self.farther_reference(&answer.asked, query, *farther)?;
+                    let frame = self.farther_reference(asked, query, *farther)?;
                     changed.request.references.frames = vec![frame];
                     option("reference", self.references().frames()[frame].clone());
                 }
@@ -132,16 +140,19 @@ impl Localizer<'_> {
 }
 
 /// A query asked differently.
-struct Changed {
+#[doc(hidden)]
+pub struct Changed {
     params: crate::params::Params,
-    method: Method,
+    /// The method that answers now.
+    pub method: Method,
     request: Request,
-    args: Vec<String>,
+    /// The arguments that ask so.
+    pub args: Vec<String>,
 }
 
 impl Changed {
     /// The error of the pose, if it is right now.
-    fn run(&self, localizer: &Localizer<'_>, query: usize) -> Option<PoseError> {
+    pub fn run(&self, localizer: &Localizer<'_>, query: usize) -> Option<PoseError> {
         let again = localizer.with_other_params(&self.params);
         let mut found = None;
         let keep = |result: QueryResult, _| {
