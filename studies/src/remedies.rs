@@ -2,7 +2,7 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::path::PathBuf;
 
 use posescope::diagnosis::remedies::{Change, Remedy, candidates, remedies};
-use posescope::diagnosis::{Tolerance, confidence};
+use posescope::diagnosis::{Diagnosis, Tolerance, confidence};
 use posescope::estimator;
 use posescope::geometry::PoseError;
 use posescope::localize::{LocalizeError, Localizer, NoObserver, QueryResult, Request};
@@ -13,8 +13,7 @@ use posescope::scene::{self, Scene, SceneSize};
 use rand::seq::IndexedRandom as _;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_pcg::Pcg64;
-use serde::Serialize;
-use serde_json::Value;
+use serde::{Deserialize, Serialize};
 
 use crate::Failure;
 use crate::faults;
@@ -80,17 +79,23 @@ pub struct Options {
     /// Write each failure with all that was tried as JSON lines.
     #[arg(long)]
     lines: Option<PathBuf>,
+    /// Take the failures of --lines of an earlier run, too, and judge today's advice on them.
+    #[arg(long)]
+    from: Vec<PathBuf>,
 }
 
 /// A query that a method failed to localise, and what mends it.
-#[derive(Serialize)]
+#[derive(Serialize, Deserialize)]
 struct Failed {
     /// Where it is from: `town`, `planted` or the scene, with what is special.
     source: String,
     method: Method,
-    code: String,
+    fell_back: bool,
+    /// The parameters that are not at their defaults, as assignments.
+    settings: Vec<String>,
+    radius_m: f64,
     family: String,
-    evidence: Value,
+    primary: Diagnosis,
     /// The advice for its verdict, in its order.
     advice: Vec<String>,
     /// Whether each candidate mends it.
@@ -102,6 +107,15 @@ pub fn run(options: &Options) -> Result<(), Failure> {
     failed.extend(planted(options)?);
     for path in &options.scene {
         failed.extend(of_scene(scene::open(path, None)?.as_ref(), options)?);
+    }
+    for path in &options.from {
+        for line in std::fs::read_to_string(path)?.lines() {
+            let mut one: Failed = serde_json::from_str(line)?;
+            let mut params = Params::default();
+            one.settings.iter().try_for_each(|setting| params.assign(setting))?;
+            one.advice = one.advice(&params);
+            failed.push(one);
+        }
     }
     if let Some(path) = &options.lines {
         let lines: Result<Vec<String>, _> = failed.iter().map(serde_json::to_string).collect();
@@ -258,22 +272,24 @@ fn explained(
             let mends = *mends.or_insert_with(|| changed.run(localizer, query).is_some());
             tried.insert(label(&remedy), mends);
         }
-        let advice = remedies(primary.code, method, fell_back, params, asked.radius_m);
-        let advice = advice
-            .iter()
-            .filter(|remedy| localizer.changed(method, asked, query, remedy).is_some())
-            .map(label);
         let responsible = confidence::responsible_of(method, fell_back);
         let family = estimator::entry(responsible).family(params);
-        failed.push(Failed {
+        let plain = Params::default().list();
+        let changed =
+            params.list().into_iter().zip(plain).filter(|(now, plain)| now.value != plain.value);
+        let mut one = Failed {
             source: source.to_owned(),
             method,
-            code: primary.code.to_string(),
+            fell_back,
+            settings: changed.map(|(now, _)| format!("{}={}", now.key, now.value)).collect(),
+            radius_m: asked.radius_m,
             family: family.map_or("none".to_owned(), |family| format!("{family:?}")),
-            evidence: primary.evidence.clone(),
-            advice: advice.collect(),
+            primary: primary.clone(),
+            advice: Vec::new(),
             tried,
-        });
+        };
+        one.advice = one.advice(params);
+        failed.push(one);
     }
     Ok(failed)
 }
@@ -342,7 +358,11 @@ impl Group<'_> {
             let Some(best) = labels.into_iter().rev().max_by_key(|label| with(label)) else {
                 break;
             };
-            counts.push(with(best));
+            let count = with(best);
+            if counts.last().unwrap_or(&0) >= &count {
+                break;
+            }
+            counts.push(count);
             chosen.push(best);
         }
         (chosen, counts)
@@ -350,6 +370,13 @@ impl Group<'_> {
 }
 
 impl Failed {
+    /// The advice for its verdict, but for what could not be tried.
+    fn advice(&self, params: &Params) -> Vec<String> {
+        let advice = remedies(&self.primary, self.method, self.fell_back, params, self.radius_m);
+        let words = |one| words(one, self.method, self.fell_back, params, self.radius_m);
+        advice.iter().map(words).filter(|label| self.tried.contains_key(label)).collect()
+    }
+
     fn mended_by(&self, label: &str) -> bool {
         self.tried.get(label).copied().unwrap_or(false)
     }
@@ -367,7 +394,7 @@ impl Failed {
 fn report(failed: &[Failed]) {
     let mut groups: BTreeMap<(&str, &str), Group<'_>> = BTreeMap::new();
     for one in failed {
-        let key = (one.code.as_str(), one.family.as_str());
+        let key = (one.primary.code.name(), one.family.as_str());
         groups.entry(key).or_insert_with(|| Group(Vec::new())).0.push(one);
     }
     println!("\n## What the advice mends\n");

@@ -1,5 +1,7 @@
 //! Builds the remedies of rules: changes of settings, for a method with its parameters.
 
+use serde_json::Value;
+
 use super::Family;
 use crate::cost::SearchRule;
 use crate::estimator::{FeatureBased, FeatureParams};
@@ -22,6 +24,21 @@ pub enum Change {
 /// Changes to try together.
 pub type Remedy = Vec<Change>;
 
+/// Another method.
+pub(super) fn method(name: &'static str) -> Remedy {
+    vec![Change::Method(Method::named(name))]
+}
+
+/// The method that mends most failures of `studies remedies`, and its search alone.
+pub(super) fn many_starts() -> [Remedy; 2] {
+    [method("robust"), method("mi6")]
+}
+
+/// Other references, the farther one first: it mends more of `studies remedies`.
+pub(super) fn other_references() -> [Remedy; 2] {
+    [2, 1].map(|farther| vec![Change::Reference(farther)])
+}
+
 /// The input of a rule's remedies: a method with its parameters and the radius of its search.
 #[derive(Clone, Copy, Debug)]
 pub struct Ask<'a> {
@@ -33,6 +50,8 @@ pub struct Ask<'a> {
     pub params: &'a Params,
     /// The uncertainty radius \[m\].
     pub radius_m: f64,
+    /// What was found.
+    pub evidence: &'a Value,
 }
 
 impl Ask<'_> {
@@ -57,6 +76,36 @@ impl Ask<'_> {
     /// Another radius.
     pub(super) fn radius(&self, times: f64) -> Change {
         Change::Radius(rounded(self.radius_m * times))
+    }
+
+    /// How far the truth is from the reference \[m\], where a verdict says that this is too far.
+    fn too_far_m(&self) -> Option<f64> {
+        let metres = |key: &str| self.evidence.get(key).and_then(Value::as_f64);
+        // Of a pose that was refused, the distance is not that of the truth.
+        if self.evidence.get("error").is_some_and(|error| !error.is_null()) {
+            return None;
+        }
+        let distance_m = metres("distance_m")?;
+        let allowed_m = metres("allowed_m").or_else(|| metres("radius_m"))?;
+        let farthest_m = self.farthest_m(self.radius_m).max(allowed_m);
+        (distance_m > farthest_m).then_some(distance_m)
+    }
+
+    /// How far a pose may be from the reference within a radius \[m\].
+    fn farthest_m(&self, radius_m: f64) -> f64 {
+        radius_m * (1.0 + self.params.fb.radius_slack)
+    }
+
+    /// Whether a remedy may bring the truth within reach. Where the truth is too far from the reference, only a greater
+    /// radius or another reference does.
+    pub(super) fn reaches(&self, remedy: &Remedy) -> bool {
+        self.too_far_m().is_none_or(|distance_m| {
+            remedy.iter().any(|change| match change {
+                Change::Radius(radius_m) => self.farthest_m(*radius_m) >= distance_m,
+                Change::Reference(_) => true,
+                Change::Set(_) | Change::Method(_) => false,
+            })
+        })
     }
 
     /// A higher or lower floor of coverage.

@@ -120,6 +120,14 @@ impl<'a> Case<'a> {
         matches.deviation_m(self.subject, self.matching().mlesac.sigma_px)
     }
 
+    /// How far the truth is from the reference, and how far the prior lets it be \[m\]; `None` where it is within that.
+    pub(super) fn truth_beyond_prior(&self) -> Option<(f64, f64)> {
+        let distance_m = self.subject.reference_from_truth()?.translation.vector.norm();
+        let slack = self.matching().radius_slack;
+        let allowed_m = self.subject.problem.believed_within_m() * (1.0 + slack);
+        (distance_m > allowed_m).then_some((distance_m, allowed_m))
+    }
+
     /// Whether the consensus, accepted or not, is right.
     pub(super) fn consensus_is_right(&self) -> bool {
         let error = self.consensus_error();

@@ -11,7 +11,7 @@ use std::str::FromStr;
 use serde::Serialize;
 
 use super::Family;
-use super::ask::{Ask, Change, Remedy};
+use super::ask::{Ask, Change, Remedy, many_starts, method, other_references};
 use super::case::{Case, FusionCase, Member, RankingCase};
 use super::free_search::FreeSearch;
 use super::matches::Funnel;

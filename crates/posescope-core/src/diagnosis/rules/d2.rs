@@ -4,7 +4,12 @@ use super::*;
 
 pub(super) const RULE: Rule = Rule {
     title: "the cost prefers another place",
-    advice: "use another method or another reference",
+    advice: "use --method robust or another reference",
+    advice_of: |family| match family {
+        Family::MultiStart => Some("use another reference or another method"),
+        Family::Descent => Some("use search=grid or search=starts, or another reference"),
+        _ => None,
+    },
     applies_to: Family::SEARCHING,
     test: Test::Method(test),
     decided_at: DecidedAt::Stage(Stage::Search(Phase::PositionCoarse)),
@@ -107,9 +112,14 @@ pub(super) fn remedies(ask: &Ask<'_>) -> Vec<Remedy> {
     if ask.family == Family::Descent {
         return ask.other_searches();
     }
-    let mut tried = vec![vec![ask.floor(4.0, 0.2)], vec![ask.wider_splat()], vec![ask.radius(0.5)]];
-    tried.extend(ask.more_search().map(|more| vec![more]));
-    tried
+    let own = [vec![ask.floor(4.0, 0.2)], vec![ask.radius(0.5)], vec![ask.wider_splat()]];
+    let more = ask.more_search().map(|more| vec![more]);
+    let own = own.into_iter().chain(more);
+    if ask.family == Family::MultiStart {
+        // Its search is that of other methods, and another view decides.
+        return other_references().into_iter().chain(many_starts()).chain(own).collect();
+    }
+    many_starts().into_iter().chain(other_references()).chain(own).collect()
 }
 
 #[cfg(test)]

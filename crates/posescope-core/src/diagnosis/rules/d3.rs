@@ -6,14 +6,14 @@ use crate::grid::ScoredLattice;
 
 pub(super) const RULE: Rule = Rule {
     title: "the search missed a lower cost near the truth",
-    advice: "raise grid.rounds or mi6.starts, or lower grid.coarse_step; instead of search=descent, use search=grid",
+    advice: "use --method robust or search=starts, or another reference; with search=descent, use search=grid",
     advice_of: |family| match family {
-        Family::Grid => Some("use search=starts, raise grid.rounds or lower grid.coarse_step"),
+        Family::Grid => Some("use --method robust or search=starts, or another reference"),
         Family::Descent => {
             Some("use search=grid or search=starts; a descent stops in the first minimum")
         }
         Family::MultiStart => {
-            Some("raise mi6.starts or mi6.coarse_yaws, or lower grid.coarse_step")
+            Some("use another reference, lower grid.coarse_step or raise mi6.starts")
         }
         _ => None,
     },
@@ -178,7 +178,7 @@ fn lost_among_coarse(coarse: &ScoredLattice, away: &dyn Fn(&Offset) -> f64) -> T
 }
 
 fn remedies(ask: &Ask<'_>) -> Vec<Remedy> {
-    let (floor, splat) = (ask.floor(3.0, 0.15), ask.wider_splat());
+    let ([robust, mi6], [farther, nearer]) = (many_starts(), other_references());
     match ask.family {
         Family::Descent => ask.other_searches(),
         Family::MultiStart => {
@@ -187,12 +187,14 @@ fn remedies(ask: &Ask<'_>) -> Vec<Remedy> {
             let finalists = ask.set("mi6.finalists", (2 * mi6.finalists).min(100) as f64);
             let yaws = ask.set("mi6.coarse_yaws", (2 * mi6.coarse_yaws).min(61) as f64);
             vec![
-                vec![starts.clone(), finalists.clone()],
+                farther,
+                nearer,
                 vec![ask.dense()],
-                vec![ask.dense(), starts, finalists],
+                robust,
+                vec![ask.dense(), starts.clone(), finalists.clone()],
+                vec![starts, finalists],
                 vec![yaws],
-                vec![floor],
-                vec![splat],
+                vec![ask.wider_splat()],
             ]
         }
         _ => {
@@ -200,17 +202,11 @@ fn remedies(ask: &Ask<'_>) -> Vec<Remedy> {
             let grid = &ask.params.grid;
             let is_narrow = 2.0 * grid.fine_range_m < grid.coarse_step_m;
             let wide = is_narrow.then(|| vec![ask.set("grid.fine_range", grid.coarse_step_m)]);
-            // Many starts follow many minima where the grid follows one.
+            // Many starts follow many minima where the grid follows one, and `robust` those of features too.
             let starts = ask.other_searches();
-            let others = vec![
-                vec![rounds.clone()],
-                vec![dense.clone()],
-                vec![dense, rounds.clone()],
-                vec![floor],
-                vec![splat],
-                vec![ask.wide_yaw(), rounds],
-            ];
-            wide.into_iter().chain(starts).chain(others).collect()
+            let grids = [vec![rounds.clone()], vec![dense.clone()], vec![dense, rounds]];
+            let others = [farther, mi6].into_iter().chain(grids);
+            wide.into_iter().chain([robust]).chain(starts).chain(others).collect()
         }
     }
 }

@@ -21,7 +21,7 @@ pub(super) const RULE: Rule = Rule {
 fn advice_on(evidence: &Value) -> Option<&'static str> {
     let metres = |key: &str| evidence.get(key).and_then(Value::as_f64);
     Some(if evidence.get("is_turned").and_then(Value::as_bool) == Some(true) {
-        "raise grid.yaw_range, or use a reference with a nearer heading"
+        "use --method robust or another reference, or raise grid.yaw_range"
     } else if metres("distance_m")? > metres("radius_m")? {
         "raise --radius, or use a nearer reference"
     } else {
@@ -108,28 +108,30 @@ evidence!(Unreached { distance_m: f64, radius_m: f64 } => {
 });
 
 fn remedies(ask: &Ask<'_>) -> Vec<Remedy> {
-    let wider = [vec![ask.radius(1.5)], vec![ask.radius(2.0)]];
+    let [farther, nearer] = other_references();
+    let wider = [vec![ask.radius(1.5)], farther.clone(), vec![ask.radius(2.0)], nearer];
+    let lower_floor = vec![ask.floor(0.2, 0.0)];
     match ask.family {
-        Family::Descent => {
-            let mut tried = ask.other_searches();
-            tried.extend(wider);
-            tried
-        }
+        Family::Descent => ask.other_searches().into_iter().chain(wider).collect(),
         Family::MultiStart => {
-            let mut tried = Vec::from(wider);
-            tried.push(vec![ask.set("mi6.yaw_step", 2.0 * ask.params.mi6.yaw_step_deg)]);
-            tried.push(vec![ask.floor(0.2, 0.0)]);
-            tried
+            let coarser = vec![ask.set("mi6.yaw_step", 2.0 * ask.params.mi6.yaw_step_deg)];
+            wider.into_iter().chain([coarser, lower_floor]).collect()
         }
         _ => {
-            let [first, second] = wider;
-            vec![
-                first,
+            let [robust, mi6] = many_starts();
+            let turned = [
+                robust,
+                farther,
+                mi6,
+                method("fb2"),
                 vec![ask.wide_yaw(), ask.rounds()],
-                second,
-                vec![ask.floor(0.2, 0.0)],
                 vec![ask.set("grid.yaw_range", 45.0), ask.rounds()],
-            ]
+            ];
+            match ask.evidence.get("is_turned").and_then(Value::as_bool) {
+                Some(true) => turned.into(),
+                Some(false) => wider.into_iter().chain([lower_floor]).collect(),
+                None => [lower_floor].into_iter().chain(wider).chain(turned).collect(),
+            }
         }
     }
 }
@@ -146,7 +148,7 @@ mod tests {
         let outside = json!({ "distance_m": 20.0, "radius_m": 15.0, "is_turned": false });
         assert!(advice(&outside).starts_with("raise --radius"));
         let turned = json!({ "distance_m": 2.0, "radius_m": 15.0, "is_turned": true });
-        assert!(advice(&turned).starts_with("raise grid.yaw_range"));
+        assert!(advice(&turned).ends_with("raise grid.yaw_range"));
         assert_eq!(advice(&json!({ "covered": 10, "least_covered": 300 })), RULE.advice);
     }
 }

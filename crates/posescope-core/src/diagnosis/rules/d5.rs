@@ -14,6 +14,7 @@ pub(super) const RULE: Rule = Rule {
     test: Test::Method(test),
     decided_at: DecidedAt::Stage(Stage::Assess),
     proof: Proof::CostMap(MapOverlay::Flat),
+    remedies: |_| other_references().into(),
     ..Rule::new(Code::D5)
 };
 

@@ -4,7 +4,7 @@ use super::*;
 
 pub(super) const RULE: Rule = Rule {
     title: "the photos look too different",
-    advice: "use another method, or a reference of similar light",
+    advice: "use --method robust or mi6, or a reference of similar light",
     applies_to: &[Family::Grid],
     test: Test::Method(test),
     decided_at: DecidedAt::Stage(Stage::Assess),

@@ -9,7 +9,7 @@ const OFF_PLANE_DEG: f64 = 0.5;
 
 pub(super) const RULE: Rule = Rule {
     title: "height, pitch or roll are off, which are not searched",
-    advice: "use mi6 or robust, which search all six freedoms",
+    advice: "use --method robust or mi6, which search all six freedoms",
     applies_to: &[Family::Grid],
     test: Test::Method(test),
     proof: Proof::FreedViews,

@@ -4,7 +4,7 @@ use super::*;
 
 pub(super) const RULE: Rule = Rule {
     title: "the search ended at its edge",
-    advice: "raise --radius",
+    advice: "use --method robust, or raise --radius",
     advice_of: |family| match family {
         Family::Descent => Some("use search=grid or search=starts; the way down left the disc"),
         _ => None,
@@ -21,7 +21,7 @@ pub(super) const RULE: Rule = Rule {
 fn remedies(ask: &Ask<'_>) -> Vec<Remedy> {
     match ask.family {
         Family::Descent => ask.other_searches(),
-        _ => d1::remedies(ask),
+        _ => many_starts().into_iter().chain(d1::remedies(ask)).collect(),
     }
 }
 

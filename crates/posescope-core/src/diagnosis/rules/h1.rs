@@ -4,13 +4,14 @@ use super::*;
 
 pub(super) const RULE: Rule = Rule {
     title: "the wrong method's pose was kept",
-    advice: "run the other method alone, or use robust",
+    advice: "use --method robust, or run the other method alone",
     advice_of: |family| match family {
         Family::MultiStart => Some("run the better method alone, or change robust.credit"),
         _ => None,
     },
     applies_to: Family::ALL,
     test: Test::Method(test),
+    remedies,
     ..Rule::new(Code::H1)
 };
 
@@ -79,3 +80,12 @@ evidence!(PassedOver {
          (lower is better).{why}"
     )
 });
+
+fn remedies(ask: &Ask<'_>) -> Vec<Remedy> {
+    let ([robust, mi6], [farther, nearer]) = (many_starts(), other_references());
+    let mut tried = vec![robust, farther, mi6, nearer];
+    if ask.family == Family::Features {
+        tried.extend([vec![ask.ratio(-0.1)], vec![ask.more_keypoints(0.2), ask.ratio(0.06)]]);
+    }
+    tried
+}

@@ -8,6 +8,7 @@ pub(super) const RULE: Rule = Rule {
     applies_to: &[Family::Features, Family::Guided, Family::Grid, Family::MultiStart],
     needs_truth: false,
     test: Test::Method(test),
+    remedies: |_| other_references().into(),
     ..Rule::new(Code::N1)
 };
 

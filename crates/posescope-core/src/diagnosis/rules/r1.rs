@@ -15,6 +15,7 @@ pub(super) const RULE: Rule = Rule {
     test: Test::Method(test),
     decided_at: DecidedAt::Stage(Stage::Match),
     proof: Proof::CloudOnPhoto,
+    remedies: |_| other_references().into(),
     ..Rule::new(Code::R1)
 };
 

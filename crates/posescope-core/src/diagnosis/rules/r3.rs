@@ -8,7 +8,12 @@ pub(super) const FEW_MATCHES: usize = 8;
 
 pub(super) const RULE: Rule = Rule {
     title: "too few true matches",
-    advice: "raise fb.ratio or get more keypoints; other light needs another method",
+    advice: "use --method robust or another reference, or get more keypoints",
+    advice_on: |found| {
+        found
+            .get("allowed_m")
+            .map(|_| "use another reference, nearer to the query, or raise --radius")
+    },
     advice_of_matches: Some(
         "let the matcher keep more matches, or use another reference or method",
     ),
@@ -35,6 +40,7 @@ fn test(case: &Case<'_>) -> Option<Diagnosis> {
         return None;
     }
     let (lost_at, before, after) = funnel.worst_step();
+    let too_far = case.truth_beyond_prior();
     Some(RULE.found(&Matches {
         unique: matches.all_unique,
         lost_at,
@@ -42,6 +48,8 @@ fn test(case: &Case<'_>) -> Option<Diagnosis> {
         after,
         limit: case.keypoint_limit().filter(|_| lost_at == FunnelStep::Detect),
         true_matches: funnel,
+        distance_m: too_far.map(|(distance_m, _)| distance_m),
+        allowed_m: too_far.map(|(_, allowed_m)| allowed_m),
     }))
 }
 
@@ -54,6 +62,12 @@ struct Matches {
     #[serde(skip_serializing_if = "Option::is_none")]
     limit: Option<String>,
     true_matches: Funnel,
+    /// How far the truth is from the reference \[m\], where it is farther than the prior allows.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    distance_m: Option<f64>,
+    /// How far it may be then \[m\].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    allowed_m: Option<f64>,
 }
 
 impl fmt::Display for Matches {
@@ -82,24 +96,23 @@ impl fmt::Display for Matches {
     }
 }
 
-pub(super) fn remedies(ask: &Ask<'_>) -> Vec<Remedy> {
-    let mut tried = vec![
-        vec![ask.ratio(0.06)],
-        vec![ask.more_keypoints(0.2)],
-        vec![ask.more_keypoints(0.2), ask.ratio(0.06)],
-    ];
-    tried.extend(
-        match ask.family {
-            Family::Guided => vec![
-                ask.set("fb2.window", 2.0 * ask.params.fb2.window_px),
-                ask.set("fb2.least_probability", 0.0),
-            ],
-            _ => vec![ask.word("fb.accept", "paper")],
-        }
-        .into_iter()
-        .map(|change| vec![change]),
-    );
-    tried
+fn remedies(ask: &Ask<'_>) -> Vec<Remedy> {
+    let own = match ask.family {
+        Family::Guided => vec![
+            ask.set("fb2.window", 2.0 * ask.params.fb2.window_px),
+            ask.set("fb2.least_probability", 0.0),
+        ],
+        _ => vec![ask.word("fb.accept", "paper")],
+    };
+    let ([robust, mi6], [farther, nearer]) = (many_starts(), other_references());
+    let keypoints = vec![ask.more_keypoints(0.2)];
+    let both = vec![ask.more_keypoints(0.2), ask.ratio(0.06)];
+    let (first, second) = match ask.family {
+        Family::Guided => (keypoints, both),
+        _ => (both, keypoints),
+    };
+    let tried = [robust, farther, first, mi6, nearer, second, vec![ask.ratio(0.06)]];
+    tried.into_iter().chain(own.into_iter().map(|change| vec![change])).collect()
 }
 
 #[cfg(test)]
@@ -110,6 +123,8 @@ mod tests {
     fn a_limit_of_keypoints_is_named_where_detection_lost_them() {
         let said = |limit: Option<&str>| {
             let matches = Matches {
+                distance_m: None,
+                allowed_m: None,
                 unique: 6,
                 lost_at: FunnelStep::Detect,
                 before: 40,

@@ -4,7 +4,7 @@ use super::*;
 
 pub(super) const RULE: Rule = Rule {
     title: "a wrong pose was accepted",
-    advice: "check that camera and cloud belong to the photos; then try another fb.ratio",
+    advice: "check that camera and cloud belong to the photos; then use --method robust",
     advice_of_matches: Some("check that camera, cloud and matches belong to the photos"),
     applies_to: Family::MATCHING,
     test: Test::Method(test),
@@ -63,9 +63,10 @@ evidence!(Accepted {
 });
 
 fn remedies(ask: &Ask<'_>) -> Vec<Remedy> {
-    let mut tried = vec![vec![ask.ratio(-0.1)], vec![ask.ratio(-0.2)]];
+    let mut tried = Vec::from(many_starts());
+    tried.extend([vec![ask.more_keypoints(0.2)], vec![ask.ratio(-0.1)], vec![ask.ratio(-0.2)]]);
     if ask.family == Family::Features {
-        tried.insert(1, vec![ask.word("fb.depth", "guarded")]);
+        tried.push(vec![ask.word("fb.depth", "guarded")]);
     }
     tried
 }

@@ -4,7 +4,7 @@ use super::*;
 
 pub(super) const RULE: Rule = Rule {
     title: "the pose is outside the prior",
-    advice: "raise --radius or fb.radius_slack",
+    advice: "use another reference, nearer to the query, or raise --radius",
     applies_to: Family::MATCHING,
     test: Test::Method(test),
     proof: Proof::PoseMap,
@@ -24,11 +24,8 @@ fn test(case: &Case<'_>) -> Option<Diagnosis> {
             error: Some(case.consensus_error()?),
         }));
     }
-    let distance_m = (case.subject.reference_from_truth()?.translation.vector).norm();
-    let slack = case.matching().radius_slack;
-    let allowed_m = case.subject.problem.believed_within_m() * (1.0 + slack);
-    let is_outside = distance_m > allowed_m;
-    is_outside.then(|| RULE.found(&Outside { distance_m, allowed_m, error: None }))
+    let (distance_m, allowed_m) = case.truth_beyond_prior()?;
+    Some(RULE.found(&Outside { distance_m, allowed_m, error: None }))
 }
 
 // Of the pose that was found, or without an error of the truth.
@@ -47,5 +44,7 @@ evidence!(Outside { distance_m: f64, allowed_m: f64, error: Option<PoseError> } 
 });
 
 fn remedies(ask: &Ask<'_>) -> Vec<Remedy> {
-    [1.5, 2.0, 3.0].map(|times| vec![ask.radius(times)]).into()
+    let [farther, nearer] = other_references();
+    let [wider, wide, widest] = [1.5, 2.0, 3.0].map(|times| vec![ask.radius(times)]);
+    vec![farther, wider, wide, widest, nearer]
 }

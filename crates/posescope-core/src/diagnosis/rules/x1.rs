@@ -41,6 +41,10 @@ pub(super) const RULE: Rule = Rule {
         if is_of_the_scene { &[Code::R1, Code::D4, Code::D7] } else { &[] }
     },
     proof: Proof::CloudOnPhoto,
+    remedies: |_| {
+        let ([robust, _], [farther, nearer]) = (many_starts(), other_references());
+        vec![farther, robust, nearer]
+    },
     ..Rule::new(Code::X1)
 };
 

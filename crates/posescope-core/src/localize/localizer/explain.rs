@@ -50,8 +50,7 @@ impl Localizer<'_> {
         let Answer { result, asked, .. } = answer;
         let candidates = result.diagnosis.first().map_or(Vec::new(), |primary| {
             let (method, fell_back) = (result.method, result.fell_back());
-            let mut tried =
-                remedies(primary.code, method, fell_back, self.params(), asked.radius_m);
+            let mut tried = remedies(primary, method, fell_back, self.params(), asked.radius_m);
             if primary.has_given_matches() {
                 tried.retain(|remedy| !changes_matching(remedy));
             }
