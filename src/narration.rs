@@ -104,9 +104,7 @@ pub(crate) fn sentence(event: &Event) -> Option<String> {
         Event::StartsRefined(event) => refined(event)?,
         Event::CandidatesJudged(event) => judged(event),
         Event::OwnAnswered(event) => own_answer(event),
-        Event::OpinionFormed(event) => {
-            format!("{}. {}", event.opinion.words(), event.opinion.because)
-        }
+        Event::OpinionFormed(event) => format!("{}. {}", event.words, event.because),
         Event::ReferencesFused(event) => fused(event),
         Event::ReferencesRanked(event) => ranked(event),
         _ => return None,

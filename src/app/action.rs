@@ -144,6 +144,7 @@ pub const ACTIONS: &[Action] = &[
     once(Query, &[shift(Key::N)], "Previous failure", |app| app.state.next_failure(true)),
     switch(Query, &[key(Key::E)], "Try what would have helped", |app| app.state.switch_explaining(), |state| state.setup.task.protocol.explain > 0),
     once(Query, &[key(Key::Slash)], "Filter the queries, the parameters or the results", |app| app.state.focus_filter()),
+    once(Query, &[], "Explain all failures", |app| app.state.explain_all()),
     switch(Query, &[], "Run all queries, or stop", |app| app.state.queries.run_all(&app.state.setup), |state| state.queries.progress().is_some()),
     switch(Show, &[key(Key::G)], "Ground truth", |app| app.state.options.shows_truth ^= true, |state| state.options.shows_truth),
     once(Show, &[key(Key::V)], "3-D view and back", |app| app.state.toggle(ViewName::Space)),

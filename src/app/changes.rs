@@ -19,6 +19,7 @@ use crate::image::Degradation;
 use crate::lesson::Moment;
 use crate::localize::{QueryResult, References, Selection};
 use crate::method::Method;
+use crate::run::Protocol;
 use crate::session::{Breakpoint, Breakpoints, Part, RunMode, RunState};
 
 impl AppState {
@@ -261,6 +262,27 @@ impl AppState {
     pub(super) fn first_failure(&self, query: usize) -> Option<usize> {
         let mut known = self.results.get(&query)?.iter();
         known.position(QueryResult::is_suspect)
+    }
+
+    /// Whether a query has failed by the truth, and nobody has tried yet what would help.
+    pub(super) fn is_unexplained(&self, query: usize) -> bool {
+        let known = self.results.get(&query).into_iter().flatten();
+        let is_unexplained = |one: &QueryResult| {
+            one.grade.is_failure() && one.initial_error.is_some() && one.explanation.is_none()
+        };
+        known.into_iter().any(is_unexplained)
+    }
+
+    /// Runs each failed query again, to see what would have helped.
+    pub(super) fn explain_all(&mut self) {
+        let mut setup = self.setup.clone();
+        setup.offered.retain(|query| self.is_unexplained(*query));
+        if setup.offered.is_empty() {
+            self.note("No failure is left to explain; Run all finds them", false);
+        } else if self.queries.progress().is_none() {
+            setup.task.protocol.explain = Protocol::EXPLAINING_RUNS;
+            self.queries.run_all(&setup);
+        }
     }
 
     pub(super) fn next_failure(&mut self, back: bool) {

@@ -1,7 +1,7 @@
 //! Which remedies mend most queries of a run.
 
 use super::groups::grouped;
-use crate::localize::QueryResult;
+use crate::localize::{Helped, QueryResult};
 
 /// What stands for references that were tried for single queries: another query needs another frame.
 const ANOTHER_REFERENCE: &str = "a reference farther away";
@@ -12,7 +12,7 @@ pub fn mended(results: &[&QueryResult]) -> Vec<(String, usize)> {
     let helped = results.iter().flat_map(|result| {
         let helped = result.explanation.iter().flat_map(|explanation| &explanation.helped);
         let scene = result.query_scene.as_ref().unwrap_or(&result.scene);
-        helped.map(move |helped| (words(&helped.args), (scene, &result.query)))
+        helped.map(move |helped| (words(helped), (scene, &result.query)))
     });
     let mut mended: Vec<(String, usize)> = grouped(helped)
         .into_iter()
@@ -27,11 +27,12 @@ pub fn mended(results: &[&QueryResult]) -> Vec<(String, usize)> {
 }
 
 /// A remedy as one of a whole run.
-fn words(args: &[String]) -> String {
-    if args.iter().any(|arg| arg == "--reference") {
+fn words(helped: &Helped) -> String {
+    if helped.names_a_frame() {
         return ANOTHER_REFERENCE.to_owned();
     }
-    let args: Vec<&str> = args.iter().map(String::as_str).filter(|arg| *arg != "--set").collect();
+    let args: Vec<&str> =
+        helped.args.iter().map(String::as_str).filter(|arg| *arg != "--set").collect();
     format!("`{}`", args.join(" "))
 }
 
@@ -39,7 +40,7 @@ fn words(args: &[String]) -> String {
 mod tests {
     use super::*;
     use crate::geometry::PoseError;
-    use crate::localize::{Explanation, Helped};
+    use crate::localize::Explanation;
     use crate::measure::metrics::tests::row;
 
     /// A wrong result of a query with the arguments that made it right.

@@ -120,7 +120,7 @@ pub(super) fn both_poses(case: &ProofCase<'_>) -> Option<ProofPicture> {
     // Small panels have little room for words.
     let given = Panel { title: given.label(), ..view_panel(query, &given) };
     let beside = [photo, given];
-    let parts = parts.map(|parts| Panel::new("Orange: given, blue: other", parts));
+    let parts = parts.map(|parts| Panel::new("Fits better: given (orange), other (blue)", parts));
     Some(ProofPicture {
         large: view_panel(query, &better),
         below: None,

@@ -9,6 +9,7 @@ use crate::event::Side;
 use crate::image::Degradation;
 use crate::localize::{References, frames_within, is_one_drive};
 use crate::method::Method;
+use crate::run::Reference;
 use crate::scene::Scene;
 
 impl Job {
@@ -80,9 +81,18 @@ impl Job {
                     let place = |asked: &Method| estimator::methods().position(|m| m == *asked);
                     methods.sort_by_key(|asked| place(asked).unwrap_or(usize::MAX));
                 }
-                "--reference" => {
-                    let frame = self.references.find(value).map_err(|why| wrong(&why))?;
-                    self.choose_by_hand(vec![frame]);
+                "--reference" => match value.parse() {
+                    Ok(way @ Reference::Chosen(_)) => {
+                        self.task.protocol.references = vec![way];
+                        self.chosen = References::default();
+                    }
+                    _ => {
+                        let frame = self.references.find(value).map_err(|why| wrong(&why))?;
+                        self.choose_by_hand(vec![frame]);
+                    }
+                },
+                "--fusion" => {
+                    self.task.protocol.fusions = vec![value.parse().map_err(|why| wrong(&why))?];
                 }
                 _ => return Err(wrong(&"no argument of a remedy")),
             }

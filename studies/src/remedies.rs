@@ -311,6 +311,8 @@ fn words(
         Change::Radius(other) => format!("radius × {}", (other / radius_m * 100.0).round() / 100.0),
         Change::Method(other) => format!("method {other}"),
         Change::Reference(farther) => format!("another reference, {farther}"),
+        Change::Fusion(name) => format!("fusion {name}"),
+        Change::Ranked(count) => format!("{count} of the ranking"),
         Change::Set(assignment) => {
             let (key, value) = assignment.split_once('=').unwrap_or((assignment, ""));
             if value_in(&params.defaults(), key) == value {

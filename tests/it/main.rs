@@ -45,6 +45,7 @@ mod processors;
 mod real_pair;
 mod recording;
 mod reference_views;
+mod remedies;
 mod report;
 mod results;
 mod retrieval;

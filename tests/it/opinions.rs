@@ -91,13 +91,14 @@ fn a_right_pose_is_confirmed_and_one_elsewhere_is_contradicted_with_where_the_ph
 }
 
 #[test]
-fn the_truth_changes_no_opinion_and_a_verdict_stands_only_where_there_is_none() {
+fn the_truth_changes_no_opinion_and_no_verdict_is_about_a_search() {
     let off = Pose::translation(0.0, 0.0, 3.0);
     let [hidden] = results(off, &[66], vec![], false).try_into().expect("one");
     let [known] = results(off, &[66], vec![], true).try_into().expect("one");
     assert_eq!(hidden.opinion, known.opinion);
     assert_eq!(known.grade, Grade::Wrong);
-    assert!(known.diagnosis.iter().all(|one| one.code != Code::E3));
+    let codes: Vec<Code> = known.diagnosis.iter().map(|one| one.code).collect();
+    assert_eq!(codes, [Code::E3]);
 }
 
 #[test]
@@ -208,7 +209,7 @@ fn matches_of_the_other_system_confirm_no_pose_that_they_lead_to() {
     // The truth says that their consensus is wrong.
     let (_, [_, given]) = by_matches_and_given(off(), off(), true);
     let codes: Vec<Code> = given.diagnosis.iter().map(|one| one.code).collect();
-    assert!(codes.starts_with(&[Code::E3, Code::R8]), "{codes:?}");
+    assert!(codes[0] == Code::E3 && codes.contains(&Code::R8), "{codes:?}");
 }
 
 #[test]
@@ -249,7 +250,7 @@ fn every_own_answer_of_an_opinion_is_an_event() {
     assert!(!own.is_empty() && own.iter().all(|one| one["method"] == "mine"), "{own:?}");
     assert!(own[0]["apart"]["translation_m"].as_f64().expect("a distance") > 5.0);
     let [formed] = of_kind("OpinionFormed")[..] else { panic!("one opinion") };
-    assert_eq!(formed["opinion"]["standing"], "contradicted");
+    assert_eq!(formed["standing"], "contradicted");
     assert!(formed["depth"].as_u64() > Some(1), "inside of the stage `opinion`");
     assert!(of_kind("StageStarted").iter().any(|one| one["stage"] == "opinion"));
     // What the own methods do on the way is kept from whoever watches the other system.

@@ -65,11 +65,16 @@ fn the_tour_leads_from_a_failure_to_a_right_pose() {
     let best = explanation.best().expect("something helped").args.clone();
     send(&mut window, |app| app.app_state_mut().try_again(&best));
     finish(&mut window);
-    send(&mut window, |app| app.app_state_mut().select_method(Method::MI));
+    // What helps may be another method.
+    let mended: Method = match &best[..] {
+        [option, name] if option == "--method" => name.parse().expect("a method"),
+        _ => Method::MI,
+    };
+    send(&mut window, |app| app.app_state_mut().select_method(mended));
     take(&mut window, 3.5);
     let mut results = app(&window).run().results();
-    let result = results.find(|result| result.method == Method::MI);
-    assert_eq!(result.expect("MI ran").grade, Grade::Right);
+    let result = results.find(|result| result.method == mended);
+    assert_eq!(result.expect("it ran").grade, Grade::Right);
     if std::env::var_os("UPDATE_DOCS").is_none() {
         return;
     }

@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex};
 use egui::{Key, Modifiers};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
-use posescope::app::{ACTIONS, App, Arrangement, Opener};
+use posescope::app::{ACTIONS, App, Arrangement, Opener, Tab};
 use posescope::event::Event;
 use posescope::geometry::Pose;
 use posescope::lesson::Lesson;
@@ -196,14 +196,20 @@ fn a_double_click_opens_a_result_of_the_batch() {
         window.query_all_by_label("000002").next().expect("a row").rect().center()
     };
     let at = row(&window);
-    for pressed in [true, false, true, false] {
-        window.event(egui::Event::PointerMoved(at));
-        window.event(egui::Event::PointerButton {
-            pos: at,
-            button: egui::PointerButton::Primary,
-            pressed,
-            modifiers: Modifiers::NONE,
-        });
+    window.hover_at(at);
+    window.run_steps(4);
+    // Each event has a frame of a quarter of a second here.
+    window.ctx.options_mut(|options| options.input_options.max_double_click_delay = 1.0);
+    for _ in 0..2 {
+        for pressed in [true, false] {
+            window.event(egui::Event::PointerButton {
+                pos: at,
+                button: egui::PointerButton::Primary,
+                pressed,
+                modifiers: Modifiers::NONE,
+            });
+        }
+        window.step();
     }
     window.run_steps(3);
     assert_eq!(app(&window).setup.query, 2);
@@ -222,10 +228,33 @@ fn a_hypothesis_is_named_with_its_cost_beside_the_lowest_so_far() {
         Some(cost) => format!("hypothesis {}: cost {cost:.4}", tried.evaluation),
         None => format!("hypothesis {}", tried.evaluation),
     };
+    send(&mut window, |app| app.app_state_mut().show_tab(Tab::Log));
     for layout in [Arrangement::Inspect, Arrangement::Lecture] {
         send(&mut window, |app| app.arrange(layout));
         let said = window.query_all_by_label_contains(&words).next();
         assert!(said.is_some(), "{layout:?}: {words}");
         assert!(is_said(&window, "the lowest so far is"), "{layout:?}");
     }
+}
+
+#[test]
+fn all_failures_are_explained_at_once_and_what_mends_most_is_named() {
+    let mut window = finished(setup());
+    send(&mut window, |app| app.act("Run all queries, or stop"));
+    wait(&mut window, |app| app.app_state().results.len() == 3);
+    press(&mut window, Modifiers::NONE, Key::F4);
+    window.run_steps(2);
+    window.get_by_label("Explain all failures").click();
+    let is_explained = |app: &App| {
+        let results = &app.app_state().results;
+        let mut failed = results.values().flatten().filter(|one| one.grade.is_failure());
+        app.app_state().queries.progress().is_none() && failed.all(|one| one.explanation.is_some())
+    };
+    wait(&mut window, is_explained);
+    window.run_steps(3);
+    let results = &app(&window).results;
+    assert!(results.values().flatten().any(|one| one.explanation.is_some()));
+    // What is right needs no explanation, and its results stay.
+    assert_eq!(results.len(), 3);
+    assert!(!is_said(&window, "Explain all failures"));
 }

@@ -20,7 +20,6 @@ use crate::geometry::{Pose, PoseError};
 use crate::grid::{Offset, Phase, Score, Scored, ScoredLattice};
 use crate::image::Photo;
 use crate::method::Method;
-use crate::opinion::Opinion;
 use crate::retrieval::ReferenceRanking;
 use crate::robust::{Acceptance, Counted, Trial};
 
@@ -438,8 +437,17 @@ events! {
 
     /// The second opinion on another system's pose.
     pub struct OpinionFormed {
-        /// The opinion.
-        pub opinion: Arc<Opinion>,
+        /// What it comes to: `confirmed`, `contradicted` or `undecided`.
+        pub standing: &'static str,
+        /// How likely the other system's pose is right.
+        pub probability: f64,
+        /// The pose at which the photos agree, `world_from_camera`, if that is another one.
+        #[serde(serialize_with = "columns::rows_if_any")]
+        pub better: Option<Pose>,
+        /// What it comes to, with how far off the pose is, in words.
+        pub words: String,
+        /// Why, in a sentence.
+        pub because: String,
     }
 
     /// A step downhill by the derivatives of a smooth cost.

@@ -40,6 +40,14 @@ pub(crate) fn left(ui: &mut Ui, context: &ViewContext<'_>, panes: &mut Panes) {
         ui.button(text)
             .on_hover_text(help)
             .sends(context, const { Action::named("Run all queries, or stop") }.run);
+        let mut known = context.state.results.keys();
+        if context.state.queries.progress().is_none()
+            && known.any(|query| context.state.is_unexplained(*query))
+        {
+            ui.button("Explain all failures")
+                .on_hover_text("Localise each failed query again in other ways, to know what mends most of them")
+                .sends(context, const { Action::named("Explain all failures") }.run);
+        }
     });
     for remark in &overview.remarks {
         ui.label(remark);

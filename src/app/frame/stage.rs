@@ -91,7 +91,7 @@ fn number(stage: Stage, event: &Event) -> Option<String> {
         (Stage::Judge, Event::CandidatesJudged(event)) => {
             format!("{} poses judged", event.candidates.len())
         }
-        (Stage::Opinion, Event::OpinionFormed(event)) => event.opinion.standing.to_string(),
+        (Stage::Opinion, Event::OpinionFormed(event)) => event.standing.to_owned(),
         (Stage::Fuse, Event::ReferencesFused(event)) => format!("{} poses", event.shares.len()),
         (Stage::Retrieve, Event::ReferencesRanked(event)) => {
             format!("{} ranked", event.ranking.candidates)

@@ -19,6 +19,10 @@ pub enum Change {
     Method(Method),
     /// Another reference, this many places farther than the one used.
     Reference(usize),
+    /// Another fusion of the same references, by its name.
+    Fusion(&'static str),
+    /// So many references of the ranking, in the place of those that were chosen of it.
+    Ranked(usize),
 }
 
 /// Changes to try together.
@@ -102,8 +106,8 @@ impl Ask<'_> {
         self.too_far_m().is_none_or(|distance_m| {
             remedy.iter().any(|change| match change {
                 Change::Radius(radius_m) => self.farthest_m(*radius_m) >= distance_m,
-                Change::Reference(_) => true,
-                Change::Set(_) | Change::Method(_) => false,
+                Change::Reference(_) | Change::Ranked(_) => true,
+                Change::Set(_) | Change::Method(_) | Change::Fusion(_) => false,
             })
         })
     }

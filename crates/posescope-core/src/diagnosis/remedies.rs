@@ -51,7 +51,7 @@ pub fn remedies(
             changed.assign(assignment).is_ok() && changed != *params
         }
         Change::Method(other) => ![method, responsible].contains(other),
-        Change::Reference(_) => true,
+        Change::Reference(_) | Change::Fusion(_) | Change::Ranked(_) => true,
     };
     tried.retain(|remedy| {
         remedy.iter().all(is_change) && ask.is_none_or(|ask| is_given || ask.reaches(remedy))
@@ -91,9 +91,9 @@ fn each_once(all: impl Iterator<Item = Remedy>) -> Vec<Remedy> {
     found
 }
 
-/// Whether a remedy is another method or another reference alone.
+/// Whether a remedy is another method or other references alone.
 fn changes_no_setting(remedy: &Remedy) -> bool {
-    remedy.iter().all(|change| matches!(change, Change::Method(_) | Change::Reference(_)))
+    !remedy.iter().any(|change| matches!(change, Change::Set(_) | Change::Radius(_)))
 }
 
 /// Whether a remedy changes how features are detected or matched. It does nothing for matches of another system.

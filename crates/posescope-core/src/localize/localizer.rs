@@ -287,7 +287,8 @@ impl<'a> Localizer<'a> {
                         let result = candidate.result.clone();
                         let result =
                             self.with_ranking_assessed(result, request, work.truth_for(method));
-                        let asked = work.asked_alone(problem);
+                        let mut asked = work.asked_alone(problem);
+                        asked.references.ranking = request.references.ranking.clone();
                         emit(result, candidate.times.clone(), asked)?;
                     }
                 }

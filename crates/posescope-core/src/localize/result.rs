@@ -122,8 +122,7 @@ impl Explanation {
     /// The remedy to recommend. They are tried in the order of what mends most, so it is the first that helped; one frame
     /// of the map in the place of another says the least about the cause.
     pub fn best(&self) -> Option<&Helped> {
-        let names_no_frame = |helped: &&Helped| !helped.args.iter().any(|arg| arg == "--reference");
-        self.helped.iter().find(names_no_frame).or(self.helped.first())
+        self.helped.iter().find(|helped| !helped.names_a_frame()).or(self.helped.first())
     }
 }
 
@@ -134,6 +133,13 @@ pub struct Helped {
     pub args: Vec<String>,
     /// The error of the pose then.
     pub error: PoseError,
+}
+
+impl Helped {
+    /// Whether it names a frame as the reference, in the place of a way to choose references.
+    pub fn names_a_frame(&self) -> bool {
+        self.args.windows(2).any(|pair| pair[0] == "--reference" && !pair[1].contains(':'))
+    }
 }
 
 /// What an experiment varies from one result of a query to the next.
@@ -559,6 +565,9 @@ mod tests {
         };
         let frame = helped("--reference", 0.1);
         let all = vec![frame.clone(), helped("--set", 0.5), helped("--method", 0.2)];
+        let mut ranked = frame.clone();
+        ranked.args[1] = "retrieve:3".to_owned();
+        assert!(frame.names_a_frame() && !ranked.names_a_frame());
         let explanation = |helped| Explanation { helped, failed: vec![], runs: 3, complete: true };
         assert_eq!(explanation(all).best().expect("it helped").args[0], "--set");
         assert_eq!(explanation(vec![frame.clone()]).best(), Some(&frame));

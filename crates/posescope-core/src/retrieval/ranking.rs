@@ -17,6 +17,16 @@ pub enum Criterion {
     Matches,
 }
 
+impl Criterion {
+    /// The way of choosing references by it, as `--reference WAY:K` has it.
+    pub(crate) fn way(self) -> &'static str {
+        match self {
+            Self::Words => "retrieve",
+            Self::Matches => "matches",
+        }
+    }
+}
+
 /// A frame that was ranked as a reference of a query.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RankedReference {

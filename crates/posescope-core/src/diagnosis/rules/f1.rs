@@ -6,10 +6,11 @@ use crate::fusion::{ShareOutcome, average_pose};
 
 pub(super) const RULE: Rule = Rule {
     title: "one reference dragged the fusion",
-    advice: "use --fusion r-wavg or --fusion joint",
+    advice: "use --fusion joint or --fusion r-wavg",
     test: Test::Fusion(test),
     decided_at: DecidedAt::Stage(Stage::Fuse),
     proof: Proof::PoseMap,
+    remedies: |_| ["joint", "r-wavg", "maxf"].map(|name| vec![Change::Fusion(name)]).into(),
     ..Rule::new(Code::F1)
 };
 

@@ -45,6 +45,6 @@ evidence!(Elsewhere {
 );
 
 evidence!(NoMatches { because: String } =>
-    "The query may not show this place, or in other light: its matches agree no more than those of other places. \
+    "The query may not show this place, or shows it from afar or in other light: its matches agree no more than those of other places. \
      {because}"
 );

@@ -7,7 +7,7 @@ use crate::diagnosis::matches::FunnelStep;
 pub(super) const FEW_MATCHES: usize = 8;
 
 pub(super) const RULE: Rule = Rule {
-    title: "too few true matches",
+    title: "too few usable matches",
     advice: "use --method robust or another reference, or get more keypoints",
     advice_on: |found| {
         found

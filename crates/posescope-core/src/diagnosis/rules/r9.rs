@@ -3,7 +3,7 @@
 use super::*;
 
 pub(super) const RULE: Rule = Rule {
-    title: "the pose is outside the prior",
+    title: "a pose is outside the prior",
     advice: "use another reference, nearer to the query, or raise --radius",
     applies_to: Family::MATCHING,
     test: Test::Method(test),

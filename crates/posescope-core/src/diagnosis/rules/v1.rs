@@ -9,6 +9,7 @@ pub(super) const RULE: Rule = Rule {
     test: Test::Ranking(test),
     decided_at: DecidedAt::Stage(Stage::Retrieve),
     proof: Proof::Ranking,
+    remedies: |_| [3, 5].map(|count| vec![Change::Ranked(count)]).into(),
     ..Rule::new(Code::V1)
 };
 

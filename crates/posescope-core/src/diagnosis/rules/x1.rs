@@ -15,6 +15,7 @@ use crate::diagnosis::matches::TrueMatches;
 use crate::diagnosis::readings::Reading;
 use crate::diagnosis::{Evidence, Subject};
 use crate::estimator::{Estimator, FeatureBased};
+use crate::problem::Problem;
 use crate::stats::median;
 use crate::trace::Trace;
 
@@ -113,8 +114,11 @@ impl SaidByFb {
         let subject = case.subject;
         let mut evidence = Evidence::default();
         let fb = FeatureBased::new(subject.params);
-        let outcome = fb.estimate(subject.problem, &mut Trace::to(&mut evidence)).ok()?;
-        let (problem, params) = (subject.problem, subject.params);
+        // The matches of another system would repeat its mistakes.
+        let own = (case.family == Family::Given)
+            .then(|| Problem { matches: None, ..subject.problem.clone() });
+        let (problem, params) = (own.as_ref().unwrap_or(subject.problem), subject.params);
+        let outcome = fb.estimate(problem, &mut Trace::to(&mut evidence)).ok()?;
         let of_fb = Subject::new(problem, Method::FB, params, &outcome, &evidence)
             .against(subject.truth, subject.tolerance);
         let case = Case::new(&of_fb, Family::Features, None);

@@ -6,6 +6,7 @@ use super::work::Answer;
 use super::{LocalizeError, Localizer, Request};
 use crate::diagnosis::Grade;
 use crate::diagnosis::remedies::{Change, Remedy, changes_matching, remedies};
+use crate::fusion::Fusion;
 use crate::geometry::PoseError;
 use crate::localize::observer::{LocalizeObserver, NoObserver, checkpoint};
 use crate::localize::{Explanation, Helped, QueryResult, frames_within};
@@ -117,6 +118,22 @@ impl Localizer<'_> {
                     let frame = self.farther_reference(asked, query, *farther)?;
                     changed.request.references.frames = vec![frame];
                     option("reference", self.references().frames()[frame].clone());
+                }
+                Change::Fusion(name) => {
+                    let fusion: Fusion = name.parse().ok()?;
+                    if asked.fusions.is_empty() || asked.fusions.contains(&fusion) {
+                        return None;
+                    }
+                    changed.request.fusions = vec![fusion];
+                    option("fusion", (*name).to_owned());
+                }
+                Change::Ranked(count) => {
+                    let ranking = asked.references.ranking.as_deref()?;
+                    let frames =
+                        ranking.frames.get(..*count).filter(|_| *count > ranking.chosen)?;
+                    changed.request.references.frames =
+                        frames.iter().map(|one| one.ranked.frame).collect();
+                    option("reference", format!("{}:{count}", ranking.criterion.way()));
                 }
             }
         }

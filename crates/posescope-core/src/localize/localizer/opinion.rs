@@ -15,7 +15,7 @@ use crate::geometry::{Pose, PoseError};
 use crate::grid::{Phase, ScoredLattice};
 use crate::localize::{LocalizeObserver, StageTimings, localize_by};
 use crate::method::Method;
-use crate::opinion::{ExplainedMatches, MatchesOfPose, Opinion, OwnAnswer};
+use crate::opinion::{BetterPose, ExplainedMatches, MatchesOfPose, Opinion, OwnAnswer};
 use crate::problem::Problem;
 use crate::trace::{Cancelled, Fanout, Trace};
 
@@ -47,8 +47,14 @@ impl Localizer<'_> {
             if let Ok(pose) = &outcome.pose {
                 let formed = trace.stage(Stage::Opinion, |trace| {
                     let own = self.own_answers(work, members, Some(pose), trace)?;
-                    let opinion = Arc::new(self.opinion(work, pose, &own));
-                    trace.emit(|| OpinionFormed { opinion: Arc::clone(&opinion) })?;
+                    let opinion = self.opinion(work, pose, &own);
+                    trace.emit(|| OpinionFormed {
+                        standing: opinion.standing.word(),
+                        probability: opinion.probability,
+                        better: opinion.better.as_ref().and_then(BetterPose::to_pose),
+                        words: opinion.words(),
+                        because: opinion.because.clone(),
+                    })?;
                     Ok::<_, Cancelled>(opinion)
                 })?;
                 opinion = Some(formed);
@@ -62,7 +68,7 @@ impl Localizer<'_> {
         });
         let estimated = Estimated { outcome, evidence, times, verdicts: None };
         let mut candidate = self.assessed(work, problem, method, estimated);
-        candidate.result.take_opinion(opinion.map(Arc::unwrap_or_clone), its_matches);
+        candidate.result.take_opinion(opinion, its_matches);
         Ok(candidate)
     }
 
