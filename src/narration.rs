@@ -315,6 +315,7 @@ mod tests {
 
     use super::*;
     use crate::event::Kind;
+    use crate::foreign::Foreign;
     use crate::fusion::Fusion;
     use crate::history::History;
     use crate::localize::{LocalizeError, LocalizeObserver, Localizer, Request};
@@ -345,8 +346,15 @@ mod tests {
         descent.set("pm.search", "descent").expect("a search");
         let mut kept = Kept::default();
         let all: Vec<Method> = estimator::methods().collect();
-        for (params, methods) in [(Params::default(), &all[..]), (descent, &[Method::PM])] {
-            let localizer = Localizer::new(scene.as_ref(), scene.as_ref(), &params, 0);
+        let other = Method::called("other").expect("a plain name");
+        let pose = scene.pose(0).expect("a pose");
+        let foreign =
+            Foreign::default().with_estimates(other, [(scene.frames()[0].clone(), pose)].into());
+        for (params, methods) in
+            [(Params::default(), &all[..]), (Params::default(), &[other]), (descent, &[Method::PM])]
+        {
+            let localizer = Localizer::new(scene.as_ref(), scene.as_ref(), &params, 0)
+                .with_foreign(foreign.clone());
             let request = Request {
                 radius_m: 5.0,
                 references: vec![1, 2].into(),

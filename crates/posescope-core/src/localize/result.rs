@@ -508,8 +508,12 @@ impl QueryResult {
                 let (text, evidence) = (opinion.because.clone(), serde_json::json!({}));
                 Some(Diagnosis { code, text, evidence })
             });
-            // The convention of a file explains why its poses are contradicted.
-            let place = self.diagnosis.iter().take_while(|one| one.code == Code::X1).count();
+            // The convention of a file explains why its poses are contradicted; what one query only hints at does not.
+            let is_certain = |one: &&Diagnosis| {
+                let is_hint = one.evidence.get("certain").is_some_and(|certain| certain == false);
+                one.code == Code::X1 && !is_hint
+            };
+            let place = self.diagnosis.iter().take_while(is_certain).count();
             let of_matches = |one: &Diagnosis| {
                 let is_resized =
                     one.code == Code::X1 && one.evidence.pointer("/query/part").is_some();
@@ -572,6 +576,27 @@ mod tests {
         assert_eq!(explanation(all).best().expect("it helped").args[0], "--set");
         assert_eq!(explanation(vec![frame.clone()]).best(), Some(&frame));
         assert_eq!(Explanation::default().best(), None);
+    }
+
+    #[test]
+    fn an_opinion_comes_behind_what_explains_it_and_before_a_hint() {
+        let opinion = json!({
+            "standing": "contradicted", "probability": 0.01, "within": {"m": 1.0, "deg": 5.0},
+            "offset_m": null, "offset_deg": null, "interval_m": null, "better": null, "by": null,
+            "because": "The photos agree elsewhere."
+        });
+        let opinion: Opinion = serde_json::from_value(opinion).expect("an opinion");
+        for (certain, codes) in [(true, [Code::X1, Code::E3]), (false, [Code::E3, Code::X1])] {
+            let result = json!({
+                "schema": SCHEMA, "scene": "street", "query": "000070", "references": ["000062"],
+                "method": "mine", "seed": 0, "status": "ok", "grade": "unmeasured",
+                "diagnosis": [{"code": "X1", "text": "A camera.", "evidence": {"certain": certain}}]
+            });
+            let mut result: QueryResult = serde_json::from_value(result).expect("a result");
+            result.take_opinion(Some(opinion.clone()), None);
+            let found: Vec<Code> = result.diagnosis.iter().map(|one| one.code).collect();
+            assert_eq!(found, codes);
+        }
     }
 
     #[test]
