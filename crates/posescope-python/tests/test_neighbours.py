@@ -225,11 +225,11 @@ def test_right_radius_and_explain_are_those_of_the_command(street: posescope.Sce
         exact = posescope.localize(query, reference, method="fb", right=(1e-6, 1e-6))
         assert exact.grade == "wrong" and exact.explanation is None
     assert posescope.diagnose(query, reference, moved).grade == "right"
-    near = posescope.localize(query, reference, method="mi", radius=2.0, explain=3)
+    near = posescope.localize(query, reference, method="mi", radius=2.0, explain=2)
     assert near.grade == "wrong" and near.explanation is not None
-    assert near.explanation["runs"] == 3 and "helped" in near.explanation
+    assert near.explanation["runs"] == 2 and "helped" in near.explanation
     out = tmp_path / "near.jsonl"
-    words = "run street --query 70 --reference 62 --method mi --radius 2 --explain 3 --quiet".split()
+    words = "run street --query 70 --reference 62 --method mi --radius 2 --explain 2 --quiet".split()
     assert posescope.main([*words, "--json", str(out)]) == 0
     assert near.to_json() + "\n" == out.read_text()
     assert posescope.diagnose(query, reference, query.truth, radius=2.0).grade == "right"
