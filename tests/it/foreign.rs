@@ -68,7 +68,7 @@ fn an_estimate_that_is_our_own_pose_gets_no_verdicts_on_a_search() {
             let at_pose = at_pose.expect("every cost is asked");
             assert!((at_pose.cost.expect("is covered") - costs.best).abs() < 1e-6);
             assert_eq!(at_pose.truth, costs.truth);
-            // Another system searched no cost, so nothing is said of one.
+            // Another system searches no cost, so no verdict is about one.
             let (needed, said) = (codes(&ours), codes(&other));
             println!("{queries} {query} {reference}: {needed:?} → {said:?}");
             assert!(!said.iter().any(|code| code.name().starts_with('D')), "{query}: {said:?}");

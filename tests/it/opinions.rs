@@ -227,7 +227,7 @@ fn an_opinion_says_how_many_of_its_matches_a_pose_explains() {
     // Nothing is wrong with the matches.
     assert_eq!(given.diagnosis.len(), 1, "{:?}", given.diagnosis);
 
-    // Of a right pose nothing is said against its matches.
+    // A right pose gets no verdict on its matches.
     let (_, [_, given]) = by_matches_and_given(none, none, true);
     assert_eq!((given.grade, given.diagnosis.len()), (Grade::Right, 0));
     let of_matches = opinion(&given).matches.as_ref().expect("matches");
@@ -253,7 +253,7 @@ fn every_own_answer_of_an_opinion_is_an_event() {
     assert_eq!(formed["standing"], "contradicted");
     assert!(formed["depth"].as_u64() > Some(1), "inside of the stage `opinion`");
     assert!(of_kind("StageStarted").iter().any(|one| one["stage"] == "opinion"));
-    // What the own methods do on the way is kept from whoever watches the other system.
+    // An observer of the other system does not get the events of the own methods.
     assert!(of_kind("FeaturesDetected").is_empty());
 }
 

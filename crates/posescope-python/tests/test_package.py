@@ -71,7 +71,7 @@ def test_a_wrong_pose_of_others_has_a_picture_and_its_distance(street: posescope
         seen.add(first.code)
         off = (right**2 + down**2 + forward**2) ** 0.5
         assert result.opinion is not None and abs(float(np.linalg.norm(result.opinion.offset_m)) - off) < 0.2
-    # Nothing is said of a search that the other system did not do.
+    # The other system did not search, so no verdict is about a search.
     assert seen == {"E3"}, seen
     lost = posescope.localize(query, reference, matches=(np.zeros((0, 2)), np.zeros((0, 2))))
     assert lost.proof() is not None
