@@ -4,6 +4,8 @@
 //! ground truth, which no problem and no estimator sees.
 
 mod choose;
+mod explanation;
+mod judged;
 mod localizer;
 mod observer;
 mod result;
@@ -13,11 +15,12 @@ mod timing;
 mod words;
 
 pub use choose::Chooser;
+pub use explanation::{Explanation, Helped};
 pub use localizer::{LocalizeError, Localizer, Request, is_one_drive};
 pub use observer::{LocalizeObserver, NoObserver};
 pub use result::{
-    Agreement, CostAtPose, CostReport, Explanation, Helped, PoseReport, QueryResult, Reason,
-    SCHEMA, Setting, Status, evaluate,
+    Agreement, CostAtPose, CostReport, PoseReport, QueryResult, Reason, SCHEMA, Setting, Status,
+    evaluate,
 };
 pub use select::{
     ByMatches, ChoiceError, Ranking, References, Selection, draw, frames_within, report_ranking,

@@ -3,6 +3,7 @@
 use nalgebra::Matrix3x4;
 use serde::{Deserialize, Serialize};
 
+use super::explanation::Explanation;
 use crate::diagnosis::{
     Assessment, Code, Confidence, Diagnosis, Family, Grade, PoseConfidence, Subject, Tolerance,
     confidence,
@@ -15,7 +16,7 @@ use crate::grid::GridParams;
 use crate::grid::{Basin, Offset, Phase};
 use crate::image::Degradation;
 use crate::method::Method;
-use crate::opinion::{MatchesOfPose, Opinion, Standing};
+use crate::opinion::{Opinion, Standing};
 use crate::params::Params;
 use crate::scale::LengthUnit;
 use crate::text::words;
@@ -102,44 +103,6 @@ fn one() -> f64 {
 
 fn is_one(scale: &f64) -> bool {
     *scale == 1.0
-}
-
-/// What was tried to make a wrong result right.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Explanation {
-    /// What made it right, in the order in which it was tried.
-    pub helped: Vec<Helped>,
-    /// The arguments of each run that made nothing right; not in files.
-    #[serde(skip)]
-    pub failed: Vec<Vec<String>>,
-    /// How often the query was localised again.
-    pub runs: usize,
-    /// Whether all was tried that was to be; a run that was cancelled did not come to its end.
-    pub complete: bool,
-}
-
-impl Explanation {
-    /// The remedy to recommend. They are tried in the order of what mends most, so it is the first that helped; one frame
-    /// of the map in the place of another says the least about the cause.
-    pub fn best(&self) -> Option<&Helped> {
-        self.helped.iter().find(|helped| !helped.names_a_frame()).or(self.helped.first())
-    }
-}
-
-/// A change that made a wrong result right.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Helped {
-    /// The arguments that repeat it, beside those of the run.
-    pub args: Vec<String>,
-    /// The error of the pose then.
-    pub error: PoseError,
-}
-
-impl Helped {
-    /// Whether it names a frame as the reference, in the place of a way to choose references.
-    pub fn names_a_frame(&self) -> bool {
-        self.args.windows(2).any(|pair| pair[0] == "--reference" && !pair[1].contains(':'))
-    }
 }
 
 /// What an experiment varies from one result of a query to the next.
@@ -482,73 +445,6 @@ impl QueryResult {
         self.error.map(|error| error.translation_m).or(estimated)
     }
 
-    /// Takes the opinion on its pose, with what the matches say that came with it. What speaks against a pose that is not
-    /// known to be right is a verdict.
-    pub(super) fn take_opinion(
-        &mut self,
-        opinion: Option<Opinion>,
-        its_matches: Option<MatchesOfPose>,
-    ) {
-        let opinion = opinion.map(|opinion| match &its_matches {
-            Some(MatchesOfPose { explained, .. }) => Opinion {
-                because: format!("{} {}", opinion.because, explained.words()),
-                matches: Some(explained.clone()),
-                ..opinion
-            },
-            None => opinion,
-        });
-        if self.grade != Grade::Right {
-            let verdict = opinion.as_ref().and_then(|opinion| {
-                let code = match opinion.standing {
-                    Standing::Confirmed => return None,
-                    Standing::Contradicted if opinion.copied_from.is_some() => Code::E2,
-                    Standing::Contradicted => Code::E3,
-                    Standing::Undecided => Code::E4,
-                };
-                let (text, evidence) = (opinion.because.clone(), serde_json::json!({}));
-                Some(Diagnosis { code, text, evidence })
-            });
-            // The convention of a file explains why its poses are contradicted; what one query only hints at does not.
-            let is_certain = |one: &&Diagnosis| {
-                let is_hint = one.evidence.get("certain").is_some_and(|certain| certain == false);
-                one.code == Code::X1 && !is_hint
-            };
-            let place = self.diagnosis.iter().take_while(is_certain).count();
-            let of_matches = |one: &Diagnosis| {
-                let is_resized =
-                    one.code == Code::X1 && one.evidence.pointer("/query/part").is_some();
-                is_resized || one.code.rule().applies_to == Family::MATCHING
-            };
-            let said = its_matches.into_iter().flat_map(|said| said.verdicts).filter(of_matches);
-            let said: Vec<Diagnosis> = verdict.as_ref().map_or(Vec::new(), |_| said.collect());
-            self.diagnosis.splice(place..place, verdict.into_iter().chain(said));
-        }
-        let is_confirmed = |one: &&Opinion| one.standing == Standing::Confirmed;
-        if let Some(opinion) = opinion.as_ref().filter(is_confirmed)
-            && let Some(error) = self.error.filter(|_| self.grade == Grade::Wrong)
-        {
-            // The truth alone stands against two that found the pose independently, but with the same camera. What is
-            // said of clouds and conventions rests on the truth.
-            let is_kept = |one: &Diagnosis| {
-                let is_of = |key: &str| one.evidence.get(key).is_some();
-                one.code != Code::X1 || is_of("error") || is_of("explained")
-            };
-            self.diagnosis.retain(is_kept);
-            if !self.diagnosis.iter().any(|one| one.code == Code::X1) {
-                let text = format!(
-                    "The ground truth is suspect, or the query's camera: two systems find this pose, which is {} from \
-                     the truth. {}",
-                    error.greater(),
-                    opinion.because
-                );
-                let probability = opinion.probability;
-                let evidence = serde_json::json!({ "error": error, "probability": probability });
-                self.diagnosis.insert(0, Diagnosis { code: Code::X1, text, evidence });
-            }
-        }
-        self.opinion = opinion;
-    }
-
     /// The same, as it stands in the list of another result.
     pub fn nested(&self) -> Self {
         Self { per_reference: None, ..self.clone() }
@@ -560,44 +456,6 @@ mod tests {
     use serde_json::json;
 
     use super::*;
-
-    #[test]
-    fn the_best_of_what_helped_is_the_first_that_is_more_than_another_frame() {
-        let helped = |option: &str, translation_m: f64| Helped {
-            args: vec![option.to_owned(), "a".to_owned()],
-            error: PoseError { translation_m, rotation_deg: 1.0, max_euler_deg: 1.0 },
-        };
-        let frame = helped("--reference", 0.1);
-        let all = vec![frame.clone(), helped("--set", 0.5), helped("--method", 0.2)];
-        let mut ranked = frame.clone();
-        ranked.args[1] = "retrieve:3".to_owned();
-        assert!(frame.names_a_frame() && !ranked.names_a_frame());
-        let explanation = |helped| Explanation { helped, failed: vec![], runs: 3, complete: true };
-        assert_eq!(explanation(all).best().expect("it helped").args[0], "--set");
-        assert_eq!(explanation(vec![frame.clone()]).best(), Some(&frame));
-        assert_eq!(Explanation::default().best(), None);
-    }
-
-    #[test]
-    fn an_opinion_comes_behind_what_explains_it_and_before_a_hint() {
-        let opinion = json!({
-            "standing": "contradicted", "probability": 0.01, "within": {"m": 1.0, "deg": 5.0},
-            "offset_m": null, "offset_deg": null, "interval_m": null, "better": null, "by": null,
-            "because": "The photos agree elsewhere."
-        });
-        let opinion: Opinion = serde_json::from_value(opinion).expect("an opinion");
-        for (certain, codes) in [(true, [Code::X1, Code::E3]), (false, [Code::E3, Code::X1])] {
-            let result = json!({
-                "schema": SCHEMA, "scene": "street", "query": "000070", "references": ["000062"],
-                "method": "mine", "seed": 0, "status": "ok", "grade": "unmeasured",
-                "diagnosis": [{"code": "X1", "text": "A camera.", "evidence": {"certain": certain}}]
-            });
-            let mut result: QueryResult = serde_json::from_value(result).expect("a result");
-            result.take_opinion(Some(opinion.clone()), None);
-            let found: Vec<Code> = result.diagnosis.iter().map(|one| one.code).collect();
-            assert_eq!(found, codes);
-        }
-    }
 
     #[test]
     fn with_the_truth_hidden_nothing_is_left_that_needs_it() {
