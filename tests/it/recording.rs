@@ -695,3 +695,34 @@ fn frames_of_two_scenes_are_told_apart_in_a_recording() {
         assert!(told.contains(words), "{words}");
     }
 }
+
+#[test]
+fn how_far_a_pose_may_be_off_is_an_ellipsoid_around_it() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("fb.rrd");
+    let mut recorder = open(&path, &[Method::FB]);
+    let truth = solvable().reference().world_from_camera() * Pose::translation(0.0, 0.0, 1.0);
+    let (history, methods) = (&mut History::default(), [Method::FB]);
+    let result = run_against(&truth, &mut recorder, history, &methods, &Params::default());
+    recorder.close().expect("a whole recording");
+    let known = result.and_then(|result| result.confidence?.covariance).expect("of a pose");
+
+    let chunks = chunks(&path);
+    let numbers = |entity: &str, component| -> [f32; 3] {
+        let is_of =
+            |chunk: &&Chunk| chunk.entity_path().to_string().trim_start_matches('/') == entity;
+        let found = chunks.iter().filter(is_of).find_map(|chunk| {
+            let found = chunk.iter_slices::<[f32; 3]>(component).next()?;
+            found.first().copied()
+        });
+        found.expect(entity)
+    };
+    let (interval, camera) = (entities::interval(Method::FB), "world/estimate/fb/camera");
+    let at = numbers(&interval, rerun::Ellipsoids3D::descriptor_centers().component);
+    assert_eq!(at, numbers(camera, rerun::Transform3D::descriptor_translation().component));
+    let half = numbers(&interval, rerun::Ellipsoids3D::descriptor_half_sizes().component);
+    // Within 2.8 standard deviations, 95 % of the errors in space are.
+    let square: f32 = half.iter().map(|half| half * half).sum();
+    let expected = 7.815 * known.of_position().trace();
+    assert!((f64::from(square) / expected - 1.0).abs() < 1e-3, "{half:?} {expected}");
+}
