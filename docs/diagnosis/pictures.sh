@@ -47,3 +47,6 @@ picture V1 street street:snow 75 retrieved end --method fb --reference retrieve:
     --index "$made/street.index"
 picture E1 street street 589 583 end --method other,mi --estimates other="$made/poses.txt"
 picture L1 street:snow street:night 406 397 mi --method mi
+# A photo of another street, whose true pose nobody states.
+"$posescope" view street --query "$made/overcast/photos/000400.png" --reference 300 --method fb --at fb \
+    --camera 718.856,718.856,607.1928,185.2157 --window 1280x720 --screenshot N1.jpg
