@@ -91,7 +91,7 @@ mod tests {
         for (certain, codes) in [(true, [Code::X1, Code::E3]), (false, [Code::E3, Code::X1])] {
             let result = json!({
                 "schema": SCHEMA, "scene": "street", "query": "000070", "references": ["000062"],
-                "method": "mine", "seed": 0, "status": "ok", "grade": "unmeasured",
+                "method": "fb", "seed": 0, "status": "ok", "grade": "unmeasured",
                 "diagnosis": [{"code": "X1", "text": "A camera.", "evidence": {"certain": certain}}]
             });
             let mut result: QueryResult = serde_json::from_value(result).expect("a result");
