@@ -29,7 +29,7 @@ pub use calibration::{CALIBRATION_STEPS, Calibration, Estimate, NotJudged, calib
 pub use correction::{Correction, Place};
 pub use inventory::{Inventory, Remark, unseen_map};
 pub use reading::{Mistake, Subject};
-pub use sample::Agreement;
+pub use sample::{Agreement, FramePair};
 pub use trial::{Finding, Fit};
 
 use sample::Sample;
@@ -65,14 +65,16 @@ impl Examination {
     }
 }
 
-/// The mistake that explains why clouds and photos do not fit, if any does. Photos and clouds that cannot be read do
-/// not count.
-pub fn mistake(scene: &dyn Scene) -> Option<Finding> {
+/// The mistake that explains why clouds and photos do not fit, if any does, and how closely pairs of frames fit each
+/// other. Photos and clouds that cannot be read do not count.
+pub fn fit(scene: &dyn Scene) -> (Option<Finding>, Vec<FramePair>) {
     let sample = Sample::read(scene);
-    match scene.cloud_facts().coarse_step_m {
+    let pairs = sample.frame_pairs();
+    let mistake = match scene.cloud_facts().coarse_step_m {
         None => sample.diagnose().2,
         Some(_) => None,
-    }
+    };
+    (mistake, pairs)
 }
 
 /// Examines a scene. Errors of single files become remarks.

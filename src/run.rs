@@ -36,7 +36,7 @@ pub use inputs::{content, inputs};
 #[cfg(feature = "rerun")]
 pub use judge::{Judgement, examine, warn_of_unseen_map};
 pub use limit::Limit;
-pub use map_check::{mistake_line, mistake_of_map};
+pub use map_check::{MapFit, fit_of_map, frame_pairs_line, mistake_line};
 pub use outputs::{JSON_LINES, OutputError, refuse_in_folder, refuse_to_replace};
 pub use plan::{EvaluationRequest, Judging, Plan, PlanError, Refusal, failed_queries};
 pub use preset::{Preset, default_failure_radius_m};

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use posescope::camera::Intrinsics;
 use posescope::localize::Selection;
 use posescope::params::Params;
-use posescope::run::{Protocol, SurveyFile, mistake_of_map, survey_of};
+use posescope::run::{MapFit, Protocol, SurveyFile, fit_of_map, survey_of};
 use posescope::scene::{LoosePhotos, Scene, SceneError, SceneSize};
 use posescope::session::{Task, TaskScenes};
 
@@ -151,7 +151,10 @@ pub fn open(
     if let Some(file) = &survey {
         task.params.survey = file.survey.clone();
     }
-    task.params.mistake_of_map = mistake_of_map(scenes.references.as_ref(), scene, examines_map);
+    let MapFit { mistake, frame_pairs } =
+        fit_of_map(scenes.references.as_ref(), scene, examines_map);
+    task.params.mistake_of_map = mistake;
+    task.params.frame_pairs = frame_pairs;
     let queries = match &task.photos {
         Some(photos) => (0..photos.paths.len()).collect(),
         None => queries

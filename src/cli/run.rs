@@ -10,7 +10,7 @@ use posescope::localize::{
 };
 use posescope::method::Method;
 use posescope::run::{
-    JSON_LINES, mistake_line, refuse_to_replace, survey_line, warn_of_unseen_map,
+    JSON_LINES, frame_pairs_line, mistake_line, refuse_to_replace, survey_line, warn_of_unseen_map,
 };
 use posescope::scene::{Retriever, Scene, frame_range, why_no_cloud};
 use posescope::session::{Breakpoints, StopAtBreakpoint, Task, none_near};
@@ -83,6 +83,8 @@ pub fn run(args: &RunArgs, terminal: &Terminal) -> Result<(), CliError> {
     }
     if let Some(file) = &survey {
         terminal.say(|| survey_line(file));
+    } else if let Some(pairs) = &task.params.frame_pairs {
+        terminal.say(|| frame_pairs_line(&args.scene, pairs));
     }
     let camera = tasks.first().map(|&(query, _)| queries.intrinsics(query));
     let misfit = |camera| opened::misfit(&size, &task.protocol, &task.params, &camera);

@@ -8,11 +8,13 @@ use nalgebra::{Point2, Point3};
 
 use super::agreement::Seen;
 use crate::camera::Intrinsics;
+use crate::covariance::PoseCovariance;
+use crate::diagnosis::Tolerance;
 use crate::features::{Features, MatchVerdict, SurfParams, best_matches, surf};
 use crate::geometry::Pose;
 use crate::image::GrayImage;
 use crate::robust::{MlesacParams, effective_area_px, inliers_beyond_chance, mlesac};
-use crate::solver::Correspondence;
+use crate::solver::{Correspondence, pose_covariance};
 
 /// The strongest features of a photo that are used.
 const FEATURES: usize = 1500;
@@ -171,6 +173,8 @@ pub(super) struct Motion {
     pub(super) there_from_here: Pose,
     /// How many correspondences it explains.
     pub(super) explained: f64,
+    /// How far it may be off by the noise of its features alone: a distance \[m\] and an angle \[°\] for 95 %.
+    pub(super) within: Option<Tolerance>,
 }
 
 /// The motion that more correspondences agree on than chance explains.
@@ -190,8 +194,18 @@ pub(super) fn motion(lifted: &[Correspondence], camera: &Intrinsics) -> Option<M
     );
     let is_beyond_chance = accepted.needed.is_some_and(|needed| accepted.inliers >= needed);
     let explained = explained(lifted, camera, &found.pose);
-    (is_beyond_chance && found.inliers.len() >= MIN_LIFTED / 2)
-        .then_some(Motion { there_from_here: found.pose, explained })
+    let inliers: Vec<_> = found.inliers.iter().map(|&at| lifted[at]).collect();
+    let mut residuals: Vec<f64> = found.inliers.iter().map(|&at| found.residuals_px[at]).collect();
+    residuals.sort_by(f64::total_cmp);
+    // A residual is of two axes; the median of a Rayleigh distribution is 1.177 σ.
+    let sigma_px = (residuals.get(residuals.len() / 2).unwrap_or(&1.0) / 1.177).max(0.3);
+    let covariance = pose_covariance(&inliers, camera, &found.pose, sigma_px);
+    let within = covariance.and_then(PoseCovariance::new).map(|known| known.holding(0.95));
+    (is_beyond_chance && found.inliers.len() >= MIN_LIFTED / 2).then_some(Motion {
+        there_from_here: found.pose,
+        explained,
+        within,
+    })
 }
 
 /// The motion that the matches agree on, if a pose explains enough of them that it may be this one.

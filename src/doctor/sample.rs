@@ -16,8 +16,9 @@ use super::matches::{
 use super::reading::Change;
 use crate::camera::Intrinsics;
 use crate::cloud::Cloud;
+use crate::diagnosis::Tolerance;
 use crate::features::Features;
-use crate::geometry::Pose;
+use crate::geometry::{Pose, PoseError};
 use crate::scene::{Scene, SceneError};
 use crate::solver::Correspondence;
 
@@ -64,6 +65,15 @@ struct Seeing {
     least: usize,
     /// For each partner the shared features with a depth.
     lifted: Vec<Vec<Correspondence>>,
+}
+
+/// A pair of frames whose features agree on a motion.
+#[derive(Clone, Copy, Debug)]
+pub struct FramePair {
+    /// How far the stated poses are from it.
+    pub error: PoseError,
+    /// How far it may be off by the noise of its features alone, in 95 % of cases.
+    pub within: Tolerance,
 }
 
 /// The compared frames, with all poses.
@@ -383,6 +393,23 @@ impl<'a> Sample<'a> {
         let shared = || self.partners.values().flatten().map(|one| is_view_shared(&one.shared));
         let motions = self.motions.values().flatten().flatten().count();
         [shared().count(), shared().filter(|shared| *shared).count(), motions]
+    }
+
+    /// How far the stated poses of pairs of frames are from what their features agree on.
+    pub(super) fn frame_pairs(&self) -> Vec<FramePair> {
+        let of = |(&anchor, motions): (&usize, &Vec<Option<Motion>>)| {
+            let partners = self.partners.get(&anchor).into_iter().flatten();
+            let pairs = partners.zip(motions).filter_map(|(partner, motion)| {
+                let motion = motion.as_ref()?;
+                let there_from_here = self.poses[partner.frame]?.inverse() * self.poses[anchor]?;
+                let [stated, found] =
+                    [there_from_here, motion.there_from_here].map(|pose| pose.inverse());
+                let error = PoseError::between(&stated, &found);
+                Some(FramePair { error, within: motion.within? })
+            });
+            pairs.collect::<Vec<_>>()
+        };
+        self.motions.iter().flat_map(of).collect()
     }
 
     /// The share of shared features that a reading of the poses explains, with their lengths multiplied by a factor.

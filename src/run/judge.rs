@@ -8,7 +8,7 @@ use super::plan::Judging;
 use super::run_file::RunFile;
 use super::run_folder::{FolderError, read_results};
 use super::scenes::Scenes;
-use crate::doctor::{mistake, unseen_map};
+use crate::doctor::{self, unseen_map};
 use crate::localize::QueryResult;
 use crate::measure::{
     Change, Finding, Report, RunComparison, failing_scenes, of_examination, read_rows,
@@ -101,7 +101,7 @@ pub fn examine(run: &RunFile, scenes: &Scenes, rows: &[QueryResult]) -> Vec<Find
             continue;
         };
         warn_of_unseen_map(scene.as_ref(), rows.iter().filter(|row| row.scene == label));
-        match catch_unwind(AssertUnwindSafe(|| mistake(scene.as_ref()))) {
+        match catch_unwind(AssertUnwindSafe(|| doctor::fit(scene.as_ref()).0)) {
             Ok(found) => examined.extend(found.map(|found| of_examination(label, &found))),
             Err(_) => log::warn!("`posescope doctor` cannot examine {label}"),
         }

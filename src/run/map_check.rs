@@ -1,7 +1,9 @@
-//! Whether a map can be believed: what `posescope doctor` says of it decides whether its poses have a confidence.
+//! Whether a map can be believed: what `posescope doctor` says of it decides whether its poses have a confidence, and
+//! which.
 //!
 //! Where clouds, photos, cameras and poses do not fit together, matches and costs agree on poses that are wrong, and
-//! nothing that a method leaves behind tells. The answer is kept in the user's cache and stays until the map changes.
+//! nothing that a method leaves behind tells. How closely they fit, pairs of the map's own frames tell. The answer is kept
+//! in the user's cache and stays until the map changes.
 
 use std::hash::Hasher as _;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -11,17 +13,69 @@ use posescope_core::files::{self, write_whole};
 use serde::{Deserialize, Serialize};
 use xxhash_rust::xxh3::Xxh3;
 
-use crate::doctor;
-use crate::scene::{Scene, cache_file, format_of, street};
+use crate::diagnosis::confidence::NEAR;
+use crate::doctor::{self, FramePair};
+use crate::scale::Scale;
+use crate::scene::{Scene, SceneSize, cache_file, format_of, street};
+use posescope_core::survey::FramePairs;
 
 /// The version of the file.
-const SCHEMA: &str = "posescope.map-check/1";
+const SCHEMA: &str = "posescope.map-check/2";
+
+/// Fewer pairs of frames say nothing.
+const LEAST_PAIRS: usize = 6;
+
+/// How far off near pairs of frames are in generated towns, over what the noise of their features explains: the medians of
+/// position and rotation (`studies calibration --frame-pairs`).
+const IN_TOWNS: [f64; 2] = [1.2, 0.75];
 
 /// Clouds whose points tell one state of a map from another.
 const CLOUDS: usize = 3;
 
+/// What is known of a map.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MapFit {
+    /// What is wrong with it, in a phrase; `None` where `posescope doctor` finds nothing.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mistake: Option<String>,
+    /// How closely pairs of its frames fit each other; `None` where too few share features.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub frame_pairs: Option<FramePairs>,
+}
+
+impl MapFit {
+    /// What `posescope doctor` finds.
+    pub fn of(scene: &dyn Scene) -> Self {
+        let (mistake, pairs) = doctor::fit(scene);
+        Self {
+            mistake: mistake.map(|found| found.mistake.about().to_owned()),
+            frame_pairs: compared(&pairs, SceneSize::of(scene).scale),
+        }
+    }
+}
+
+/// How closely pairs of frames fit each other at a scale; `None` where they are too few.
+fn compared(pairs: &[FramePair], scale: Scale) -> Option<FramePairs> {
+    let near: Vec<&FramePair> =
+        pairs.iter().filter(|pair| NEAR.at(scale).contains(&pair.error)).collect();
+    let factor = |over: fn(&FramePair) -> f64, in_towns: f64| {
+        let mut all: Vec<f64> = near.iter().map(|pair| over(pair)).collect();
+        all.sort_by(f64::total_cmp);
+        let median = all.get(all.len() / 2).copied().unwrap_or(in_towns);
+        // As people read it.
+        (100.0 * (median / in_towns).clamp(1.0, 100.0)).round() / 100.0
+    };
+    (pairs.len() >= LEAST_PAIRS).then(|| FramePairs {
+        pairs: pairs.len(),
+        near: near.len(),
+        position: factor(|pair| pair.error.translation_m / pair.within.translation_m, IN_TOWNS[0]),
+        rotation: factor(|pair| pair.error.rotation_deg / pair.within.rotation_deg, IN_TOWNS[1]),
+    })
+}
+
 /// What was found in a map.
-#[derive(Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct MapCheck {
     schema: String,
@@ -29,22 +83,22 @@ struct MapCheck {
     version: String,
     /// What the map holds.
     content: String,
-    /// What is wrong with it; empty where nothing was found.
-    mistake: String,
+    fit: MapFit,
 }
 
 impl MapCheck {
-    fn new(content: String, mistake: String) -> Self {
+    fn new(content: String, fit: MapFit) -> Self {
         let version = env!("CARGO_PKG_VERSION").to_owned();
-        Self { schema: SCHEMA.to_owned(), version, content, mistake }
+        Self { schema: SCHEMA.to_owned(), version, content, fit }
     }
 
     /// What was found before, if the map and posescope are the same.
     fn read(path: &Path, content: &str) -> Option<Self> {
         let text = files::read_text(path, files::DESCRIPTION).ok()?;
         let known: Self = toml::from_str(&text).ok()?;
-        let expected = Self::new(content.to_owned(), known.mistake.clone());
-        (known == expected).then_some(known)
+        let expected = Self::new(content.to_owned(), known.fit.clone());
+        let is_sound = known.fit.frame_pairs.is_none_or(|pairs| pairs.is_sound());
+        (known == expected && is_sound).then_some(known)
     }
 
     /// Keeps it. A cache that cannot be written only costs time.
@@ -57,33 +111,28 @@ impl MapCheck {
     }
 }
 
-/// What is wrong with the map of a scene, in a phrase; `None` where `posescope doctor` finds nothing, and in scenes
-/// without clouds. `examines` is asked where that is not known yet; if it declines, it stays unknown.
-pub fn mistake_of_map(
-    scene: &dyn Scene,
-    argument: &str,
-    examines: impl FnOnce() -> bool,
-) -> Option<String> {
+/// What `posescope doctor` finds of the map of a scene; nothing of scenes without clouds, and of generated ones. `examines`
+/// is asked where that is not known yet; if it declines, it stays unknown.
+pub fn fit_of_map(scene: &dyn Scene, argument: &str, examines: impl FnOnce() -> bool) -> MapFit {
     let format = format_of(argument, None);
     let is_generated = format.is_some_and(|format| format.name == street::ENTRY.name);
     if is_generated || !(0..scene.frames().len()).any(|frame| scene.has_cloud(frame)) {
-        return None;
+        return MapFit::default();
     }
     let content = content(scene);
     let path = cache_file("map-check", "toml", scene, argument);
     let known = path.as_deref().and_then(|path| MapCheck::read(path, &content));
     if known.is_none() && !examines() {
-        return None;
+        return MapFit::default();
     }
     let check = known.unwrap_or_else(|| {
         // Nobody asked for it, so a map that cannot be examined is none with a mistake.
-        let found = catch_unwind(AssertUnwindSafe(|| doctor::mistake(scene))).ok().flatten();
-        let words = found.map(|found| found.mistake.about().to_owned());
-        let check = MapCheck::new(content, words.unwrap_or_default());
+        let fit = catch_unwind(AssertUnwindSafe(|| MapFit::of(scene))).unwrap_or_default();
+        let check = MapCheck::new(content, fit);
         path.iter().for_each(|path| check.write(path));
         check
     });
-    Some(check.mistake).filter(|mistake| !mistake.is_empty())
+    check.fit
 }
 
 /// What is said where a map has a mistake.
@@ -91,6 +140,16 @@ pub fn mistake_line(scene: &dyn Scene, mistake: &str) -> String {
     format!(
         "{}: {mistake}; poses have no confidence until that is mended (`posescope doctor` says more)",
         scene.name()
+    )
+}
+
+/// What is said where confidence follows how closely a map's frames fit each other.
+pub fn frame_pairs_line(argument: &str, pairs: &FramePairs) -> String {
+    let FramePairs { pairs, near, position, .. } = pairs;
+    format!(
+        "Confidence follows how closely the map's frames fit each other (the poses of {near} of {pairs} pairs are near what \
+         their features say, {position} times as far off as those of a generated town); `posescope survey {argument}` says \
+         more"
     )
 }
 
@@ -112,4 +171,34 @@ fn content(scene: &dyn Scene) -> String {
         }
     }
     format!("{:016x}", sum.finish())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnosis::Tolerance;
+    use crate::geometry::PoseError;
+
+    /// A pair that is off by so much, where the noise of its features explains 0.01 m and 0.1°.
+    fn pair(translation_m: f64, rotation_deg: f64) -> FramePair {
+        FramePair {
+            error: PoseError { translation_m, rotation_deg, max_euler_deg: rotation_deg },
+            within: Tolerance { translation_m: 0.01, rotation_deg: 0.1 },
+        }
+    }
+
+    #[test]
+    fn pairs_say_how_many_are_near_and_how_much_farther_off_than_noise() {
+        let mut pairs = vec![pair(0.06, 0.075); 8];
+        pairs.extend([pair(0.3, 0.1), pair(0.02, 9.0)]);
+        let room = compared(&pairs, Scale::of_depth(1.8, true)).expect("enough");
+        // Near is within 0.1 m and 5° there. In towns, positions are off 1.2 times as far as noise.
+        assert_eq!((room.pairs, room.near), (10, 8));
+        assert_eq!((room.position, room.rotation), (5.0, 1.0));
+        assert_eq!(compared(&pairs, Scale::PAPER).map(|pairs| pairs.near), Some(9));
+        // No map is better than generated ones, and few pairs say nothing.
+        let close = compared(&[pair(0.001, 0.001); 6], Scale::PAPER).expect("enough");
+        assert_eq!((close.position, close.rotation), (1.0, 1.0));
+        assert_eq!(compared(&pairs[..5], Scale::PAPER), None);
+    }
 }

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use super::config::{ConfigError, with_config};
 use super::draw::{Draw, DrawError};
 use super::inputs::{content, inputs};
-use super::map_check::{mistake_line, mistake_of_map};
+use super::map_check::{MapFit, fit_of_map, mistake_line};
 use super::outputs::{JSON_LINES, OutputError, refuse_in_folder, refuse_to_replace};
 use super::preset::Preset;
 use super::protocol::{Protocol, ProtocolError, defaults, known};
@@ -193,7 +193,9 @@ impl EvaluationRequest<'_> {
         };
         let mut params = Params::at_scale(size.scale);
         params.survey = numbers;
-        params.mistake_of_map = self.mistake_of_map(&scenes);
+        let MapFit { mistake, frame_pairs } = self.fit_of_map(&scenes);
+        params.mistake_of_map = mistake;
+        params.frame_pairs = frame_pairs;
         let params = with_config(params, self.config, self.assignments)?;
         let defaults =
             defaults(given.preset, first.map_or("", |scene| scene.name())).at_size(&size);
@@ -240,20 +242,27 @@ impl EvaluationRequest<'_> {
         }
     }
 
-    /// What is wrong with the map, or with the first of several that has a mistake. A run that goes on keeps what it
-    /// began with.
-    fn mistake_of_map(&self, scenes: &Scenes) -> Option<String> {
+    /// What is wrong with the map, or with the first of several that has a mistake, and of one map how closely its frames
+    /// fit each other. A run that goes on keeps what it began with.
+    fn fit_of_map(&self, scenes: &Scenes) -> MapFit {
         let begun = read_run(self.folder).ok().and_then(|run| run.params().ok());
         if let Some(params) = begun {
-            return params.mistake_of_map;
+            return MapFit { mistake: params.mistake_of_map, frame_pairs: params.frame_pairs };
         }
         let maps = scenes.references.iter().zip(self.scenes);
-        let mut maps = maps.filter(|_| !self.is_survey);
-        maps.find_map(|(scene, argument)| {
-            let mistake = mistake_of_map(scene.as_ref(), argument, || true)?;
-            log::warn!("{}", mistake_line(scene.as_ref(), &mistake));
-            Some(mistake)
-        })
+        let maps = maps.filter(|_| !self.is_survey);
+        let mut fits = maps.map(|(scene, argument)| {
+            let fit = fit_of_map(scene.as_ref(), argument, || true);
+            if let Some(mistake) = &fit.mistake {
+                log::warn!("{}", mistake_line(scene.as_ref(), mistake));
+            }
+            fit
+        });
+        let first = fits.next().unwrap_or_default();
+        let is_one = scenes.references.len() == 1;
+        let frame_pairs = first.frame_pairs.filter(|_| is_one);
+        let mistake = first.mistake.or_else(|| fits.find_map(|fit| fit.mistake));
+        MapFit { mistake, frame_pairs }
     }
 
     /// Gives each query of a pair its own references, and checks those that are named for all.

@@ -135,3 +135,28 @@ fn a_survey_that_is_there_is_continued_and_a_damaged_one_refused() {
     }
     desk.run("survey street --radius 0.001").fails(3, "within 0.001 m ~ --radius");
 }
+
+/// A box on a desk: its frames fit each other, if less closely than generated ones.
+#[test]
+fn poses_in_a_room_have_a_confidence_by_how_closely_its_frames_fit_each_other() {
+    let Some(data) = std::env::var_os("POSESCOPE_DATA") else {
+        println!("skipped: no data (POSESCOPE_DATA)");
+        return;
+    };
+    let desk = Desk::new();
+    let (from, to) = (Path::new(&data).join("box"), desk.path().join("box"));
+    fs::create_dir(&to).expect("writable");
+    for file in fs::read_dir(&from).expect("a folder") {
+        let file = file.expect("a file");
+        fs::copy(file.path(), to.join(file.file_name())).expect("writable");
+    }
+    fs::copy(from.join("intrinsics.K.txt"), to.join("camera-intrinsics.txt")).expect("writable");
+    let said = desk.run("run box --query 55 --reference 63 --method fb2 --json -");
+    has(&said.err, "Confidence follows how closely the map's frames fit each other ~ survey box");
+    let results = said.results();
+    let known = results[0].confidence.as_ref().expect("a pose");
+    assert_eq!(known.calibrated_on, Calibration::FramePairs);
+    assert!(known.probability > 0.9, "{known:?}");
+    let (held, error) = (known.within_95.expect("an interval"), results[0].error.expect("a truth"));
+    assert!(error.translation_m <= held.m && error.rotation_deg <= held.deg, "{held:?} {error:?}");
+}

@@ -5,8 +5,9 @@ use std::sync::Arc;
 use nalgebra::Vector3;
 use posescope::app::{Results, Setup, Tab, ViewName};
 use posescope::camera::Intrinsics;
-use posescope::diagnosis::{Code, Diagnosis, Evidence, Subject, Tolerance, diagnose};
-use posescope::geometry::Pose;
+use posescope::diagnosis::confidence::Lowered;
+use posescope::diagnosis::{Code, Confidence, Diagnosis, Evidence, Subject, Tolerance, diagnose};
+use posescope::geometry::{Pose, PoseError};
 use posescope::localize::{QueryResult, localize_traced};
 use posescope::measure::{Field, measure, read_rows};
 use posescope::method::Method;
@@ -160,6 +161,44 @@ fn stated_as(
     let (pose, cloud) = (tuple.world_from_camera() * turn, tuple.cloud().clone());
     let reference = ReferenceTuple::new(tuple.name(), of_tuple, camera, pose, cloud);
     (Query::new(query.name(), of_query, camera).expect("fits"), reference.expect("fits"))
+}
+
+/// A pose of a query whose camera is stated wrongly is as wrong as that, however many matches agree on it.
+#[test]
+fn a_pose_by_the_camera_of_another_photo_is_not_trusted_and_one_by_its_own_is() {
+    let street = scene::open("street", None).expect("is built in");
+    let mut doubted = 0;
+    for frame in [152, 168, 232, 312] {
+        let truth = street.pose(frame).expect("is known");
+        let stated = street.intrinsics(frame);
+        let confidence = |camera: Intrinsics| {
+            let (_, reference) =
+                stated_as(street.as_ref(), [frame, frame - 8], stated, &Pose::identity());
+            let photo = Arc::clone(street.query(frame).expect("a photo").photo());
+            let query = Query::new("query", photo, camera).expect("fits");
+            let problem = Problem::new(query, reference, 15.0).expect("a radius");
+            let (params, mut evidence) = (Params::default(), Evidence::default());
+            let outcome =
+                localize_traced(&problem, Method::FB, &params, &mut Trace::to(&mut evidence));
+            let outcome = outcome.expect("nobody cancels");
+            let subject = Subject::new(&problem, Method::FB, &params, &outcome, &evidence);
+            let pose = outcome.pose.as_ref().ok()?;
+            let error = PoseError::between(&truth, pose).translation_m;
+            Some((error, subject.confidence.expect("a pose")))
+        };
+        let (error, own) = confidence(stated).expect("a pose");
+        assert!(error < 0.5 && own.lowered_by.is_empty(), "{frame}: {error} m, {own:?}");
+        let short = Intrinsics { fx: 0.8 * stated.fx, fy: 0.8 * stated.fy, ..stated };
+        let Some((error, other)) = confidence(short) else { continue };
+        assert!(error > 1.0 && other.word != Confidence::Trusted, "{frame}: {error} m, {other:?}");
+        let named = other.lowered_by.iter().find_map(|why| match why {
+            Lowered::Camera { focal_length_px, .. } => Some(focal_length_px / stated.fx),
+            Lowered::Radius { .. } => None,
+        });
+        doubted += usize::from(named.is_some_and(|ratio| (ratio - 1.0).abs() < 0.1));
+    }
+    // Of the others FB gives no pose, or is unsure of it.
+    assert!(doubted >= 1, "{doubted}");
 }
 
 /// What FB's verdicts are of a query with these words for its truth.

@@ -11,7 +11,7 @@ use crate::features::SurfParams;
 use crate::grid::{GridParams, SurfaceParams};
 use crate::retrieval::{IndexParams, RetrievalParams};
 use crate::scale::Scale;
-use crate::survey::{Survey, Surveyed};
+use crate::survey::{FramePairs, Survey, Surveyed};
 
 pub use crate::describe::{About, Described, Domain, ParamError, Value};
 pub use crate::estimator::{
@@ -33,6 +33,10 @@ pub struct Params {
     /// What is wrong with the map, if anything is known to be: its poses have no confidence then. It changes no pose.
     #[doc(hidden)]
     pub mistake_of_map: Option<String>,
+    /// How closely pairs of the map's frames fit each other, where that is known and the map was not surveyed. It changes
+    /// no pose.
+    #[doc(hidden)]
+    pub frame_pairs: Option<FramePairs>,
     /// `surf`: detector and descriptor.
     pub surf: SurfParams,
     /// `fb`: matching, depth lift, consensus, acceptance.
@@ -68,6 +72,8 @@ pub struct Params {
 const SCALE: &str = "scale";
 /// The table of the survey in a configuration.
 const SURVEY: &str = "survey";
+/// The table of the map's pairs of frames in a configuration.
+const FRAME_PAIRS: &str = "frame_pairs";
 /// The key of the map's mistake in a configuration.
 const MISTAKE_OF_MAP: &str = "mistake_of_map";
 
@@ -219,6 +225,15 @@ impl Params {
                 })?;
                 continue;
             }
+            if group == FRAME_PAIRS {
+                let pairs = entries.clone().try_into().ok().filter(FramePairs::is_sound);
+                self.frame_pairs = Some(pairs.ok_or_else(|| ParamError::BadValue {
+                    key: group.clone(),
+                    expected: "a table of pairs, near, position and rotation".to_owned(),
+                    given: entries.to_string(),
+                })?);
+                continue;
+            }
             if group == MISTAKE_OF_MAP {
                 let mistake = entries.as_str().map(str::to_owned);
                 self.mistake_of_map = Some(mistake.ok_or_else(|| ParamError::BadValue {
@@ -253,6 +268,11 @@ impl Params {
         if !self.scale.is_paper() {
             let (metre, is_metric) = (self.scale.metre(), self.scale.is_metric());
             text += &format!("[{SCALE}]\nmetre = {metre:?}\nis_metric = {is_metric}\n\n");
+        }
+        if let Some(FramePairs { pairs, near, position, rotation }) = self.frame_pairs {
+            text += &format!(
+                "[{FRAME_PAIRS}]\npairs = {pairs}\nnear = {near}\nposition = {position:?}\nrotation = {rotation:?}\n\n"
+            );
         }
         for (method, one) in self.survey.methods() {
             let Surveyed { shift, slope, position, rotation } = one;
@@ -386,12 +406,15 @@ mod tests {
         let surveyed = Surveyed { shift: -0.25, slope: 0.75, position: 2.0, rotation: 1.5 };
         let survey: Survey = [(crate::method::Method::FB, surveyed)].into_iter().collect();
         let mistake_of_map = Some("a \"mistake\"".to_owned());
-        let params =
-            Params { survey, mistake_of_map, ..Params::at_scale(Scale::of_depth(1.8, true)) };
+        let frame_pairs = Some(FramePairs { pairs: 16, near: 12, position: 2.5, rotation: 1.0 });
+        let room = Params::at_scale(Scale::of_depth(1.8, true));
+        let params = Params { survey, mistake_of_map, frame_pairs, ..room };
         assert_eq!(params.changes(), [""; 0]);
         assert_eq!(params.to_toml().parse(), Ok(params));
         for wrong in [
             "mistake_of_map = 1.0",
+            "frame_pairs = 1.0",
+            "[frame_pairs]\npairs = 1\nnear = 2\nposition = 1.0\nrotation = 1.0",
             "survey = 1.0",
             "[survey.fb]\nshift = 0.0",
             "[survey.fb]\nshift = 0.0\nslope = 0.0\nposition = 1.0\nrotation = 1.0",

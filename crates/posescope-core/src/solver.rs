@@ -4,6 +4,7 @@
 //! |---|---|---|
 //! | [`p3p()`] | three bearings, three points, up to four poses | two conics met by a line pair (Ding et al. 2023) |
 //! | [`refine()`] | pixels and points, one pose near the answer | Levenberg–Marquardt on a robust reprojection error |
+//! | `zoom` | pixels and points, one pose and one focal length | the same with a seventh freedom |
 //! | [`Loss`] | how much may a large residual say? | Huber, Cauchy |
 
 mod conic;
@@ -11,11 +12,14 @@ mod loss;
 mod p3p;
 mod refine;
 mod reprojection;
+mod zoom;
 
 pub use loss::{Loss, LossShape};
 pub use p3p::{MAX_SOLUTIONS, p3p};
-pub(crate) use refine::pose_covariance;
+#[doc(hidden)]
+pub use refine::pose_covariance;
 pub use refine::{Refinement, Termination, refine};
+pub(crate) use zoom::{Zoomed, refine_zoomed};
 
 use nalgebra::{Point2, Point3};
 

@@ -13,6 +13,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::covariance::PoseCovariance;
 use crate::method::Method;
+use crate::scale::Scale;
 
 /// What was surveyed, by the method that makes the pose.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -31,6 +32,52 @@ pub struct Surveyed {
     pub position: f64,
     /// How many times farther rotations are off.
     pub rotation: f64,
+}
+
+/// How closely pairs of frames of a map fit each other, where nobody surveyed the map.
+///
+/// The features of two photos and the cloud of one say how the cameras stand to each other, and the stated poses say it,
+/// too. A pose that is localised in the map is off at least as these are.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FramePairs {
+    /// The pairs whose features agree on how the cameras stand to each other.
+    pub pairs: usize,
+    /// Those of them whose stated poses are near that.
+    pub near: usize,
+    /// How many times farther than in generated towns the positions of these are off.
+    pub position: f64,
+    /// How many times farther their rotations are off.
+    pub rotation: f64,
+}
+
+impl FramePairs {
+    /// The probability in this map: a pose is right if it was found, and if the map is right there. At the scale of the
+    /// paper, what was fitted holds.
+    pub fn probability(&self, fitted: f64, scale: Scale) -> f64 {
+        if scale.is_paper() {
+            return fitted;
+        }
+        // The mean of what is likely of the share, if all shares were likely (Jeffreys).
+        fitted * (self.near as f64 + 0.5) / (self.pairs as f64 + 1.0)
+    }
+
+    /// The covariance in this map.
+    pub fn covariance(&self, fitted: &PoseCovariance) -> PoseCovariance {
+        widened(fitted, self.rotation, self.position)
+    }
+
+    /// Whether its numbers can be used.
+    pub fn is_sound(&self) -> bool {
+        let is_factor = |factor: f64| factor >= 1.0 && factor.is_finite();
+        self.near <= self.pairs && is_factor(self.position) && is_factor(self.rotation)
+    }
+}
+
+/// A covariance whose rotations and positions are so many times wider.
+fn widened(fitted: &PoseCovariance, turn: f64, shift: f64) -> PoseCovariance {
+    let by = Vector6::new(turn, turn, turn, shift, shift, shift);
+    fitted.with_deviations(&fitted.deviations().component_mul(&by))
 }
 
 /// The logarithm of the odds of a probability. More than this counts as this.
@@ -54,9 +101,7 @@ impl Surveyed {
 
     /// The covariance in this map.
     pub fn covariance(&self, fitted: &PoseCovariance) -> PoseCovariance {
-        let (turn, shift) = (self.rotation, self.position);
-        let by = Vector6::new(turn, turn, turn, shift, shift, shift);
-        fitted.with_deviations(&fitted.deviations().component_mul(&by))
+        widened(fitted, self.rotation, self.position)
     }
 
     fn is_sound(&self) -> bool {
@@ -121,6 +166,20 @@ mod tests {
         let fitted = PoseCovariance::new(Matrix6::identity()).expect("positive");
         let deviations = surveyed.covariance(&fitted).deviations();
         assert_eq!(deviations, Vector6::new(2.0, 2.0, 2.0, 3.0, 3.0, 3.0));
+    }
+
+    #[test]
+    fn pairs_that_do_not_fit_lower_the_probability_and_widen_the_interval() {
+        let of = |near| FramePairs { pairs: 15, near, position: 2.0, rotation: 1.5 };
+        let room = Scale::of_depth(1.8, true);
+        assert!((of(15).probability(1.0, room) - 15.5 / 16.0).abs() < 1e-12);
+        assert!((of(9).probability(0.5, room) - 0.5 * 9.5 / 16.0).abs() < 1e-12);
+        assert_eq!(of(9).probability(0.5, Scale::PAPER), 0.5);
+        let fitted = PoseCovariance::new(Matrix6::identity()).expect("positive");
+        let deviations = of(15).covariance(&fitted).deviations();
+        assert_eq!(deviations, Vector6::new(1.5, 1.5, 1.5, 2.0, 2.0, 2.0));
+        assert!(of(15).is_sound() && !of(16).is_sound());
+        assert!(!FramePairs { position: 0.5, ..of(15) }.is_sound());
     }
 
     #[test]

@@ -99,6 +99,10 @@ fn why(ui: &mut Ui, context: &ViewContext<'_>) {
         if let Some(interval) = known.interval() {
             words = format!("{words}; if so, {interval}");
         }
+        if let Some(because) = known.because() {
+            words =
+                context.in_unit(&format!("{words}; less sure than it seems, because {because}"));
+        }
         if known.word == Confidence::Trusted && result.grade == Grade::Wrong {
             words += ", although the pose is wrong";
         }

@@ -8,7 +8,7 @@ use std::sync::atomic::AtomicBool;
 use indicatif::ProgressBar;
 use posescope::run::{
     Evaluation, EvaluationRequest, Judgement, Judging, Plan, Protocol, ProtocolError, RunError,
-    RunFile, RunFolder, Sweep, examine, survey_line,
+    RunFile, RunFolder, Sweep, examine, frame_pairs_line, survey_line,
 };
 use posescope::session::command_line;
 use posescope::sink::{EventExport, Follower, KEPT_FAILURES, RunRecords};
@@ -43,6 +43,8 @@ pub fn evaluate(
     }
     if let Some(file) = &plan.survey {
         terminal.say(|| survey_line(file));
+    } else if let Some(pairs) = &plan.params.frame_pairs {
+        terminal.say(|| frame_pairs_line(&run.scenes.join(" "), pairs));
     }
     let first = plan.scenes.references.first().filter(|scene| !scene.frames().is_empty());
     let camera = first.map(|scene| scene.intrinsics(0));

@@ -14,6 +14,7 @@ mod appearance;
 mod coefficients;
 mod edges;
 mod inliers;
+mod lowered;
 mod minimum;
 mod settled;
 
@@ -22,6 +23,7 @@ use std::fmt;
 use serde::{Deserialize, Serialize};
 
 pub use coefficients::{Fitted, fit, fitted, units};
+pub use lowered::Lowered;
 
 use super::numbers::with_digits;
 use super::{Family, Subject, Tolerance};
@@ -87,6 +89,8 @@ pub enum Calibration {
     Generated,
     /// Generated towns, and then a survey of the map.
     Map,
+    /// Generated towns, and then how closely pairs of the map's frames fit each other.
+    FramePairs,
 }
 
 /// A distance and an angle.
@@ -129,6 +133,9 @@ pub struct PoseConfidence {
     pub within: Within,
     /// What the probability was fitted on.
     pub calibrated_on: Calibration,
+    /// Why it is lower than the method's evidence says.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub lowered_by: Vec<Lowered>,
     /// How far 95 % of the poses like this one are off at most, of those that are right.
     #[serde(default)]
     pub within_95: Option<Within>,
@@ -169,6 +176,7 @@ impl PoseConfidence {
             word: Confidence::of(probability),
             within,
             calibrated_on: Calibration::Generated,
+            lowered_by: Vec::new(),
             within_95: None,
             covariance: None,
             position_std_m: None,
@@ -185,6 +193,12 @@ impl PoseConfidence {
         const TELLING: f64 = 10.0;
         let known = self.within_95.filter(|known| known.m <= TELLING * self.within.m)?;
         Some(format!("95 % of such poses within {known}"))
+    }
+
+    /// Why a pose is less likely right than it seems, as people read it; lengths in metres.
+    pub fn because(&self) -> Option<String> {
+        let why: Vec<String> = self.lowered_by.iter().map(ToString::to_string).collect();
+        (!why.is_empty()).then(|| why.join(", and "))
     }
 
     /// The probability as people read it, with the glyph of a low one before it.
@@ -221,18 +235,20 @@ pub(super) struct Trust {
     /// What near is at the scale of the scene.
     is_near: Tolerance,
     calibrated_on: Calibration,
+    lowered_by: Vec<Lowered>,
     elsewhere: Option<f64>,
 }
 
 impl Trust {
-    /// That of a subject's pose; `None` without a pose, for a method for which nothing was fitted, and for a scene of
-    /// another scale than those that it was fitted on, or whose map has a mistake, unless the map was surveyed: there,
-    /// poses that are wrong would be trusted.
+    /// That of a subject's pose; `None` without a pose, for a method for which nothing was fitted, and, unless the map was
+    /// surveyed, for a map that has a mistake, and for one of another scale than those that it was fitted on if it is not
+    /// known how closely its frames fit each other: there, poses that are wrong would be trusted.
     pub(super) fn of(subject: &Subject<'_>) -> Option<Self> {
         let method = responsible(subject.method, subject.outcome);
         let (scale, survey) = (subject.params.scale, subject.params.survey.of(method));
-        let is_as_fitted = scale.is_paper() && subject.params.mistake_of_map.is_none();
-        if !is_as_fitted && survey.is_none() {
+        let pairs = subject.params.frame_pairs.filter(|_| survey.is_none());
+        let is_known = scale.is_paper() || pairs.is_some();
+        if survey.is_none() && (subject.params.mistake_of_map.is_some() || !is_known) {
             return None;
         }
         let evidenced = evidenced(subject)?;
@@ -240,19 +256,33 @@ impl Trust {
         let surveyed = survey.copied().unwrap_or(Surveyed::UNCHANGED);
         let values: Vec<f64> = evidenced.signals.iter().map(|(_, value)| *value).collect();
         let spread = evidenced.alone.map(|alone| {
-            let spread = fitted.covariance(&alone, &values, scale);
-            (surveyed.covariance(&spread), fitted.tail)
+            let spread = surveyed.covariance(&fitted.covariance(&alone, &values, scale));
+            (pairs.map_or(spread, |pairs| pairs.covariance(&spread)), fitted.tail)
         });
-        let is_moved = surveyed != Surveyed::UNCHANGED;
-        let calibrated_on = if is_moved { Calibration::Map } else { Calibration::Generated };
+        let calibrated_on = match pairs {
+            Some(_) => Calibration::FramePairs,
+            None if surveyed != Surveyed::UNCHANGED => Calibration::Map,
+            None => Calibration::Generated,
+        };
         let shown = fitted.shown(&values);
+        let mut lowered_by = Vec::new();
+        let mut lower = |probability: f64, why: Option<Lowered>| {
+            let lowered = why.as_ref().map_or(probability, |why| why.applied(probability));
+            lowered_by.extend(why.filter(|_| lowered < probability));
+            lowered
+        };
+        let near = lower(fitted.probability(&values), lowered::by_radius(subject, fitted));
+        let near = surveyed.probability(near);
+        let near = pairs.map_or(near, |pairs| pairs.probability(near, scale));
+        let near = lower(near, lowered::by_camera(subject));
         Some(Self {
             elsewhere: Some(shown).filter(|shown| *shown < fitted.shown_from),
-            near: surveyed.probability(fitted.probability(&values)),
+            near,
             spread,
             is_near: NEAR.at(scale),
             evidenced,
             calibrated_on,
+            lowered_by,
         })
     }
 
@@ -276,6 +306,7 @@ impl Trust {
             runner_up_margin,
             chance_level,
             calibrated_on: self.calibrated_on,
+            lowered_by: self.lowered_by.clone(),
             ..PoseConfidence::new(probability, right.into())
         }
     }

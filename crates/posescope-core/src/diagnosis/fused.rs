@@ -79,6 +79,7 @@ pub fn fused_confidence(
     Some(match of_heaviest {
         Some(one) => PoseConfidence {
             calibrated_on: one.calibrated_on,
+            lowered_by: one.lowered_by.clone(),
             within_95: one.within_95,
             covariance: one.covariance,
             position_std_m: one.position_std_m,

@@ -62,6 +62,12 @@ impl Judge {
         }
     }
 
+    /// The same judge, if another camera took the query. It must have been made with this `shrink`.
+    #[must_use]
+    pub fn seen_by(self, camera: &Intrinsics, shrink: u32) -> Self {
+        Self { intrinsics: shrunk_camera(camera, shrink), ..self }
+    }
+
     /// The mean cost of the channels over the pairs. A channel that is constant tells nothing, which costs 1;
     /// where all are, there is no cost.
     ///

@@ -106,13 +106,15 @@ impl QueryResult {
         match &self.confidence {
             Some(known) if self.grade == Grade::Unmeasured => {
                 let interval = known.interval().map(|words| format!(" ({words})"));
+                let because = known.because().map(|why| format!(", because {why}"));
                 let words = format!(
-                    "{} {}, {} likely within {} m{}; {rests_on}",
+                    "{} {}, {} likely within {} m{}{}; {rests_on}",
                     known.word.glyph(),
                     known.word,
                     confidence::percent(known.probability),
                     known.within.m,
-                    interval.unwrap_or_default()
+                    interval.unwrap_or_default(),
+                    because.unwrap_or_default()
                 );
                 self.unit.words(&words)
             }

@@ -1,6 +1,6 @@
 //! Reprojection errors of correspondences, with their derivatives by the pose.
 
-use nalgebra::{Matrix6, Vector6};
+use nalgebra::{Matrix6, SMatrix, SVector, Vector2, Vector6};
 
 use super::Correspondence;
 use super::loss::Loss;
@@ -111,6 +111,43 @@ impl<'a> Reprojection<'a> {
         }
         normal.hessian.fill_upper_triangle_with_lower_triangle();
         normal
+    }
+
+    /// Mean loss \[px²\] of a pose, where points that are not in front of the camera are as far off as the photo is large;
+    /// no number without points.
+    pub(super) fn cost_of_seen(&self, pose: &Pose, loss: Loss) -> f64 {
+        let Intrinsics { width, height, .. } = self.intrinsics;
+        let unseen = f64::from(width).powi(2) + f64::from(height).powi(2);
+        let squares = self.seen(pose).map(|seen| {
+            seen.map_or(unseen, |Seen { residual: [u, v], .. }| (u * u + v * v).min(unseen))
+        });
+        squares.map(|square| loss.rho(square)).sum::<f64>() / self.correspondences.len() as f64
+    }
+
+    /// The normal equations of a pose, and of the logarithm of the focal lengths last; points that are not in front of the
+    /// camera are left out.
+    pub(super) fn zoom_equations(
+        &self,
+        pose: &Pose,
+        loss: Loss,
+    ) -> (SMatrix<f64, 7, 7>, SVector<f64, 7>) {
+        let (mut hessian, mut gradient) = (SMatrix::zeros(), SVector::zeros());
+        let Intrinsics { fx, fy, .. } = self.intrinsics;
+        for seen in self.seen(pose).flatten() {
+            let residual = Vector2::from(seen.residual);
+            let weight = loss.weight(residual.norm_squared());
+            let mut jacobian = SMatrix::<f64, 2, 7>::zeros();
+            for (axis, derivatives) in self.derivatives(&seen).into_iter().enumerate() {
+                for (freedom, derivative) in MOVES[axis].into_iter().zip(derivatives) {
+                    jacobian[(axis, freedom)] = derivative;
+                }
+            }
+            jacobian[(0, 6)] = fx * seen.plane[0];
+            jacobian[(1, 6)] = fy * seen.plane[1];
+            hessian += jacobian.transpose() * jacobian * weight;
+            gradient += jacobian.transpose() * residual * weight;
+        }
+        (hessian, gradient)
     }
 
     /// Derivatives of both axes of a pixel by what moves them, of a twist in the camera frame \[px/rad, px/m\].

@@ -63,6 +63,12 @@ impl Fitted {
         1.0 / (1.0 + (-weighted_sum(&self.near, signals)).exp())
     }
 
+    /// The farthest search that was fitted to, at the scale of the paper \[m\].
+    pub fn farthest(&self) -> Option<f64> {
+        let at = self.signals.iter().position(|name| name == "radius")?;
+        Some(self.seen.get(at)?[1].exp())
+    }
+
     /// How likely a pose of these signals is near, beside one of a query that does not show the place.
     pub fn shown(&self, signals: &[f64]) -> f64 {
         1.0 / (1.0 + (-weighted_sum(&self.shown, signals)).exp())

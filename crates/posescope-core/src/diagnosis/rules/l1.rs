@@ -23,13 +23,15 @@ pub(in crate::diagnosis) fn low(confidence: Option<&PoseConfidence>) -> Option<D
         RULE.found(&Low {
             probability: confidence.probability,
             within_m: confidence.within.m,
+            because: confidence.because(),
             runner_up_margin: confidence.runner_up_margin,
             inlier_spread: confidence.inlier_spread,
         })
     })
 }
 
-evidence!(Low { probability: f64, within_m: f64, runner_up_margin: Option<f64>, inlier_spread: Option<f64> } =>
-    "Low confidence: {} likely within {} m.",
-    confidence::percent(*probability), within_m
+evidence!(Low { probability: f64, within_m: f64, #[serde(skip_serializing_if = "Option::is_none")] because: Option<String>, runner_up_margin: Option<f64>, inlier_spread: Option<f64> } =>
+    "Low confidence: {} likely within {} m{}.",
+    confidence::percent(*probability), within_m,
+    because.as_ref().map(|why| format!(", because {why}")).unwrap_or_default()
 );
