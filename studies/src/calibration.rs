@@ -69,9 +69,25 @@ pub struct Options {
     /// Plant mistakes in the inputs, each alone.
     #[arg(long)]
     wrong_inputs: bool,
+    /// Plant those alone whose name has these words.
+    #[arg(long, requires = "wrong_inputs", default_value = "")]
+    mistake: String,
+    /// Only compare pairs of frames of each map, as posescope doctor does.
+    #[arg(long)]
+    frame_pairs: bool,
 }
 
 pub fn run(options: &Options) -> Result<(), Failure> {
+    if options.frame_pairs {
+        let open = |argument: &String| scene::open(argument, None);
+        let scenes = options.scene.iter().map(open).collect::<Result<Vec<_>, _>>()?;
+        let maps = match scenes.as_slice() {
+            [] => trials::maps(options.real, &options.towns, &[])?,
+            _ => Vec::new(),
+        };
+        wrong_inputs::compare_pairs(&maps, &scenes);
+        return Ok(());
+    }
     let samples = match options.from.as_slice() {
         [] => collected(options)?,
         files => read(files)?,
@@ -80,7 +96,7 @@ pub fn run(options: &Options) -> Result<(), Failure> {
         let lines: Result<Vec<_>, _> = samples.iter().map(serde_json::to_string).collect();
         std::fs::write(path, lines?.join("\n"))?;
     }
-    if options.wrong_inputs {
+    if options.wrong_inputs && options.mistake.is_empty() {
         wrong_inputs::examine(&trials::maps(options.real, &options.towns, &options.scene)?);
     }
     let now: BTreeMap<String, Fitted> = options
@@ -153,7 +169,7 @@ fn read(files: &[PathBuf]) -> Result<Vec<Sample>, Failure> {
 
 fn collected(options: &Options) -> Result<Vec<Sample>, Failure> {
     let Options { places, seed, towns, radii, methods, .. } = options;
-    let inputs = if options.wrong_inputs { Inputs::Wrong } else { Inputs::Sound };
+    let inputs = if options.wrong_inputs { Inputs::Wrong(&options.mistake) } else { Inputs::Sound };
     if options.real {
         return trials::of_real_streets(radii[0], inputs, methods);
     }

@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use posescope::diagnosis::PoseConfidence;
 use posescope::diagnosis::confidence::{Confidence, Fitted};
 
 use super::fit::{beyond, square};
@@ -63,13 +64,71 @@ pub fn judge(title: &str, samples: &[Sample], fitted: &BTreeMap<String, Fitted>)
         &intervals,
     );
     elsewhere(&all, fitted);
+    as_stated(&all);
+}
+
+/// Prints how well what is said of poses holds, with all that is known of their map and of their query's camera.
+fn as_stated(samples: &[&Sample]) {
+    let known: Vec<(&Sample, &PoseConfidence)> =
+        samples.iter().filter_map(|sample| Some((*sample, sample.stated.as_ref()?))).collect();
+    let row = |name: &str, own: &[(&Sample, &PoseConfidence)]| {
+        let mut scored: Vec<Scored> =
+            own.iter().map(|(sample, stated)| (stated.probability, sample.is_near())).collect();
+        scored.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let share = |is_one: &dyn Fn(&Sample) -> bool, word: Confidence| {
+            let group = || own.iter().filter(|(sample, _)| is_one(sample));
+            let hit = group().filter(|(_, stated)| stated.word == word).count();
+            format!("{hit} of {}", group().count())
+        };
+        let lowered = |is_near: bool| {
+            let of = |(sample, stated): &&(&Sample, &PoseConfidence)| {
+                sample.is_near() == is_near && !stated.lowered_by.is_empty()
+            };
+            own.iter().filter(of).count()
+        };
+        let held = |which: usize| {
+            let near = || own.iter().filter(|(sample, _)| sample.is_near());
+            let is_in = |(sample, stated): &&(&Sample, &PoseConfidence)| {
+                let Some((within, [m, rad])) = stated.within_95.zip(sample.distances()) else {
+                    return false;
+                };
+                [m <= within.m / sample.metre, rad.to_degrees() <= within.deg][which]
+            };
+            format!("{} of {}", near().filter(is_in).count(), near().count())
+        };
+        vec![
+            name.to_owned(),
+            own.len().to_string(),
+            format!("{:.3}", calibration_error(&scored)),
+            share(&|sample| !sample.is_near(), Confidence::Trusted),
+            share(&Sample::is_near, Confidence::Trusted),
+            share(&Sample::is_near, Confidence::Low),
+            format!("{} / {}", lowered(true), lowered(false)),
+            held(0),
+            held(1),
+        ]
+    };
+    let mut rows = Vec::new();
+    let of: BTreeSet<(&str, &str)> =
+        known.iter().map(|(sample, _)| (sample.of.as_str(), sample.method.as_str())).collect();
+    for (of, method) in of {
+        let is_own = |(s, _): &(&Sample, &PoseConfidence)| s.of == of && s.method == method;
+        let own: Vec<_> = known.iter().copied().filter(is_own).collect();
+        rows.push(row(&format!("{of}, {method}"), &own));
+    }
+    rows.push(row("all", &known));
+    print_table(
+        "as stated,poses,calibration error,trusted of wrong,trusted of near,low of near,lowered near / wrong,position \
+         in 95 %,rotation in 95 %",
+        &rows,
+    );
 }
 
 /// Prints how many poses are trusted, by what is wrong with the inputs.
 fn wrong_inputs(samples: &[&Sample], fitted: &BTreeMap<String, Fitted>) {
     let is_trusted = |sample: &&&Sample| {
-        let probability = fitted[&sample.method].probability(&sample.values);
-        Confidence::of(probability) == Confidence::Trusted
+        let stated = sample.stated.as_ref().map(|stated| stated.word);
+        stated == Some(Confidence::Trusted)
     };
     let row = |name: &str, of: &dyn Fn(&Sample) -> bool| {
         let (right, wrong): (Vec<&Sample>, Vec<&Sample>) =
@@ -173,8 +232,7 @@ fn coverage(
         let is_in = |s: &&&&Sample| beyond(&fitted[&s.method], s)[which] <= 1.0;
         percent(near.iter().filter(is_in).count(), near.len())
     };
-    let size =
-        |s: &Sample| s.error.map_or(f64::NAN, |e| (e[3] * e[3] + e[4] * e[4] + e[5] * e[5]).sqrt());
+    let size = |s: &Sample| s.distances().map_or(f64::NAN, |[distance, _]| distance);
     let error = crate::numbers::median(near.iter().map(|s| size(s)));
     let interval =
         crate::numbers::median(near.iter().map(|s| size(s) / beyond(&fitted[&s.method], s)[0]));

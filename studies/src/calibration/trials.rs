@@ -4,13 +4,14 @@ use std::sync::Arc;
 
 use posescope::camera::Intrinsics;
 use posescope::covariance::{PoseCovariance, error_vector};
-use posescope::diagnosis::{Evidence, Subject, confidence};
+use posescope::diagnosis::{Evidence, PoseConfidence, Subject, confidence};
 use posescope::estimator;
 use posescope::geometry::{Pose, PoseError};
 use posescope::image::Photo;
 use posescope::method::Method;
 use posescope::params::Params;
 use posescope::problem::{Problem, Query, ReferenceTuple};
+use posescope::run::MapFit;
 use posescope::scene::street::{Condition, Size, Traversal, WORLD_SEED};
 use posescope::scene::{self, Scene, SceneSize};
 use posescope::trace::Trace;
@@ -40,12 +41,15 @@ const OTHER_STREET_DEG: f64 = 60.0;
 /// References are up to this share of the search radius away.
 const REACH: f64 = 0.9;
 
+/// What pairs of registered real photos are called.
+pub const REAL_STREETS: &str = "real streets";
+
 /// Whether the inputs are as they should be.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Inputs {
+pub enum Inputs<'a> {
     Sound,
-    /// Each pair of frames once with each mistake.
-    Wrong,
+    /// Each pair of frames once with each mistake whose name has these words.
+    Wrong(&'a str),
 }
 
 /// One pose with what is known of it.
@@ -69,6 +73,9 @@ pub struct Sample {
     pub alone: Option<PoseCovariance>,
     pub names: Vec<String>,
     pub values: Vec<f64>,
+    /// What is said of it, where anything is, within what is near.
+    #[serde(default)]
+    pub stated: Option<PoseConfidence>,
 }
 
 /// What the reference shows of the query's place.
@@ -96,13 +103,18 @@ impl Shown {
 }
 
 impl Sample {
+    /// How far the pose is off: a distance in units of the scale, and an angle \[rad\].
+    pub fn distances(&self) -> Option<[f64; 2]> {
+        let [x, y, z, right, down, forward] = self.error?;
+        let length = |a: f64, b: f64, c: f64| (a * a + b * b + c * c).sqrt();
+        Some([length(right, down, forward), length(x, y, z)])
+    }
+
     /// Whether the pose is near.
     pub fn is_near(&self) -> bool {
         let near = confidence::NEAR;
-        self.error.is_some_and(|[x, y, z, right, down, forward]| {
-            let angle = (x * x + y * y + z * z).sqrt().to_degrees();
-            let distance = (right * right + down * down + forward * forward).sqrt();
-            angle <= near.rotation_deg && distance <= near.translation_m
+        self.distances().is_some_and(|[distance, angle]| {
+            angle.to_degrees() <= near.rotation_deg && distance <= near.translation_m
         })
     }
 }
@@ -123,7 +135,7 @@ pub fn of_towns(
     places: usize,
     radii: &[f64],
     seed: u64,
-    inputs: Inputs,
+    inputs: Inputs<'_>,
     methods: &[Method],
 ) -> Result<Vec<Sample>, Failure> {
     let drives: Vec<[Traversal; 5]> = towns
@@ -135,9 +147,9 @@ pub fn of_towns(
         let of = towns[town].to_string();
         let trials = match inputs {
             Inputs::Sound => at(&drives[town], towns[town], place, radius_m, seed)?,
-            Inputs::Wrong => {
+            Inputs::Wrong(words) => {
                 let (query, reference) = pair_at(&drives[town], place, radius_m, seed);
-                wrong(&query, &reference)?
+                wrong(&query, &reference, words)?
             }
         };
         samples_of(&trials, &of, radius_m, &Params::default(), methods)
@@ -148,7 +160,7 @@ pub fn of_towns(
 /// The poses of pairs of registered real photos of the street.
 pub fn of_real_streets(
     radius_m: f64,
-    inputs: Inputs,
+    inputs: Inputs<'_>,
     methods: &[Method],
 ) -> Result<Vec<Sample>, Failure> {
     let pairs = real_pairs::all()?;
@@ -156,9 +168,9 @@ pub fn of_real_streets(
         let pair = &pairs[number];
         let trials = match inputs {
             Inputs::Sound => vec![Trial::of(&pair.query, &pair.reference, None)?],
-            Inputs::Wrong => wrong(&pair.query, &pair.reference)?,
+            Inputs::Wrong(words) => wrong(&pair.query, &pair.reference, words)?,
         };
-        samples_of(&trials, "real streets", radius_m, &Params::default(), methods)
+        samples_of(&trials, REAL_STREETS, radius_m, &Params::default(), methods)
     })?;
     Ok(samples.concat())
 }
@@ -168,11 +180,12 @@ pub fn of_scene(
     scene: &dyn Scene,
     pairs: usize,
     seed: u64,
-    inputs: Inputs,
+    inputs: Inputs<'_>,
     methods: &[Method],
 ) -> Result<Vec<Sample>, Failure> {
     let scale = SceneSize::of(scene).scale;
-    let (params, radius_m) = (Params::at_scale(scale), scale.radius());
+    let (mut params, radius_m) = (Params::at_scale(scale), scale.radius());
+    params.frame_pairs = MapFit::of(scene).frame_pairs;
     let frames = 0..scene.frames().len();
     let apart = |a: usize, b: usize| {
         let (a, b) = (scene.pose(a)?, scene.pose(b)?);
@@ -197,7 +210,9 @@ pub fn of_scene(
                 shown: Shown::Same,
                 fault: None,
             }],
-            Inputs::Wrong => wrong(&Frame::read(scene, query)?, &Frame::read(scene, reference)?)?,
+            Inputs::Wrong(words) => {
+                wrong(&Frame::read(scene, query)?, &Frame::read(scene, reference)?, words)?
+            }
         };
         samples_of(&trials, scene.name(), radius_m, &params, methods)
     })?;
@@ -217,9 +232,9 @@ fn samples_of(
     Ok(samples?.concat())
 }
 
-/// A pair with each mistake in its inputs.
-fn wrong(query: &Frame, reference: &Frame) -> Result<Vec<Trial>, Failure> {
-    let planted = wrong_inputs::planted(query, reference).into_iter();
+/// A pair with each mistake in its inputs whose name has these words.
+fn wrong(query: &Frame, reference: &Frame, words: &str) -> Result<Vec<Trial>, Failure> {
+    let planted = wrong_inputs::planted(query, reference, words).into_iter();
     planted.map(|(fault, query, reference)| Trial::of(&query, &reference, Some(fault))).collect()
 }
 
@@ -372,7 +387,8 @@ impl Trial {
             let mut evidence = Evidence::default();
             let estimator = estimator::entry(method).make(params);
             let outcome = estimator.estimate(&problem, &mut Trace::to(&mut evidence))?;
-            let subject = Subject::new(&problem, method, params, &outcome, &evidence);
+            let subject = Subject::new(&problem, method, params, &outcome, &evidence)
+                .against(None, confidence::NEAR.at(params.scale));
             let evidenced = confidence::evidenced(&subject);
             let (Ok(pose), Some(evidenced)) = (&outcome.pose, evidenced) else {
                 continue;
@@ -390,6 +406,7 @@ impl Trial {
                 alone: evidenced.alone,
                 names: names.iter().map(ToString::to_string).collect(),
                 values,
+                stated: subject.confidence.clone(),
             });
         }
         Ok(samples)

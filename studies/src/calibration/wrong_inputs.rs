@@ -1,11 +1,13 @@
 //! Inputs that are wrong, and what `posescope doctor` says of maps of such inputs.
 
 use nalgebra::{Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
-use posescope::doctor;
+use posescope::diagnosis::confidence::NEAR;
+use posescope::doctor::{self, FramePair};
 use posescope::geometry::Pose;
+use posescope::scene::{Scene, SceneSize};
 
 use crate::frames::{Frame, Frames};
-use crate::numbers::print_table;
+use crate::numbers::{percentile, print_table};
 
 /// A query and a reference, and what makes their inputs wrong.
 type Mistake = (&'static str, fn(&mut Frame, &mut Frame) -> Option<()>);
@@ -41,14 +43,14 @@ const ALL: &[Mistake] = &[
     }),
 ];
 
-/// A pair of frames with each of the mistakes.
-pub fn planted(query: &Frame, reference: &Frame) -> Vec<(&'static str, Frame, Frame)> {
+/// A pair of frames with each of the mistakes whose name has these words.
+pub fn planted(query: &Frame, reference: &Frame, words: &str) -> Vec<(&'static str, Frame, Frame)> {
     let planted = |&(name, plant): &Mistake| {
         let (mut query, mut reference) = (query.clone(), reference.clone());
         plant(&mut query, &mut reference)?;
         Some((name, query, reference))
     };
-    ALL.iter().filter_map(planted).collect()
+    ALL.iter().filter(|(name, _)| name.contains(words)).filter_map(planted).collect()
 }
 
 /// Half a turn about the axis to the right.
@@ -91,7 +93,7 @@ fn world(query: &mut Frame, reference: &mut Frame, change: impl Fn(&Pose) -> Pos
 /// Prints what is said of a map whose frames all have the same mistake, and of the map as it is.
 pub fn examine(maps: &[(String, Vec<Frame>)]) {
     let said = |frames: Vec<Frame>| {
-        let found = doctor::mistake(&Frames::new("map", frames));
+        let (found, _) = doctor::fit(&Frames::new("map", frames));
         found.map_or("nothing", |found| found.mistake.about()).to_owned()
     };
     let row = |name: &str, plant: &dyn Fn(&mut Frame)| {
@@ -114,4 +116,40 @@ pub fn examine(maps: &[(String, Vec<Frame>)]) {
     }
     let names: Vec<&str> = maps.iter().map(|(name, _)| name.as_str()).collect();
     print_table(&format!("a map's mistake,{}", names.join(",")), &rows);
+}
+
+/// Prints how closely pairs of frames of these maps fit each other.
+pub fn compare_pairs(maps: &[(String, Vec<Frame>)], scenes: &[Box<dyn Scene>]) {
+    let maps: Vec<(&str, Frames)> = maps
+        .iter()
+        .map(|(name, frames)| (name.as_str(), Frames::new("map", frames.clone())))
+        .collect();
+    let maps = maps.iter().map(|(name, map)| (*name, map as &dyn Scene));
+    let row = |(name, map): (&str, &dyn Scene)| {
+        let scale = SceneSize::of(map).scale;
+        let (_, pairs) = doctor::fit(map);
+        let near: Vec<_> =
+            pairs.iter().filter(|pair| NEAR.at(scale).contains(&pair.error)).collect();
+        let of = |value: &dyn Fn(&FramePair) -> f64| {
+            let mut all: Vec<f64> = near.iter().map(|pair| value(pair)).collect();
+            let quantiles = [0.5, 0.75, 1.0].map(|share| percentile(&mut all, share));
+            quantiles.map(|one| format!("{one:.4}")).join(" ")
+        };
+        vec![
+            name.to_owned(),
+            scale.metre().to_string(),
+            pairs.len().to_string(),
+            near.len().to_string(),
+            of(&|pair| pair.error.translation_m),
+            of(&|pair| pair.error.translation_m / pair.within.translation_m),
+            of(&|pair| pair.error.rotation_deg),
+            of(&|pair| pair.error.rotation_deg / pair.within.rotation_deg),
+        ]
+    };
+    let scenes = scenes.iter().map(|scene| (scene.name(), scene.as_ref()));
+    let rows: Vec<_> = maps.chain(scenes).map(row).collect();
+    print_table(
+        "pairs of frames,scale,pairs,near,position [m],over noise,rotation [°],over noise",
+        &rows,
+    );
 }
