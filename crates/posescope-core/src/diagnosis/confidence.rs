@@ -353,9 +353,13 @@ pub fn accepted(subject: &Subject<'_>, asked: Option<f64>) -> Outcome {
     let of_method = estimator::find(subject.method)
         .map_or(0.0, |entry| entry.least_probability(subject.params));
     let needed = asked.unwrap_or(0.0).max(of_method);
-    match subject.confidence.as_ref().map(|one| one.probability) {
-        Some(probability) if probability < needed => Outcome {
-            pose: Err(Failure::LowConfidence { probability, needed }),
+    match &subject.confidence {
+        Some(one) if one.probability < needed => Outcome {
+            pose: Err(Failure::LowConfidence {
+                probability: one.probability,
+                needed,
+                because: one.because(),
+            }),
             ..subject.outcome.clone()
         },
         _ => subject.outcome.clone(),

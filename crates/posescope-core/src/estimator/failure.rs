@@ -191,13 +191,18 @@ pub enum Failure {
     },
     /// The confidence of the pose is below what the user or the method requires.
     #[error(
-        "The pose was refused: only {} likely right, {:.0} % required.", percent(*.probability), 100.0 * .needed
+        "The pose was refused: only {} likely right, {:.0} % required{}.",
+        percent(*.probability),
+        100.0 * .needed,
+        .because.as_ref().map(|why| format!(", because {why}")).unwrap_or_default()
     )]
     LowConfidence {
         /// Its probability of being right.
         probability: f64,
         /// The probability that is required.
         needed: f64,
+        /// What speaks against it, beside its own evidence.
+        because: Option<String>,
     },
     /// A file of the query or of its references cannot be read.
     #[error("{message}")]

@@ -45,7 +45,7 @@ impl fmt::Display for Lowered {
             Self::Camera { focal_length_px, stated_px, explains, stated_explains } => write!(
                 f,
                 "a focal length of {focal_length_px:.0} px explains {explains} matches, from another place, and the \
-                 stated {stated_px:.0} px explain {stated_explains}"
+                 stated {stated_px:.0} px explain {stated_explains}: check the query's camera"
             ),
             Self::Radius { searched_m, fitted_to_m } => write!(
                 f,
@@ -181,7 +181,9 @@ mod tests {
         assert_eq!([0.99, 0.1].map(|one| camera.applied(one)), [OF_ANOTHER_CAMERA, 0.1]);
         let said = [radius.to_string(), camera.to_string()];
         assert_eq!(said[0], "the search went 50 m far, and probabilities are known up to 25 m");
-        assert!(said[1].starts_with("a focal length of 883 px explains 60 matches"), "{}", said[1]);
+        let words = "a focal length of 883 px explains 60 matches, from another place, and the stated 707 px explain \
+                     21: check the query's camera";
+        assert_eq!(said[1], words);
         let text = serde_json::to_string(&camera).expect("numbers");
         assert_eq!(serde_json::from_str::<Lowered>(&text).ok(), Some(camera));
     }
