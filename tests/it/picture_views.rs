@@ -115,6 +115,21 @@ fn the_funnel_counts_every_feature_and_hides_the_states_that_are_clicked() {
 }
 
 #[test]
+fn the_matches_of_fb2_are_shown_where_nothing_else_ran() {
+    let mut setup = setup();
+    setup.job.task.protocol.methods = vec![Method::named("fb2")];
+    let mut window = finished(setup);
+    send(&mut window, |app| app.app_state_mut().show_alone(Some(ViewName::Images)));
+    let states = latest::<FeaturesClassified>(&window).states;
+    let inliers = states.iter().filter(|state| state.name() == "inlier").count();
+    assert!(inliers > 0);
+    window.get_by_label(&format!("inlier: {inliers}, shown"));
+    send(&mut window, |app| app.app_state_mut().show_alone(Some(ViewName::Ransac)));
+    window.get_by_label_contains("inliers by trial");
+    assert!(window.query_by_label_contains("inside").is_none());
+}
+
+#[test]
 fn a_clicked_match_shows_the_numbers_that_were_told_about_it() {
     let mut window = at_end(Method::FB, ViewName::Images);
     let (feature, place) = lonely_inlier(&window);

@@ -8,6 +8,7 @@ use crate::estimator::{self, Family};
 use crate::feature_progress::FeatureProgress;
 use crate::features::{FeatureState, Keypoint};
 use crate::method::Method;
+use crate::robust::MlesacParams;
 use crate::session::Span;
 
 /// Position of the inliers in [`FeatureState::NAMES`].
@@ -64,25 +65,41 @@ pub(super) fn position(keypoint: &Keypoint) -> [f32; 2] {
     [keypoint.x, keypoint.y]
 }
 
-/// The progress at the cursor; for the direct methods that of FB, or of the hybrid where FB was
-/// not asked to run.
-pub(super) fn at<'a>(context: &ViewContext<'a>) -> FeatureProgress<'a> {
-    let with_features = |method: Method| {
-        estimator::find(method).is_some_and(|entry| match entry.hybrid() {
-            Some(parts) => parts.first == Method::FB,
-            None => entry.family(&context.run.params) == Some(Family::Features),
-        })
-    };
+/// The method at the cursor and then those that are asked for, of those that match features: with what they are, or of a
+/// hybrid what its first part is.
+pub(super) fn methods<'a>(
+    context: &ViewContext<'a>,
+) -> impl Iterator<Item = (Method, Method)> + use<'a> {
+    let params = &context.run.params;
     let asked = context.setup.task.protocol.methods.iter().copied();
     let methods = context.method().into_iter().chain(asked);
-    let mut parts = methods.filter(|method| with_features(*method));
-    let part = parts.find_map(|method| context.part_of(method));
+    methods.filter_map(move |method| {
+        let first = estimator::find(method)?.hybrid().map_or(method, |parts| parts.first);
+        let family = estimator::find(first)?.family(params);
+        matches!(family, Some(Family::Features | Family::Guided)).then_some((method, first))
+    })
+}
+
+/// How the method whose matches are shown agrees on a pose.
+pub(super) fn mlesac<'a>(context: &ViewContext<'a>) -> &'a MlesacParams {
+    let params = &context.run.params;
+    let shown = methods(context).next().and_then(|(_, method)| estimator::find(method));
+    match shown.and_then(|entry| entry.family(params)) {
+        Some(Family::Guided) => &params.fb2.mlesac,
+        _ => &params.fb.mlesac,
+    }
+}
+
+/// The progress at the cursor; for the direct methods that of FB or `fb2`, or of the hybrid where these were
+/// not asked to run.
+pub(super) fn at<'a>(context: &ViewContext<'a>) -> FeatureProgress<'a> {
+    let part = methods(context).find_map(|(method, _)| context.part_of(method));
     part.map_or_else(FeatureProgress::default, |(span, cursor)| of(context, span, cursor))
 }
 
 /// The progress of a part up to a cursor.
 pub(super) fn of<'a>(context: &ViewContext<'a>, span: &Span, cursor: usize) -> FeatureProgress<'a> {
-    let threshold_px = context.run.params.fb.mlesac.inlier_threshold_px;
+    let threshold_px = mlesac(context).inlier_threshold_px;
     let camera = context.problem().map(|problem| problem.query().intrinsics());
     FeatureProgress::of(context.run.until(span, cursor), camera, threshold_px)
 }

@@ -147,7 +147,7 @@ fn true_match(
         &progress.query.get(feature)?.pixel(),
         &progress.reference.get(found.reference)?.pixel(),
         lifted.and_then(|lifted| lifted.point.as_ref()),
-        true_match_px(context.run.params.fb.mlesac.inlier_threshold_px),
+        true_match_px(features::mlesac(context).inlier_threshold_px),
     ))
 }
 

@@ -10,7 +10,7 @@ use egui::{Color32, Ui};
 use egui_plot::{Line, Plot, PlotPoint, Points, VLine};
 
 use super::legend::name_picture;
-use super::{View, part_with};
+use super::{View, features, part_with};
 use crate::app::memo::{Memo, Same};
 use crate::app::{ViewContext, theme};
 use crate::event::HypothesisTried;
@@ -32,17 +32,19 @@ pub struct RansacView {
 impl View for RansacView {
     fn ui(&mut self, ui: &mut Ui, context: &ViewContext<'_>) {
         egui::ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
-            let part = part_with::<HypothesisTried>(context, Method::FB);
+            let mut matching = features::methods(context).map(|(_, method)| method);
+            let method = matching.next().unwrap_or(Method::FB);
+            let part = part_with::<HypothesisTried>(context, method);
             let Some(((span, cursor), trials)) = part.and_then(|(span, cursor)| {
                 Some(((span, cursor), self.read(context, span, cursor)?))
             }) else {
                 ui.weak(
-                    "No hypothesis yet. Run FB (1), which tries hypotheses in its stage ransac",
+                    "No hypothesis yet. Run FB (1) or FB2, which try hypotheses in their stage ransac",
                 );
                 return;
             };
-            head(ui, context, span, trials);
-            plot(ui, context, trials);
+            head(ui, context, span, method, trials);
+            plot(ui, context, method, trials);
             verdict::ui(ui, context, span, cursor, trials);
         });
     }
@@ -58,12 +60,12 @@ impl RansacView {
     }
 }
 
-fn head(ui: &mut Ui, context: &ViewContext<'_>, span: &Span, trials: &Trials) {
+fn head(ui: &mut Ui, context: &ViewContext<'_>, span: &Span, method: Method, trials: &Trials) {
     ui.horizontal_wrapped(|ui| {
-        if let Some(method) = span.part.method().filter(|method| *method != Method::FB) {
-            ui.weak(format!("inside {}", method.label()));
+        if let Some(hybrid) = span.part.method().filter(|of| *of != method) {
+            ui.weak(format!("inside {}", hybrid.label()));
         }
-        let most = context.run.params.fb.mlesac.max_trials;
+        let most = features::mlesac(context).max_trials;
         let made = trials.made();
         ui.label(match trials.needed().filter(|needed| *needed < most) {
             Some(needed) => format!("{made} trials made, {needed} needed"),
@@ -79,7 +81,7 @@ fn head(ui: &mut Ui, context: &ViewContext<'_>, span: &Span, trials: &Trials) {
             ui.painter().rect_filled(rect, 0.0, color);
             ui.weak(words);
         };
-        legend(ui, theme::method(Method::FB), "hypothesis");
+        legend(ui, theme::method(method), "hypothesis");
         legend(ui, theme::ESTIMATE, "best so far, refined");
         legend(ui, ui.visuals().strong_text_color(), "cursor");
         ui.weak("(click a point to go there)");
@@ -87,7 +89,7 @@ fn head(ui: &mut Ui, context: &ViewContext<'_>, span: &Span, trials: &Trials) {
 }
 
 /// Inliers over trials. A click goes to the nearest trial.
-fn plot(ui: &mut Ui, context: &ViewContext<'_>, trials: &Trials) {
+fn plot(ui: &mut Ui, context: &ViewContext<'_>, method: Method, trials: &Trials) {
     let strong = ui.visuals().strong_text_color();
     // Bands would fill the corners of steps.
     let best = Line::new("best", trials.best_support.clone()).allow_band(false).allow_hover(false);
@@ -104,7 +106,7 @@ fn plot(ui: &mut Ui, context: &ViewContext<'_>, trials: &Trials) {
                 plot.vline(cursor.width(1.0).allow_hover(false));
             }
             let points = Points::new("hypotheses", trials.support.clone());
-            let points = points.color(theme::method(Method::FB)).radius(1.6);
+            let points = points.color(theme::method(method)).radius(1.6);
             plot.points(points.allow_hover(false));
             plot.line(best.color(theme::ESTIMATE).width(1.5));
         });

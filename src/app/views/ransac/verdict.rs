@@ -101,7 +101,7 @@ fn row(
     }
     let (Some(point), Some(problem)) = (lifted.point, context.problem()) else { return };
     ui.label(format!("{:.1}", point.z));
-    let inlier_px = context.run.params.fb.mlesac.inlier_threshold_px;
+    let inlier_px = features::mlesac(context).inlier_threshold_px;
     for hypothesis in [&trial.hypothesis, &trial.best] {
         let error = hypothesis.as_ref().zip(seen).and_then(|(hypothesis, seen)| {
             residual_px(problem.query().intrinsics(), &hypothesis.pose, &point, seen)
