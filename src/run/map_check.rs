@@ -143,7 +143,7 @@ pub fn mistake_line(scene: &dyn Scene, mistake: &str) -> String {
     )
 }
 
-/// What is said where confidence follows how closely a map's frames fit each other.
+/// The line that tells users that confidence follows how closely a map's frames fit each other.
 pub fn frame_pairs_line(argument: &str, pairs: &FramePairs) -> String {
     let FramePairs { pairs, near, position, .. } = pairs;
     format!(

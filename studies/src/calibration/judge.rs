@@ -67,7 +67,7 @@ pub fn judge(title: &str, samples: &[Sample], fitted: &BTreeMap<String, Fitted>)
     as_stated(&all);
 }
 
-/// Prints how well what is said of poses holds, with all that is known of their map and of their query's camera.
+/// Prints how well stated probabilities and intervals hold. They include what the map and the query's camera change.
 fn as_stated(samples: &[&Sample]) {
     let known: Vec<(&Sample, &PoseConfidence)> =
         samples.iter().filter_map(|sample| Some((*sample, sample.stated.as_ref()?))).collect();

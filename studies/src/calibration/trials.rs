@@ -73,7 +73,7 @@ pub struct Sample {
     pub alone: Option<PoseCovariance>,
     pub names: Vec<String>,
     pub values: Vec<f64>,
-    /// What is said of it, where anything is, within what is near.
+    /// The confidence that posescope states, for being near; `None` where it states none.
     #[serde(default)]
     pub stated: Option<PoseConfidence>,
 }
