@@ -32,31 +32,68 @@ pub fn channel_images(photo: &GrayImage, params: &JudgeParams) -> Vec<FloatImage
     }
 }
 
+/// A place between two neighbours of a row or column.
+#[derive(Clone, Copy)]
+struct Between {
+    first: usize,
+    second: usize,
+    /// How far from the first to the second.
+    share: f32,
+}
+
+impl Between {
+    /// The place among so many; beyond the border the nearest one.
+    fn of(place: f32, count: u32) -> Self {
+        let last = (count - 1) as f32;
+        let place = place.clamp(0.0, last);
+        // Not negative, so what is cut off is what lies beyond the first.
+        let first = place as u32 as f32;
+        let second = (first + 1.0).min(last);
+        Self { first: first as usize, second: second as usize, share: place - first }
+    }
+
+    fn value(self, row: &[f32]) -> f32 {
+        let first = row[self.first];
+        first + self.share * (row[self.second] - first)
+    }
+
+    /// The two rows of an image.
+    fn rows(self, image: &FloatImage) -> [&[f32]; 2] {
+        let width = image.width() as usize;
+        [self.first, self.second].map(|row| &image.as_raw()[row * width..(row + 1) * width])
+    }
+}
+
+/// The value at a place between the pixels of two rows.
+fn between([above, below]: [&[f32]; 2], along: Between, down: Between) -> f32 {
+    let above = along.value(above);
+    above + down.share * (along.value(below) - above)
+}
+
 /// The value between the pixels, linearly; beyond the border that of the nearest pixel.
 pub fn linear(image: &FloatImage, x: f32, y: f32) -> f32 {
-    let (last_x, last_y) = ((image.width() - 1) as f32, (image.height() - 1) as f32);
-    let (x, y) = (x.clamp(0.0, last_x), y.clamp(0.0, last_y));
-    let (left, top) = (x.floor(), y.floor());
-    let (right, bottom) = ((left + 1.0).min(last_x), (top + 1.0).min(last_y));
-    let at = |x: f32, y: f32| image.get_pixel(x as u32, y as u32).0[0];
-    let (along, down) = (x - left, y - top);
-    let above = at(left, top) + along * (at(right, top) - at(left, top));
-    let below = at(left, bottom) + along * (at(right, bottom) - at(left, bottom));
-    above + down * (below - above)
+    let down = Between::of(y, image.height());
+    between(down.rows(image), Between::of(x, image.width()), down)
 }
 
 /// The grey value less the mean of its surroundings, in their standard deviations.
 fn local_contrast(photo: &GrayImage, smoothed: &FloatImage, sigma: f64) -> FloatImage {
     let (mean, deviation) = surroundings(photo, sigma);
     let scale = 1.0 / SQUARE as f32;
-    FloatImage::from_fn(photo.width(), photo.height(), |x, y| {
-        let place = |pixel: u32| (pixel as f32 + 0.5) * scale - 0.5;
-        let (u, v) = (place(x), place(y));
-        let above = smoothed.get_pixel(x, y).0[0] - linear(&mean, u, v);
-        let deviations = above / (linear(&deviation, u, v) + MIN_DEVIATION);
-        let share = (deviations / MAX_DEVIATIONS).clamp(-1.0, 1.0);
-        Luma([127.5 + 127.5 * share])
-    })
+    let place = |pixel: u32| (pixel as f32 + 0.5) * scale - 0.5;
+    let (width, height) = photo.dimensions();
+    let columns: Vec<Between> = (0..width).map(|x| Between::of(place(x), mean.width())).collect();
+    let mut contrast = Vec::with_capacity(smoothed.as_raw().len());
+    for (y, row) in (0..height).zip(smoothed.as_raw().chunks(columns.len().max(1))) {
+        let down = Between::of(place(y), mean.height());
+        let (means, spreads) = (down.rows(&mean), down.rows(&deviation));
+        contrast.extend(row.iter().zip(&columns).map(|(grey, &along)| {
+            let above = grey - between(means, along, down);
+            let deviations = above / (between(spreads, along, down) + MIN_DEVIATION);
+            127.5 + 127.5 * (deviations / MAX_DEVIATIONS).clamp(-1.0, 1.0)
+        }));
+    }
+    FloatImage::from_raw(width, height, contrast).expect("a value for each pixel")
 }
 
 /// Mean and standard deviation of the grey values around each square of the photo.
@@ -90,4 +127,40 @@ fn edges(smoothed: &FloatImage) -> FloatImage {
         let magnitude = 0.5 * along.hypot(down);
         Luma([(255.0 * (1.0 + magnitude).ln() / max_log).min(255.0)])
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_between_pixels_are_on_the_line_and_those_beyond_the_border_are_of_the_nearest() {
+        // A plane, so that all between is linear.
+        let image = FloatImage::from_fn(5, 4, |x, y| Luma([10.0 * x as f32 - 3.0 * y as f32]));
+        for (x, y) in [(0.0, 0.0), (1.5, 2.25), (3.75, 0.5), (4.0, 3.0)] {
+            assert!((linear(&image, x, y) - (10.0 * x - 3.0 * y)).abs() < 1e-4, "{x} {y}");
+        }
+        assert_eq!(linear(&image, -2.0, 1.0), linear(&image, 0.0, 1.0));
+        assert_eq!(linear(&image, 9.0, 7.5), linear(&image, 4.0, 3.0));
+        let one = FloatImage::from_pixel(1, 1, Luma([7.0]));
+        assert_eq!(linear(&one, 0.3, -1.0), 7.0);
+    }
+
+    #[test]
+    fn contrast_is_that_of_the_place_and_none_where_all_is_even() {
+        // Dark to the left and light to the right, by the same step at both brightnesses of the photo.
+        let photo =
+            |low: u8| GrayImage::from_fn(64, 32, |x, _| Luma([low + if x < 32 { 0 } else { 60 }]));
+        let contrast = |photo: &GrayImage| {
+            let smoothed = gaussian_smoothed(photo, 1.0);
+            local_contrast(photo, &smoothed, 8.0)
+        };
+        let (dim, bright) = (contrast(&photo(20)), contrast(&photo(150)));
+        assert!(dim.get_pixel(28, 16).0[0] < 100.0 && dim.get_pixel(36, 16).0[0] > 155.0);
+        for (a, b) in dim.pixels().zip(bright.pixels()) {
+            assert!((a.0[0] - b.0[0]).abs() < 0.5);
+        }
+        let even = contrast(&GrayImage::from_pixel(20, 10, Luma([90])));
+        assert!(even.pixels().all(|pixel| (pixel.0[0] - 127.5).abs() < 0.5));
+    }
 }

@@ -3,7 +3,6 @@
 use std::borrow::Cow;
 use std::sync::Arc;
 
-use image::GenericImageView as _;
 use nalgebra::Point3;
 
 use super::chance::corrected_distance;
@@ -172,15 +171,20 @@ fn shrunk(photo: &GrayImage, shrink: u32) -> Cow<'_, GrayImage> {
     if shrink <= 1 {
         return Cow::Borrowed(photo);
     }
-    let (width, height) = photo.dimensions();
-    let [columns, rows] = [width, height].map(|side| (side / shrink).max(1));
-    Cow::Owned(GrayImage::from_fn(columns, rows, |x, y| {
-        let (left, top) = (x * shrink, y * shrink);
-        let square = photo.view(left, top, shrink.min(width - left), shrink.min(height - top));
-        let count = (square.width() * square.height()).max(1);
-        let sum: u32 = square.pixels().map(|(_, _, pixel)| u32::from(pixel.0[0])).sum();
-        image::Luma([((sum + count / 2) / count) as u8])
-    }))
+    let [columns, rows] = [photo.width(), photo.height()].map(|side| (side / shrink).max(1));
+    let (side, width) = (shrink as usize, photo.width().max(1) as usize);
+    let mut means = Vec::with_capacity((columns * rows) as usize);
+    for lines in photo.as_raw().chunks(side * width).take(rows as usize) {
+        let mut sums = vec![0_u32; columns as usize];
+        for line in lines.chunks(width) {
+            for (sum, square) in sums.iter_mut().zip(line.chunks(side)) {
+                *sum += square.iter().map(|&grey| u32::from(grey)).sum::<u32>();
+            }
+        }
+        let count = (side.min(width) * lines.len() / width).max(1) as u32;
+        means.extend(sums.iter().map(|sum| ((sum + count / 2) / count) as u8));
+    }
+    Cow::Owned(GrayImage::from_raw(columns, rows, means).expect("a mean for each square"))
 }
 
 /// The camera of the photo that [`shrunk`] makes.
@@ -203,6 +207,32 @@ fn shrunk_camera(camera: &Intrinsics, shrink: u32) -> Intrinsics {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_smaller_photo_has_the_means_of_squares() {
+        let photo = |width: u32, height: u32| {
+            GrayImage::from_fn(width, height, |x, y| image::Luma([(7 * x + 31 * y) as u8]))
+        };
+        let mean = |of: &GrayImage, left: u32, top: u32, side: u32| {
+            let (right, bottom) = ((left + side).min(of.width()), (top + side).min(of.height()));
+            let square = (top..bottom).flat_map(|y| (left..right).map(move |x| (x, y)));
+            let greys: Vec<u32> = square.map(|(x, y)| u32::from(of.get_pixel(x, y).0[0])).collect();
+            let count = greys.len() as u32;
+            ((greys.iter().sum::<u32>() + count / 2) / count) as u8
+        };
+        // Lines and columns that are left over do not count; a photo that is smaller than a square is one.
+        for (width, height, shrink, size) in
+            [(13, 9, 4, (3, 2)), (8, 8, 2, (4, 4)), (3, 2, 4, (1, 1))]
+        {
+            let photo = photo(width, height);
+            let small = shrunk(&photo, shrink);
+            assert_eq!(small.dimensions(), size);
+            for (x, y, pixel) in small.enumerate_pixels() {
+                assert_eq!(pixel.0[0], mean(&photo, shrink * x, shrink * y, shrink), "{x} {y}");
+            }
+        }
+        assert_eq!(*shrunk(&photo(5, 4), 1), photo(5, 4));
+    }
 
     #[test]
     fn what_few_pixels_say_counts_less() {
