@@ -60,7 +60,9 @@ fn compared(pairs: &[FramePair], scale: Scale) -> Option<FramePairs> {
     let near: Vec<&FramePair> =
         pairs.iter().filter(|pair| NEAR.at(scale).contains(&pair.error)).collect();
     let factor = |over: fn(&FramePair) -> f64, in_towns: f64| {
-        let mut all: Vec<f64> = near.iter().map(|pair| over(pair)).collect();
+        let all = near.iter().map(|pair| over(pair));
+        // Nothing off, of features without noise, is no ratio.
+        let mut all: Vec<f64> = all.filter(|ratio| !ratio.is_nan()).collect();
         all.sort_by(f64::total_cmp);
         let median = all.get(all.len() / 2).copied().unwrap_or(in_towns);
         // As people read it.
@@ -200,5 +202,12 @@ mod tests {
         let close = compared(&[pair(0.001, 0.001); 6], Scale::PAPER).expect("enough");
         assert_eq!((close.position, close.rotation), (1.0, 1.0));
         assert_eq!(compared(&pairs[..5], Scale::PAPER), None);
+        // Frames that agree to the last bit, of features without noise, leave nothing to divide.
+        let exact = FramePair {
+            within: Tolerance { translation_m: 0.0, rotation_deg: 0.0 },
+            ..pair(0.0, 0.0)
+        };
+        let exact = compared(&[exact; 6], Scale::PAPER).expect("enough");
+        assert!(exact.is_sound() && (exact.position, exact.rotation) == (1.0, 1.0), "{exact:?}");
     }
 }
