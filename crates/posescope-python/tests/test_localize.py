@@ -31,6 +31,13 @@ def test_a_result_has_a_pose_that_is_graded(right: posescope.Result, street: pos
     assert (right.query, right.references, right.method) == ("000070", ["000062"], "fb")
 
 
+def test_a_confidence_says_what_lowers_it(right: posescope.Result, street: posescope.Scene) -> None:
+    assert right.confidence is not None and right.confidence.lowered_by == []
+    far = posescope.localize(street.query("70"), street.reference("62"), method="fb", radius=40.0).confidence
+    assert far is not None and [one["why"] for one in far.lowered_by] == ["radius"]
+    assert far.lowered_by[0]["searched_m"] == 40.0 and float(far) < float(right.confidence)
+
+
 def moved(pose: np.ndarray, freedom: int, by: float) -> np.ndarray:
     """The pose with one small error: about the camera's axes, or along them."""
     error = np.zeros(6)

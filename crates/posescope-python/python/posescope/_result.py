@@ -87,6 +87,12 @@ class Confidence:
         numbers = self.details["covariance"]
         return None if numbers is None else np.asarray(numbers, dtype=np.float64).reshape(6, 6)
 
+    @property
+    def lowered_by(self) -> List[Dict[str, Any]]:
+        """What speaks against the pose, beside what the method left behind: each with its ``why``, ``camera`` or
+        ``radius``, and its numbers."""
+        return list(self.details.get("lowered_by", []))
+
     def __float__(self) -> float:
         return self.probability
 
