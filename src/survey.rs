@@ -9,6 +9,8 @@ mod answers;
 mod fit;
 mod page;
 mod parts;
+mod places;
+mod prediction;
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -26,9 +28,14 @@ use crate::run::{
 use crate::scene::{self, Scene, SceneError, SceneSize};
 use crate::sink::{Follower, RunRecords};
 
-pub use answers::Part;
-use answers::{Answer, Surveyed};
+pub use answers::{Part, Surveyed};
+pub use prediction::{Prediction, Tried};
+
+use answers::Answer;
 use parts::Pairs;
+
+/// The name of the table of places in the folder of a survey.
+pub const PLACES: &str = "places.csv";
 
 /// The name of the page in the folder of a survey.
 pub const SURVEY_PAGE: &str = "survey.html";
@@ -163,7 +170,7 @@ impl SurveyPlan {
         Ok(())
     }
 
-    /// Fits what the results show, and writes `survey.toml` and `survey.html`.
+    /// Fits what the results show, and writes `survey.toml`, `survey.html` and `places.csv`.
     ///
     /// # Errors
     /// [`SurveyingError`].
@@ -172,7 +179,7 @@ impl SurveyPlan {
         let mut answers = Vec::new();
         for (part, plan) in &self.parts {
             let results = read_results(&self.request.folder(*part), &plan.run)?;
-            let answers_of = results.into_iter().map(|result| Answer::of(*part, result));
+            let answers_of = results.into_iter().map(|result| Answer::of(*part, result, scene));
             answers.extend(answers_of);
         }
         let is_paper = self.parts.first().is_some_and(|(_, plan)| plan.params.scale.is_paper());
@@ -191,8 +198,12 @@ impl SurveyPlan {
             .collect();
         let file = SurveyFile::of(scene, self.queries(), self.radius_m, poses, survey);
         let page = self.request.out.join(SURVEY_PAGE);
-        let html = page::page(scene, &self.request, self.radius_m, &methods, &answers);
+        let places = places::predicted(scene, self.radius_m, self.request.spacing_m, &methods);
+        let html = page::page(scene, &self.request, self.radius_m, &methods, &answers, &places);
         write_whole(&page, html.as_bytes()).map_err(FolderError::io(&page))?;
+        let table = self.request.out.join(PLACES);
+        write_whole(&table, places::table(&places).to_csv().as_bytes())
+            .map_err(FolderError::io(&table))?;
         let kept = file.write(&self.request.out, scene, &self.request.scene)?;
         Ok(Found { file, methods, page, kept })
     }

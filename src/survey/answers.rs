@@ -1,11 +1,13 @@
 //! What was answered about the photos of a survey.
 
 use super::fit::{self, Judged};
+use super::prediction::{Prediction, Tried};
 use crate::diagnosis::confidence::TRUSTED_FROM;
 use crate::diagnosis::{Code, Confidence, Grade};
 use crate::localize::QueryResult;
 use crate::method::Method;
 use crate::run::Poses;
+use crate::scene::Scene;
 use posescope_core::survey::Surveyed as Numbers;
 
 /// A part of a survey.
@@ -45,10 +47,12 @@ pub(super) struct Answer {
     pub code: Option<Code>,
     /// The stated probability of its pose, and the truth.
     pub judged: Option<Judged>,
+    /// Where it was and from where it was searched.
+    pub tried: Option<Tried>,
 }
 
 impl Answer {
-    pub fn of(part: Part, result: QueryResult) -> Self {
+    pub fn of(part: Part, result: QueryResult, scene: &dyn Scene) -> Self {
         // A mirrored photo shows no place, so that a pose near the truth is right by chance alone.
         let is_right = result.grade == Grade::Right && part != Part::Mirrored;
         let judged = result.confidence.as_ref().map(|confidence| Judged {
@@ -62,9 +66,15 @@ impl Answer {
             (Grade::Right, Part::Mirrored) => Grade::Wrong,
             (grade, _) => grade,
         };
+        let pose = |frame: &str| scene.pose(scene.find(frame).ok()?);
+        let tried = result.references.first().and_then(|reference| {
+            let (query, reference) = (pose(&result.query)?, pose(reference)?);
+            Some(Tried { query, reference, is_right: grade == Grade::Right })
+        });
         Self {
             part,
             method: result.method,
+            tried,
             grade,
             error_m: result.error.map(|error| error.translation_m),
             start_m: result.initial_error.map(|error| error.translation_m),
@@ -83,6 +93,8 @@ pub struct Surveyed {
     pub numbers: Option<Numbers>,
     /// Photos near a reference, and how many of them it localised.
     pub near: (usize, usize),
+    /// What became of each of them.
+    pub tried: Vec<Tried>,
     judged: Vec<Judged>,
     is_paper: bool,
 }
@@ -105,14 +117,21 @@ impl Surveyed {
         let own = || answers.iter().filter(|answer| answer.method == method);
         let near = own().filter(|answer| answer.part == Part::Near);
         let right = near.clone().filter(|answer| answer.grade == Grade::Right).count();
+        let tried = near.clone().filter_map(|answer| answer.tried).collect();
         let judged: Vec<Judged> = own().filter_map(|answer| answer.judged).collect();
         Self {
             method,
             numbers: fit::fitted(&judged, is_paper),
             near: (near.count(), right),
+            tried,
             judged,
             is_paper,
         }
+    }
+
+    /// Where the method will localise photos that are searched within this radius.
+    pub fn prediction(&self, radius_m: f64) -> Prediction {
+        Prediction::of(&self.tried, radius_m)
     }
 
     /// The poses that the numbers rest on.

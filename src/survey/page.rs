@@ -7,6 +7,7 @@ use nalgebra::Point2;
 
 use super::SurveyRequest;
 use super::answers::{Answer, GROUPS, Part, Surveyed};
+use super::places::{self, Place};
 use crate::chart::{Axis, Chart, GroundAxes, Mark, Shape};
 use crate::diagnosis::{Code, Grade};
 use crate::geometry::Pose;
@@ -46,6 +47,7 @@ pub(super) fn page(
     radius_m: f64,
     methods: &[Surveyed],
     answers: &[Answer],
+    places: &[Place<'_>],
 ) -> String {
     let size = SceneSize::of(scene);
     let unit = size.scale.unit();
@@ -68,6 +70,19 @@ pub(super) fn page(
                     }
                 }
                 (further(&photos, radius_m, unit))
+            }
+            @if let Some(chart) = places::chart(places, scene) {
+                section aria-labelledby="places" {
+                    h2 id="places" { "Where photos will be localised" }
+                    p { "Each dot is a frame of the map, as if it were a photo that is searched from another one, "
+                        (unit.words(&places::from_where(request.spacing_m, radius_m))) ". How likely that succeeds follows from the photos above: how far \
+                         their references were away and turned, and what became of those nearby. Rest the pointer on it \
+                         for the methods; " code { (super::PLACES) } " has the numbers." }
+                    figure.plot style="max-width:48rem" {
+                        (chart.in_words_of(unit).svg(None)) figcaption { "The map from above" }
+                    }
+                    (table(&places::summary(places)))
+                }
             }
             section aria-labelledby="methods" {
                 h2 id="methods" { "Each method" }
@@ -405,6 +420,7 @@ mod tests {
             start_m: None,
             code: None,
             judged: None,
+            tried: None,
         }
     }
 

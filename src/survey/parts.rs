@@ -47,6 +47,27 @@ pub(super) fn choose(
     parts.into_iter().filter(|(_, pairs)| !pairs.is_empty()).collect()
 }
 
+/// Frames, evenly over the map and at most so many, each with the reference that a query there may have: the nearest
+/// one that is at least this far away, or one half the radius away.
+pub(super) fn expected(
+    scene: &dyn Scene,
+    radius_m: f64,
+    spacing_m: Option<f64>,
+    most: usize,
+) -> Vec<(usize, usize)> {
+    let frames = Frames::of(scene, 0);
+    let is_near = |away_m: f64| (spacing_m.unwrap_or(0.0)..=radius_m).contains(&away_m);
+    let from_m = spacing_m.unwrap_or(0.5 * radius_m);
+    let chosen = spread(&frames.with_reference(&is_near), most).into_iter();
+    let with_reference = chosen.filter_map(|frame| {
+        let off = |away_m: f64| (away_m - from_m).abs();
+        let references = frames.references_of(frame, &is_near);
+        let (reference, _) = references.min_by(|a, b| off(a.1).total_cmp(&off(b.1)))?;
+        Some((frame.0, reference))
+    });
+    with_reference.collect()
+}
+
 /// At most so many of these, evenly.
 fn spread<T: Copy>(all: &[T], count: usize) -> Vec<T> {
     let count = count.min(all.len());

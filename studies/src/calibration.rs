@@ -14,6 +14,7 @@ use posescope::scene;
 
 use crate::Failure;
 use judge::judge;
+pub use judge::{Scored, area_under_curve, calibration_error};
 use trials::{Inputs, Sample};
 
 /// The methods whose poses have a probability of their own.
@@ -99,6 +100,8 @@ pub fn run(options: &Options) -> Result<(), Failure> {
     if options.wrong_inputs && options.mistake.is_empty() {
         wrong_inputs::examine(&trials::maps(options.real, &options.towns, &options.scene)?);
     }
+    let (silent, samples): (Vec<Sample>, Vec<Sample>) =
+        samples.into_iter().partition(Sample::is_silent);
     let now: BTreeMap<String, Fitted> = options
         .methods
         .iter()
@@ -108,10 +111,11 @@ pub fn run(options: &Options) -> Result<(), Failure> {
         samples.iter().filter(|s| s.method == *name).all(|s| s.names == fitted.signals)
     };
     if now.iter().all(|(name, fitted)| fits_samples(name, fitted)) {
-        judge("As posescope has it now", &samples, &now);
+        judge("As posescope has it now", &samples, &silent, &now);
     }
     if !options.fit.is_empty() {
-        let own = read(&options.fit)?;
+        let mut own = read(&options.fit)?;
+        own.retain(|sample| !sample.is_silent());
         let mut fitted = BTreeMap::new();
         for method in &options.methods {
             let name = method.name();
@@ -124,8 +128,8 @@ pub fn run(options: &Options) -> Result<(), Failure> {
             }
             fitted.insert(name.to_owned(), found);
         }
-        judge("Fitted, on what it was fitted to", &own, &fitted);
-        judge("Fitted, on the others", &samples, &fitted);
+        judge("Fitted, on what it was fitted to", &own, &[], &fitted);
+        judge("Fitted, on the others", &samples, &silent, &fitted);
         if options.write {
             std::fs::write(FITTED, text_of(&fitted)?)?;
         }

@@ -29,6 +29,7 @@ mod remedies;
 mod same_results;
 mod scene_statistics;
 mod signals;
+mod survey_map;
 mod truth;
 
 use std::process::ExitCode;
@@ -59,6 +60,7 @@ enum Study {
     Peers(peers::Options),
     Remedies(remedies::Options),
     SameResults(same_results::Options),
+    SurveyMap(survey_map::Options),
 }
 
 fn main() -> ExitCode {
@@ -80,6 +82,7 @@ fn main() -> ExitCode {
         Study::Growth(options) => growth::run(&options),
         Study::Peers(options) => peers::run(&options),
         Study::Remedies(options) => remedies::run(&options),
+        Study::SurveyMap(options) => survey_map::run(&options),
         Study::SameResults(options) => match same_results::run(&options) {
             Ok(0) => Ok(()),
             Ok(_) => return ExitCode::FAILURE,

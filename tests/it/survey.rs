@@ -65,6 +65,16 @@ fn the_confidence_of_later_runs_follows_a_survey_until_the_map_changes() {
         "Where photos are localised ~ How far to trust a pose here ~ What a survey cannot know",
     );
     assert_eq!(text(desk.kept()), toml);
+    // What the map says of its frames: half the radius away from another, with a chance of the method.
+    has(&page, "Where photos will be localised ~ from 80 % on");
+    let places = text(desk.path().join("s/places.csv"));
+    let (header, rows) = places.split_once('\n').expect("rows");
+    assert_eq!(header, "frame,reference,distance,fb");
+    assert_eq!(rows.lines().count(), 400);
+    for row in rows.lines() {
+        let numbers: Vec<f64> = row.split(',').filter_map(|cell| cell.parse().ok()).collect();
+        assert!((4.0..6.0).contains(&numbers[2]) && (0.0..=1.0).contains(&numbers[3]), "{row}");
+    }
     // Its parts are runs, and confidence is as it was fitted there.
     has(
         &text(desk.path().join("s/mirrored/run.toml")),

@@ -4,6 +4,7 @@ use nalgebra::{DMatrix, DVector, Matrix3, Matrix6, Vector3, Vector6};
 use posescope::covariance::PoseCovariance;
 use posescope::diagnosis::confidence::{Fitted, units};
 use posescope::scale::Scale;
+use xxhash_rust::xxh3::xxh3_64;
 
 use super::trials::{REAL_STREETS, Sample};
 use crate::numbers::{mean, percentile};
@@ -22,7 +23,7 @@ const UNSEEN: f64 = 0.005;
 const LN_SIZE: f64 = -0.635_181_4;
 
 /// The share of near poses that N1 wrongly accuses.
-const ACCUSED: f64 = 0.005;
+const ACCUSED: f64 = 0.002;
 
 /// Smaller errors are not told apart.
 const LEAST_ERROR: f64 = 1e-5;
@@ -47,7 +48,8 @@ pub fn fitted(samples: &[&Sample]) -> Option<Fitted> {
     let counts: Vec<f64> =
         samples.iter().map(|s| if s.shown.is_nothing() { NOTHING_COUNTS } else { 1.0 }).collect();
     let near = Design::of(&rows).logistic(&labels, &counts)?;
-    let (shown, shown_from) = told_apart(samples)?;
+    let shown = told_apart(samples)?;
+    let shown_from = shown_from(samples)?;
 
     let usable: Vec<(&Sample, [f64; 6], Vec<f64>)> = samples
         .iter()
@@ -57,52 +59,80 @@ pub fn fitted(samples: &[&Sample]) -> Option<Fitted> {
             Some((*s, s.error?, alone.map(f64::ln).iter().copied().collect()))
         })
         .collect();
-    let deviation = |freedom: usize| {
-        let row = |(sample, _, alone): &(&Sample, [f64; 6], Vec<f64>)| {
-            [&[alone[freedom]], clamped(sample).as_slice()].concat()
+    let deviations = |is_one: &dyn Fn(&Sample) -> bool| -> Option<[Vec<f64>; 6]> {
+        let own: Vec<_> = usable.iter().filter(|(sample, ..)| is_one(sample)).collect();
+        let deviation = |freedom: usize| {
+            let row = |(sample, _, alone): &&(&Sample, [f64; 6], Vec<f64>)| {
+                [&[alone[freedom]], clamped(sample).as_slice()].concat()
+            };
+            let rows: Vec<Vec<f64>> = own.iter().map(row).collect();
+            let size = |error: &[f64; 6]| error[freedom].abs().max(LEAST_ERROR).ln() - LN_SIZE;
+            let sizes: Vec<f64> = own.iter().map(|(_, error, _)| size(error)).collect();
+            Design::of(&rows).linear(&sizes)
         };
-        let rows: Vec<Vec<f64>> = usable.iter().map(row).collect();
-        let sizes: Vec<f64> = usable
-            .iter()
-            .map(|(_, error, _)| error[freedom].abs().max(LEAST_ERROR).ln() - LN_SIZE)
-            .collect();
-        Design::of(&rows).linear(&sizes)
+        (0..6).map(deviation).collect::<Option<Vec<_>>>()?.try_into().ok()
     };
-    let deviations = (0..6).map(deviation).collect::<Option<Vec<_>>>()?.try_into().ok()?;
-    let mut fitted = Fitted { signals, seen, near, shown, shown_from, deviations, tail: 1.0 };
+    let all = deviations(&|_| true)?;
+    let mut fitted =
+        Fitted { signals, seen: seen.clone(), near, shown, shown_from, deviations: all, tail: 1.0 };
 
+    // Places that were not fitted to say how much wider errors go.
+    let mut by_others = Vec::new();
+    for fold in 0..FOLDS {
+        let deviations = deviations(&|sample| fold_of(sample) != fold)?;
+        let others = Fitted { deviations, ..fitted.clone() };
+        let own = usable.iter().filter(|(sample, ..)| fold_of(sample) == fold);
+        by_others.extend(own.map(|(sample, ..)| (others.clone(), *sample)));
+    }
     // So that 90 % of the errors of rotation and of position are within the ellipsoids that say so.
     for first in [0, 3] {
         let mut squares: Vec<f64> =
-            usable.iter().map(|(sample, ..)| square(&fitted, sample, first)).collect();
+            by_others.iter().map(|(others, sample)| square(others, sample, first)).collect();
         let factor = (percentile(&mut squares, 0.9) / NINETY_OF_THREE).sqrt();
-        for weights in &mut fitted.deviations[first..first + 3] {
-            weights[0] += factor.ln();
+        for one in by_others.iter_mut().map(|(others, _)| others).chain([&mut fitted]) {
+            for weights in &mut one.deviations[first..first + 3] {
+                weights[0] += factor.ln();
+            }
         }
     }
     let mut ratios: Vec<f64> =
-        usable.iter().flat_map(|(sample, ..)| beyond(&fitted, sample)).collect();
+        by_others.iter().flat_map(|(others, sample)| beyond(others, sample)).collect();
     fitted.tail = percentile(&mut ratios, 0.95);
     Some(fitted)
 }
 
-/// The logistic function that tells poses that are near from those of queries that do not show the place, and what all
-/// but [`ACCUSED`] of the poses that are near have of it.
-fn told_apart(samples: &[&Sample]) -> Option<(Vec<f64>, f64)> {
+/// Parts of the places; each is judged by what is fitted to the others.
+const FOLDS: u64 = 6;
+
+/// The part that the place of a sample belongs to.
+fn fold_of(sample: &Sample) -> u64 {
+    xxh3_64(format!("{}/{}", sample.of, sample.pair[0]).as_bytes()) % FOLDS
+}
+
+/// What all but [`ACCUSED`] of the poses that are near have of the function that tells them from those of queries that do
+/// not show the place, where it is fitted to other places.
+fn shown_from(samples: &[&Sample]) -> Option<f64> {
+    let mut near = Vec::new();
+    for fold in 0..FOLDS {
+        let (own, others): (Vec<&Sample>, Vec<&Sample>) =
+            samples.iter().copied().partition(|sample| fold_of(sample) == fold);
+        let weights = told_apart(&others)?;
+        let own = own.into_iter().filter(|sample| sample.is_near());
+        near.extend(own.map(|sample| {
+            let weighted = weights[1..].iter().zip(&sample.values).map(|(w, value)| w * value);
+            1.0 / (1.0 + (-weights[0] - weighted.sum::<f64>()).exp())
+        }));
+    }
+    Some(percentile(&mut near, ACCUSED))
+}
+
+/// The logistic function that tells poses that are near from those of queries that do not show the place.
+fn told_apart(samples: &[&Sample]) -> Option<Vec<f64>> {
     let known: Vec<&&Sample> =
         samples.iter().filter(|s| s.is_near() || s.shown.is_nothing()).collect();
     let rows: Vec<Vec<f64>> = known.iter().map(|s| s.values.clone()).collect();
     let labels: Vec<f64> = known.iter().map(|s| f64::from(u8::from(s.is_near()))).collect();
-    let weights = Design::of(&rows).logistic(&labels, &vec![1.0; known.len()])?;
-    let score = |sample: &Sample| {
-        let weighted =
-            weights[1..].iter().zip(&sample.values).map(|(weight, value)| weight * value);
-        1.0 / (1.0 + (-weights[0] - weighted.sum::<f64>()).exp())
-    };
-    let near = known.iter().filter(|s| s.is_near());
-    let mut near: Vec<f64> = near.map(|sample| score(sample)).collect();
-    let from = percentile(&mut near, ACCUSED);
-    Some((weights, from))
+    Design::of(&rows).logistic(&labels, &vec![1.0; known.len()])
 }
 
 /// The scale of the scene of a sample.

@@ -10,13 +10,18 @@ use super::trials::{Sample, Shown};
 use crate::numbers::{mean, percent, print_table};
 
 /// A probability, and whether the pose is near.
-type Scored = (f64, bool);
+pub type Scored = (f64, bool);
 
 /// Below this, 90 % of the squares of a normally distributed vector in space are.
 const NINETY_OF_THREE: f64 = 6.251;
 
-/// Prints how well probabilities and intervals hold.
-pub fn judge(title: &str, samples: &[Sample], fitted: &BTreeMap<String, Fitted>) {
+/// Prints how well probabilities and intervals hold of these, and what is said of those without a pose.
+pub fn judge(
+    title: &str,
+    samples: &[Sample],
+    silent: &[Sample],
+    fitted: &BTreeMap<String, Fitted>,
+) {
     println!("\n## {title}\n");
     let radii: BTreeSet<u64> = samples.iter().map(|s| s.radius_m.to_bits()).collect();
     let mut groups: Vec<(String, Vec<&Sample>)> = Vec::new();
@@ -43,6 +48,9 @@ pub fn judge(title: &str, samples: &[Sample], fitted: &BTreeMap<String, Fitted>)
             groups.push((format!("{name}, radius {radius_m:.3} m"), own));
         }
     }
+    for (what, shown) in [("one condition", Shown::Same), ("between", Shown::Other)] {
+        groups.push((format!("HY, {what}"), of_hybrid(&of(&|s| s.shown == shown))));
+    }
     groups.push(("all".to_owned(), of(&|_| true)));
     groups.push(("nothing is shown".to_owned(), of(&|s| s.shown.is_nothing())));
     let mut likely = Vec::new();
@@ -63,8 +71,16 @@ pub fn judge(title: &str, samples: &[Sample], fitted: &BTreeMap<String, Fitted>)
          in 95 %",
         &intervals,
     );
-    elsewhere(&all, fitted);
+    elsewhere(&all, silent, fitted);
     as_stated(&all);
+}
+
+/// The poses of HY: those of FB, and where it has none those of MI.
+fn of_hybrid<'a>(samples: &[&'a Sample]) -> Vec<&'a Sample> {
+    let key = |s: &Sample| (s.of.clone(), s.pair, s.radius_m.to_bits());
+    let of = |name: &'static str| samples.iter().copied().filter(move |s| s.method == name);
+    let features: BTreeSet<_> = of("fb").map(key).collect();
+    of("fb").chain(of("mi").filter(|sample| !features.contains(&key(sample)))).collect()
 }
 
 /// Prints how well stated probabilities and intervals hold. They include what the map and the query's camera change.
@@ -147,8 +163,9 @@ fn wrong_inputs(samples: &[&Sample], fitted: &BTreeMap<String, Fitted>) {
     print_table("wrong inputs,trusted of near,trusted of wrong", &rows);
 }
 
-/// Prints how many poses are said to be of another place, by what the reference shows of the query.
-fn elsewhere(samples: &[&Sample], fitted: &BTreeMap<String, Fitted>) {
+/// Prints how many queries are said to be of another place, by what the reference shows of them. Poses are judged by what
+/// was fitted, and queries without a pose by the verdict that they have.
+fn elsewhere(samples: &[&Sample], silent: &[Sample], fitted: &BTreeMap<String, Fitted>) {
     let is_named = |sample: &&&Sample| {
         let fitted = &fitted[&sample.method];
         fitted.shown(&sample.values) < fitted.shown_from
@@ -161,7 +178,17 @@ fn elsewhere(samples: &[&Sample], fitted: &BTreeMap<String, Fitted>) {
             let named = group.iter().filter(|s| is_named(s)).count();
             format!("{named} of {}", group.len())
         };
-        let of = |shown: Shown| share(&|s| s.shown == shown);
+        let of = |shown: Shown| {
+            let without: Vec<&Sample> =
+                silent.iter().filter(|s| s.method == *name && s.shown == shown).collect();
+            let named = without.iter().filter(|s| s.named).count();
+            let poses = share(&|s| s.shown == shown);
+            if without.is_empty() {
+                poses
+            } else {
+                format!("{poses}, {named} of {}", without.len())
+            }
+        };
         rows.push(vec![
             name.clone(),
             of(Shown::Town),
@@ -174,7 +201,7 @@ fn elsewhere(samples: &[&Sample], fitted: &BTreeMap<String, Fitted>) {
         ]);
     }
     print_table(
-        "said to be elsewhere,another town,noise,mirrored,another street,near in one condition,near between,far",
+        "said to be elsewhere (poses; no pose),another town,noise,mirrored,another street,near in one condition,near between,far",
         &rows,
     );
 }
@@ -256,7 +283,7 @@ fn tenths(sorted: &[Scored]) -> impl Iterator<Item = (f64, f64, usize)> {
 }
 
 /// Expected calibration error over ten bins of equal count.
-fn calibration_error(scored: &[Scored]) -> f64 {
+pub fn calibration_error(scored: &[Scored]) -> f64 {
     let all = scored.len() as f64;
     let error = |(predicted, actual, count): (f64, f64, usize)| {
         (predicted - actual).abs() * count as f64 / all
@@ -266,7 +293,7 @@ fn calibration_error(scored: &[Scored]) -> f64 {
 
 /// The share of pairs of a near and a far pose in which the near one is believed more; ties are half.
 /// `None` where there is no such pair.
-fn area_under_curve(scored: &[Scored]) -> Option<f64> {
+pub fn area_under_curve(scored: &[Scored]) -> Option<f64> {
     let (near, far): (Vec<Scored>, Vec<Scored>) = scored.iter().copied().partition(|s| s.1);
     let beats = |a: &Scored, b: &Scored| match a.0.total_cmp(&b.0) {
         std::cmp::Ordering::Greater => 1.0,

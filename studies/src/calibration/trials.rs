@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use posescope::camera::Intrinsics;
 use posescope::covariance::{PoseCovariance, error_vector};
-use posescope::diagnosis::{Evidence, PoseConfidence, Subject, confidence};
+use posescope::diagnosis::{Code, Evidence, PoseConfidence, Subject, confidence, diagnose};
 use posescope::estimator;
 use posescope::geometry::{Pose, PoseError};
 use posescope::image::Photo;
@@ -58,6 +58,9 @@ pub struct Sample {
     pub method: String,
     /// The number of the town, or the name of a scene.
     pub of: String,
+    /// The place, and the pair of photos there.
+    #[serde(default)]
+    pub pair: [usize; 2],
     /// What the reference shows of the query.
     pub shown: Shown,
     /// What is wrong with the inputs.
@@ -76,6 +79,9 @@ pub struct Sample {
     /// The confidence that posescope states, for being near; `None` where it states none.
     #[serde(default)]
     pub stated: Option<PoseConfidence>,
+    /// Whether posescope says that the query may not show the place.
+    #[serde(default)]
+    pub named: bool,
 }
 
 /// What the reference shows of the query's place.
@@ -103,6 +109,11 @@ impl Shown {
 }
 
 impl Sample {
+    /// Whether there is no pose, and so nothing that speaks for one.
+    pub fn is_silent(&self) -> bool {
+        self.values.is_empty()
+    }
+
     /// How far the pose is off: a distance in units of the scale, and an angle \[rad\].
     pub fn distances(&self) -> Option<[f64; 2]> {
         let [x, y, z, right, down, forward] = self.error?;
@@ -152,7 +163,11 @@ pub fn of_towns(
                 wrong(&query, &reference, words)?
             }
         };
-        samples_of(&trials, &of, radius_m, &Params::default(), methods)
+        let mut samples = samples_of(&trials, &of, radius_m, &Params::default(), methods)?;
+        for sample in &mut samples {
+            sample.pair[0] = place;
+        }
+        Ok(samples)
     })?;
     Ok(samples.concat())
 }
@@ -227,9 +242,15 @@ fn samples_of(
     params: &Params,
     methods: &[Method],
 ) -> Result<Vec<Sample>, Failure> {
-    let samples: Result<Vec<_>, _> =
-        trials.iter().map(|trial| trial.samples(of, radius_m, params, methods)).collect();
-    Ok(samples?.concat())
+    let mut all = Vec::new();
+    for (number, trial) in trials.iter().enumerate() {
+        let mut samples = trial.samples(of, radius_m, params, methods)?;
+        for sample in &mut samples {
+            sample.pair[1] = number;
+        }
+        all.extend(samples);
+    }
+    Ok(all)
 }
 
 /// A pair with each mistake in its inputs whose name has these words.
@@ -390,23 +411,32 @@ impl Trial {
             let subject = Subject::new(&problem, method, params, &outcome, &evidence)
                 .against(None, confidence::NEAR.at(params.scale));
             let evidenced = confidence::evidenced(&subject);
-            let (Ok(pose), Some(evidenced)) = (&outcome.pose, evidenced) else {
-                continue;
-            };
-            let error = self.truth.map(|truth| error_vector(&truth, pose).component_div(&units));
-            let (names, values): (Vec<_>, Vec<_>) = evidenced.signals.into_iter().unzip();
+            let named = diagnose(&subject).iter().any(|one| one.code == Code::N1);
+            let (mut error, mut alone, mut signals) = (None, None, Vec::new());
+            match (&outcome.pose, evidenced) {
+                (Ok(pose), Some(evidenced)) => {
+                    let away = |truth| error_vector(&truth, pose).component_div(&units);
+                    error = self.truth.map(away);
+                    (alone, signals) = (evidenced.alone, evidenced.signals);
+                }
+                (Ok(_), None) => continue,
+                (Err(_), _) => {}
+            }
+            let (names, values): (Vec<&str>, Vec<f64>) = signals.into_iter().unzip();
             samples.push(Sample {
                 method: method.name().to_owned(),
                 of: of.to_owned(),
+                pair: [0, 0],
                 shown: self.shown,
                 fault: self.fault.map(str::to_owned),
                 radius_m,
                 metre: params.scale.metre(),
                 error: error.map(Into::into),
-                alone: evidenced.alone,
+                alone,
                 names: names.iter().map(ToString::to_string).collect(),
                 values,
                 stated: subject.confidence.clone(),
+                named,
             });
         }
         Ok(samples)
