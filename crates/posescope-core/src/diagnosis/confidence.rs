@@ -3,7 +3,8 @@
 //! The evidence of an estimator shows how far its pose stands out from chance. For feature-based methods these are
 //! the inliers beyond chance, how well they determine the pose, and whether the photos agree better there than
 //! elsewhere. For a grid search it is the depth of the minimum compared with other hypotheses, the runner-up and
-//! shuffled pixels. For a multi-start search it is how many of them end there, and whether features agree. A
+//! shuffled pixels. For a multi-start search it is how many of them end there, whether features agree, and how many
+//! matches the pose explains. For both searches it is also whether the photos agree better there than elsewhere. A
 //! logistic function of these signals is the probability of being [near](NEAR). How far a pose that is near is off
 //! follows from the inliers or the edges that fix it, scaled by another function of the same signals. Both together
 //! say how likely the pose is right, whatever error still counts as right. What is fitted was fitted on generated
@@ -13,6 +14,7 @@
 mod appearance;
 mod coefficients;
 mod edges;
+mod explained;
 mod inliers;
 mod lowered;
 mod minimum;
@@ -375,15 +377,17 @@ pub fn evidenced(subject: &Subject<'_>) -> Option<Evidenced> {
     // What was fitted for a method was fitted to its own search.
     let is_usual = Family::of(responsible, &Params::default()) == Some(family);
     let of_search = |found: Option<Evidenced>| {
-        let alone = edges::covariance(problem, params, &problem.reference_from_query(pose));
-        Some(Evidenced { alone, ..found? })
+        let at = problem.reference_from_query(pose);
+        let mut found = found?;
+        found.signals.extend(appearance::signals(problem, params, &at, Look::GLANCE));
+        Some(Evidenced { alone: edges::covariance(problem, params, &at), ..found })
     };
     let mut found = match family {
         _ if !is_usual => None,
         Family::Features => inliers::evidenced(subject, Look::QUICK),
         Family::Guided => inliers::evidenced(subject, Look::THOROUGH),
         Family::Grid => of_search(minimum::evidenced(outcome, evidence)),
-        Family::MultiStart => of_search(settled::evidenced(outcome, evidence, params.scale)),
+        Family::MultiStart => of_search(settled::evidenced(subject)),
         Family::Descent | Family::Given => None,
     }?;
     // The farther a method looked, the more it may have confused with the place.

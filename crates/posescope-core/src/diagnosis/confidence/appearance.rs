@@ -1,9 +1,10 @@
-//! What both photos say about a pose that features led to.
+//! What both photos say about a pose.
 //!
 //! Features that repeat, the windows of one house and of another, agree on a pose as well as those of one
 //! place do. The photos as a whole do not: drawn at a right pose the reference's cloud goes with the query
-//! far better than at poses beside it, or elsewhere around the reference. The cost is that of the
-//! [judge](crate::judge), on smaller photos.
+//! far better than at poses beside it, or elsewhere around the reference. A search compares photos, too, but of the poses
+//! that it tries one is always the best, also where none is right. The cost is that of the [judge](crate::judge), on
+//! smaller photos.
 
 use std::convert::Infallible;
 
@@ -24,13 +25,18 @@ pub(super) struct Look {
     shrink: u32,
     /// Poses around the reference that a pose is held against.
     around: usize,
+    /// The freedoms along which its neighbours are: three of position, right, down, forward, and three of rotation about
+    /// the same.
+    freedoms: &'static [usize],
 }
 
 impl Look {
     /// For a method that takes a tenth of a second.
-    pub(super) const QUICK: Self = Self { shrink: 4, around: 48 };
+    pub(super) const QUICK: Self = Self { shrink: 4, around: 48, freedoms: &[0, 1, 2, 3, 4, 5] };
     /// For one that takes its time: it doubts two right poses where a quick look doubts three.
-    pub(super) const THOROUGH: Self = Self { shrink: 2, around: 64 };
+    pub(super) const THOROUGH: Self = Self { shrink: 2, around: 64, freedoms: &[0, 1, 2, 3, 4, 5] };
+    /// For a search, which has compared photos itself: it takes two thousandths of a second.
+    pub(super) const GLANCE: Self = Self { shrink: 4, around: 16, freedoms: &[0, 2, 4] };
 }
 
 /// How far the poses around the reference go, at the scale of the paper \[m\].
@@ -66,7 +72,7 @@ pub(super) fn signals(
     let seen = || {
         let judge = Judge::new(problem, &params.render, &params.judge, look.shrink);
         let mut poses = vec![*reference_from_query, Pose::identity()];
-        poses.extend(neighbours(reference_from_query, scale));
+        poses.extend(neighbours(reference_from_query, look.freedoms, scale));
         let first_around = poses.len();
         poses.extend(around(look.around, scale));
         Ok(Appearance::among(&judge.score(&poses), first_around).unwrap_or_default())
@@ -133,13 +139,17 @@ impl Appearance {
 }
 
 /// The pose moved along and turned about each of its axes, to both sides, by the step of each ring.
-fn neighbours(pose: &Pose, scale: Scale) -> impl Iterator<Item = Pose> + '_ {
+fn neighbours<'a>(
+    pose: &'a Pose,
+    freedoms: &'a [usize],
+    scale: Scale,
+) -> impl Iterator<Item = Pose> + 'a {
     RINGS_M.into_iter().flat_map(move |paper_m| {
         let step_rad = (DEG_PER_M * paper_m).to_radians();
         let step_m = scale.length(paper_m);
         let steps = [step_m, step_m, step_m, step_rad, step_rad, step_rad];
-        let both = |axis: usize| [(axis, 1.0), (axis, -1.0)];
-        (0..steps.len()).flat_map(both).map(move |(axis, sign)| {
+        let both = |axis: &usize| [(*axis, 1.0), (*axis, -1.0)];
+        freedoms.iter().flat_map(both).map(move |(axis, sign)| {
             let mut by = [0.0; 6];
             by[axis] = sign * steps[axis];
             moved(pose, &by)
@@ -209,6 +219,6 @@ mod tests {
             quarters[usize::from(at.x > 0.0) + 2 * usize::from(at.z > 0.0)] += 1;
         }
         assert!(quarters.iter().all(|&count| count >= 10), "{quarters:?}");
-        assert_eq!(neighbours(&Pose::identity(), Scale::PAPER).count(), 24);
+        assert_eq!(neighbours(&Pose::identity(), Look::QUICK.freedoms, Scale::PAPER).count(), 24);
     }
 }

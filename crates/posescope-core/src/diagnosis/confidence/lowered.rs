@@ -4,6 +4,7 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
+use super::explained::correspondences;
 use super::{NEAR, coefficients::Fitted};
 use crate::diagnosis::Subject;
 use crate::diagnosis::numbers::with_digits;
@@ -11,7 +12,7 @@ use crate::estimator::Family;
 use crate::geometry::{Pose, PoseError};
 use crate::judge::Judge;
 use crate::render::Objective as _;
-use crate::solver::{Correspondence, Loss, Zoomed, refine_zoomed};
+use crate::solver::{Loss, Zoomed, refine_zoomed};
 use crate::stats::median;
 
 /// Why a pose is less likely right than its method's evidence says.
@@ -147,19 +148,6 @@ pub(super) fn by_camera(subject: &Subject<'_>) -> Option<Lowered> {
         explains,
         stated_explains,
     })
-}
-
-/// The matches that have a depth, at most so many, evenly of all.
-fn correspondences(subject: &Subject<'_>, most: usize) -> Option<Vec<Correspondence>> {
-    let evidence = subject.evidence;
-    let features = evidence.query.as_ref()?;
-    let lifted = evidence.lifted.as_ref()?.iter().filter_map(|one| {
-        let pixel = features.keypoints.get(one.query)?.pixel();
-        Some(Correspondence { pixel, point: one.point? })
-    });
-    let all: Vec<Correspondence> = lifted.collect();
-    let step = all.len().div_ceil(most).max(1);
-    Some(all.into_iter().step_by(step).collect())
 }
 
 #[cfg(test)]

@@ -1,14 +1,14 @@
 //! What a multi-start search says about the pose in which they settled.
 
-use super::{Costs, Evidenced, NEAR, gain_and_coverage, signed_log};
-use crate::diagnosis::Evidence;
-use crate::estimator::Outcome;
+use super::{Costs, Evidenced, NEAR, explained, gain_and_coverage, signed_log};
+use crate::diagnosis::Subject;
 use crate::geometry::{Pose, PoseError};
 use crate::grid::Phase;
 use crate::scale::Scale;
 
 /// What the starts of a search say of the pose in which some of them settled. Depths are in robust standard deviations of the coarse costs, below their median.
-pub(super) fn evidenced(outcome: &Outcome, evidence: &Evidence, scale: Scale) -> Option<Evidenced> {
+pub(super) fn evidenced(subject: &Subject<'_>) -> Option<Evidenced> {
+    let (outcome, evidence, scale) = (subject.outcome, subject.evidence, subject.params.scale);
     let summary = outcome.cost.as_ref()?;
     let surfaces = evidence.surfaces.iter().map(|surface| &**surface);
     let coarse = Costs::of(surfaces.filter(|one| one.lattice.phase == Phase::PositionCoarse))?;
@@ -35,6 +35,7 @@ pub(super) fn evidenced(outcome: &Outcome, evidence: &Evidence, scale: Scale) ->
         let poses = of_features.map(|one| (one.refined.pose, one.accepted));
         let FeaturesSay { support, against } = FeaturesSay::of(&answer, poses, scale);
         signals.extend([("support", support), ("against", against)]);
+        signals.extend(explained::signals(subject, &answer));
     }
     let chance_level = summary.shuffled;
     Some(Evidenced { signals, alone: None, inlier_spread: None, runner_up_margin, chance_level })
