@@ -88,8 +88,11 @@ fn a_photo_of_another_place_is_said_to_be_one_and_a_photo_of_this_place_is_not()
         results.iter().map(|result| (result.method, of(result), is_trusted(result))).collect()
     };
     let here = said("here");
-    assert!(here.iter().all(|(_, codes, is_trusted)| codes.is_empty() && *is_trusted), "{here:?}");
-    for (photo, named) in [("mirrored", "fb2"), ("noise", "mi")] {
+    assert!(here.iter().all(|(_, codes, _)| codes.is_empty()), "{here:?}");
+    // MI alone is less sure.
+    let trusted = here.iter().filter(|(.., is_trusted)| *is_trusted);
+    assert!(trusted.count() >= 3, "{here:?}");
+    for (photo, named) in [("mirrored", "fb2"), ("noise", "robust")] {
         for (method, codes, is_trusted) in said(photo) {
             let is_named = codes.contains(&Code::N1);
             assert!(is_named || method.name() != named, "{photo}, {method}: {codes:?}");

@@ -4,8 +4,7 @@
 //! the inliers beyond chance, how well they determine the pose, and whether the photos agree better there than
 //! elsewhere. For a grid search it is the depth of the minimum compared with other hypotheses, the runner-up and
 //! shuffled pixels. For a multi-start search it is how many of them end there, whether features agree, and how many
-//! matches the pose explains. For both searches it is also whether the photos agree better there than elsewhere. A
-//! logistic function of these signals is the probability of being [near](NEAR). How far a pose that is near is off
+//! matches the pose explains, and also whether the photos agree better there than elsewhere. A logistic function of these signals is the probability of being [near](NEAR). How far a pose that is near is off
 //! follows from the inliers or the edges that fix it, scaled by another function of the same signals. Both together
 //! say how likely the pose is right, whatever error still counts as right. What is fitted was fitted on generated
 //! towns with default parameters, and evaluated on others (numbers in `studies/README.md`). Lengths are in units of
@@ -376,18 +375,22 @@ pub fn evidenced(subject: &Subject<'_>) -> Option<Evidenced> {
     let family = Family::of(responsible, params)?;
     // What was fitted for a method was fitted to its own search.
     let is_usual = Family::of(responsible, &Params::default()) == Some(family);
+    let at = problem.reference_from_query(pose);
     let of_search = |found: Option<Evidenced>| {
-        let at = problem.reference_from_query(pose);
-        let mut found = found?;
+        Some(Evidenced { alone: edges::covariance(problem, params, &at), ..found? })
+    };
+    // A grid has three freedoms, so on a real road its right poses are beside the minimum, where the photos agree less
+    // than in generated towns. So a glance would doubt them.
+    let with_glance = |mut found: Evidenced| {
         found.signals.extend(appearance::signals(problem, params, &at, Look::GLANCE));
-        Some(Evidenced { alone: edges::covariance(problem, params, &at), ..found })
+        found
     };
     let mut found = match family {
         _ if !is_usual => None,
         Family::Features => inliers::evidenced(subject, Look::QUICK),
         Family::Guided => inliers::evidenced(subject, Look::THOROUGH),
         Family::Grid => of_search(minimum::evidenced(outcome, evidence)),
-        Family::MultiStart => of_search(settled::evidenced(subject)),
+        Family::MultiStart => of_search(settled::evidenced(subject)).map(with_glance),
         Family::Descent | Family::Given => None,
     }?;
     // The farther a method looked, the more it may have confused with the place.

@@ -35,7 +35,7 @@ impl Look {
     pub(super) const QUICK: Self = Self { shrink: 4, around: 48, freedoms: &[0, 1, 2, 3, 4, 5] };
     /// For one that takes its time: it doubts two right poses where a quick look doubts three.
     pub(super) const THOROUGH: Self = Self { shrink: 2, around: 64, freedoms: &[0, 1, 2, 3, 4, 5] };
-    /// For a search, which has compared photos itself: it takes two thousandths of a second.
+    /// For a search in six freedoms, which has compared photos itself.
     pub(super) const GLANCE: Self = Self { shrink: 4, around: 16, freedoms: &[0, 2, 4] };
 }
 
