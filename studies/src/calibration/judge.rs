@@ -15,7 +15,8 @@ pub type Scored = (f64, bool);
 /// Below this, 90 % of the squares of a normally distributed vector in space are.
 const NINETY_OF_THREE: f64 = 6.251;
 
-/// Prints how well probabilities and intervals hold of these, and what is said of those without a pose.
+/// Prints how well the probabilities and intervals of these samples hold. N1 is also counted for the `silent` ones, which
+/// have no pose.
 pub fn judge(
     title: &str,
     samples: &[Sample],

@@ -3,12 +3,12 @@
 //! The evidence of an estimator shows how far its pose stands out from chance. For feature-based methods these are
 //! the inliers beyond chance, how well they determine the pose, and whether the photos agree better there than
 //! elsewhere. For a grid search it is the depth of the minimum compared with other hypotheses, the runner-up and
-//! shuffled pixels. For a multi-start search it is how many of them end there, whether features agree, and how many
-//! matches the pose explains, and also whether the photos agree better there than elsewhere. A logistic function of these signals is the probability of being [near](NEAR). How far a pose that is near is off
-//! follows from the inliers or the edges that fix it, scaled by another function of the same signals. Both together
-//! say how likely the pose is right, whatever error still counts as right. What is fitted was fitted on generated
-//! towns with default parameters, and evaluated on others (numbers in `studies/README.md`). Lengths are in units of
-//! the scene's scale.
+//! shuffled pixels. For a multi-start search it is how many of them end there, whether features agree, how many
+//! matches the pose explains, and whether the photos agree better there than elsewhere. A logistic function of these
+//! signals is the probability of being [near](NEAR). How far a pose that is near is off follows from the inliers or
+//! the edges that fix it, scaled by another function of the same signals. Both together say how likely the pose is
+//! right, whatever error still counts as right. What is fitted was fitted on generated towns with default parameters,
+//! and evaluated on others (numbers in `studies/README.md`). Lengths are in units of the scene's scale.
 
 mod appearance;
 mod coefficients;

@@ -93,6 +93,7 @@ fn local_contrast(photo: &GrayImage, smoothed: &FloatImage, sigma: f64) -> Float
             127.5 + 127.5 * (deviations / MAX_DEVIATIONS).clamp(-1.0, 1.0)
         }));
     }
+    // Smoothing keeps the size of the photo, so each of its pixels has one value.
     FloatImage::from_raw(width, height, contrast).expect("a value for each pixel")
 }
 

@@ -184,6 +184,7 @@ fn shrunk(photo: &GrayImage, shrink: u32) -> Cow<'_, GrayImage> {
         let count = (side.min(width) * lines.len() / width).max(1) as u32;
         means.extend(sums.iter().map(|sum| ((sum + count / 2) / count) as u8));
     }
+    // A query's and a reference's photo has at least one pixel, by the check of its camera.
     Cow::Owned(GrayImage::from_raw(columns, rows, means).expect("a mean for each square"))
 }
 
