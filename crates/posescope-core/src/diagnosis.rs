@@ -30,6 +30,7 @@ mod matches;
 mod numbers;
 mod proof;
 pub(crate) mod readings;
+mod relation;
 pub mod remedies;
 mod rules;
 mod search;

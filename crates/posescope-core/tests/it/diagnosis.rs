@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use nalgebra::{UnitQuaternion, Vector3};
 use posescope_core::camera::Intrinsics;
+use posescope_core::cloud::Cloud;
 use posescope_core::diagnosis::Code;
 use posescope_core::diagnosis::{Diagnosis, Evidence, Subject, Tolerance, diagnose};
 use posescope_core::event::{JudgedPose, KindSet};
@@ -352,6 +353,40 @@ fn nothing_is_said_of_matches_that_were_never_sought() {
     let found = verdicts(&problem, Method::FB, &with(&["fb.ratio=0.1"]), Some(&truth(&problem)));
     assert_eq!(primary(&found), Some(Code::R3), "{found:?}");
     assert!(!codes(&found).contains(&Code::R4), "{found:?}");
+}
+
+#[test]
+fn matches_of_the_place_without_depths_speak_of_depths_and_not_of_another_place() {
+    let few = cloud_of_the_walls().points.into_iter().step_by(4000).collect();
+    let problem = problem(photo(1.0, 5), photo(0.0, 5), Cloud { points: few });
+    for method in [Method::FB, Method::named("fb2")] {
+        let found = verdicts(&problem, method, &Params::default(), None);
+        assert_eq!(codes(&found), [Code::R4], "{method}: {found:?}");
+    }
+}
+
+/// Nothing else of the evidence changes with the pose.
+#[test]
+fn a_pose_at_which_the_photos_agree_less_is_less_likely_right() {
+    let problem = solvable();
+    let params = Params::default();
+    for method in ["mi6", "robust"].map(Method::named) {
+        let mut evidence = Evidence::default();
+        let mut trace = Trace::to(&mut evidence);
+        let found = localize_traced(&problem, method, &params, &mut trace).expect("nobody cancels");
+        // All are near 1, so that how likely they are wrong tells more.
+        let doubt = |shift: Pose| {
+            let mut outcome = found.clone();
+            outcome.pose = found.pose.clone().map(|pose| pose * shift);
+            let subject = Subject::new(&problem, method, &params, &outcome, &evidence);
+            1.0 - subject.confidence.expect("a pose").probability
+        };
+        let at_minimum = doubt(Pose::identity());
+        for elsewhere in [Pose::translation(2.0, 0.0, 0.0), Pose::translation(0.0, 0.0, -3.0)] {
+            let elsewhere = doubt(elsewhere);
+            assert!(elsewhere > 3.0 * at_minimum, "{method}: {elsewhere}, {at_minimum}");
+        }
+    }
 }
 
 #[test]

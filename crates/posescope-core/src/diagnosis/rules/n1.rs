@@ -1,6 +1,7 @@
 //! N1: as little speaks for the answer as where the query shows another place.
 
 use super::*;
+use crate::diagnosis::relation;
 
 pub(super) const RULE: Rule = Rule {
     title: "the query may not show this place",
@@ -27,8 +28,11 @@ fn test(case: &Case<'_>) -> Option<Diagnosis> {
                 Failure::NoConsensus { .. }
                 | Failure::ChanceConsensus { .. }
                 | Failure::TooFewMatches { .. } => true,
-                // Of many matches, the depths are missing and not the place.
-                Failure::TooFewDepths { unique, .. } => *unique <= r3::FEW_MATCHES,
+                // Of many matches that agree on where the photos lie against each other, the depths are missing and not
+                // the place.
+                Failure::TooFewDepths { unique, .. } => {
+                    *unique <= r3::FEW_MATCHES || relation::is_chance(case.subject.evidence) == Some(true)
+                }
                 _ => false,
             };
             is_chance.then(|| RULE.found(&NoMatches { because: failure.to_string() }))
