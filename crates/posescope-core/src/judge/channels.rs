@@ -83,18 +83,17 @@ fn local_contrast(photo: &GrayImage, smoothed: &FloatImage, sigma: f64) -> Float
     let place = |pixel: u32| (pixel as f32 + 0.5) * scale - 0.5;
     let (width, height) = photo.dimensions();
     let columns: Vec<Between> = (0..width).map(|x| Between::of(place(x), mean.width())).collect();
-    let mut contrast = Vec::with_capacity(smoothed.as_raw().len());
-    for (y, row) in (0..height).zip(smoothed.as_raw().chunks(columns.len().max(1))) {
+    let mut contrast = smoothed.clone();
+    for (y, row) in (0..height).zip(contrast.chunks_mut(columns.len().max(1))) {
         let down = Between::of(place(y), mean.height());
         let (means, spreads) = (down.rows(&mean), down.rows(&deviation));
-        contrast.extend(row.iter().zip(&columns).map(|(grey, &along)| {
-            let above = grey - between(means, along, down);
+        for (value, &along) in row.iter_mut().zip(&columns) {
+            let above = *value - between(means, along, down);
             let deviations = above / (between(spreads, along, down) + MIN_DEVIATION);
-            127.5 + 127.5 * (deviations / MAX_DEVIATIONS).clamp(-1.0, 1.0)
-        }));
+            *value = 127.5 + 127.5 * (deviations / MAX_DEVIATIONS).clamp(-1.0, 1.0);
+        }
     }
-    // Smoothing keeps the size of the photo, so each of its pixels has one value.
-    FloatImage::from_raw(width, height, contrast).expect("a value for each pixel")
+    contrast
 }
 
 /// Mean and standard deviation of the grey values around each square of the photo.

@@ -173,8 +173,9 @@ fn shrunk(photo: &GrayImage, shrink: u32) -> Cow<'_, GrayImage> {
     }
     let [columns, rows] = [photo.width(), photo.height()].map(|side| (side / shrink).max(1));
     let (side, width) = (shrink as usize, photo.width().max(1) as usize);
-    let mut means = Vec::with_capacity((columns * rows) as usize);
-    for lines in photo.as_raw().chunks(side * width).take(rows as usize) {
+    let mut means = GrayImage::new(columns, rows);
+    let rows = means.chunks_mut(columns as usize);
+    for (row, lines) in rows.zip(photo.as_raw().chunks(side * width)) {
         let mut sums = vec![0_u32; columns as usize];
         for line in lines.chunks(width) {
             for (sum, square) in sums.iter_mut().zip(line.chunks(side)) {
@@ -182,10 +183,11 @@ fn shrunk(photo: &GrayImage, shrink: u32) -> Cow<'_, GrayImage> {
             }
         }
         let count = (side.min(width) * lines.len() / width).max(1) as u32;
-        means.extend(sums.iter().map(|sum| ((sum + count / 2) / count) as u8));
+        for (mean, sum) in row.iter_mut().zip(&sums) {
+            *mean = ((sum + count / 2) / count) as u8;
+        }
     }
-    // A query's and a reference's photo has at least one pixel, by the check of its camera.
-    Cow::Owned(GrayImage::from_raw(columns, rows, means).expect("a mean for each square"))
+    Cow::Owned(means)
 }
 
 /// The camera of the photo that [`shrunk`] makes.
