@@ -10,8 +10,10 @@ use crate::scale::LengthUnit;
 const SIZE: (f64, f64) = (500.0, 300.0);
 /// The margins: left, top, right, bottom \[px\].
 const AROUND: [f64; 4] = [52.0, 24.0, 12.0, 44.0];
-/// The height of a line and the width of an entry of the legend \[px\].
+/// The height of a line of the legend, and the least width of an entry \[px\].
 const LEGEND: (f64, f64) = (18.0, 92.0);
+/// What an entry of the legend has around its name, and about the width of a letter \[px\].
+const NAMED: (f64, f64) = (24.0, 6.0);
 
 /// A chart with two axes.
 #[derive(Clone, Debug)]
@@ -212,9 +214,15 @@ impl Chart {
         (width.unwrap_or(SIZE.0), height.unwrap_or(SIZE.1))
     }
 
+    /// The width of each entry of the legend, so that the longest name fits \[px\], and how many are in a row.
+    fn legend_entries(&self) -> (f64, usize) {
+        let letters = self.legend.iter().map(|(name, _)| name.chars().count()).max();
+        let width = LEGEND.1.max(NAMED.0 + NAMED.1 * letters.unwrap_or(0) as f64);
+        (width, (self.inside().0 / width).max(1.0) as usize)
+    }
+
     fn legend_rows(&self) -> f64 {
-        let in_row = (self.inside().0 / LEGEND.1).max(1.0).floor();
-        (self.legend.len() as f64 / in_row).ceil()
+        self.legend.len().div_ceil(self.legend_entries().1) as f64
     }
 
     fn size(&self) -> (f64, f64) {
@@ -253,9 +261,9 @@ impl Chart {
                     } @else { (drawn(mark, &x, &y)) }
                 }
                 @for (at, (name, color)) in self.legend.iter().enumerate() {
-                    @let in_row = (inner / LEGEND.1).max(1.0) as usize;
+                    @let (wide, in_row) = self.legend_entries();
                     @let (column, row) = ((at % in_row) as f64, (at / in_row) as f64);
-                    @let (from, line) = (left + LEGEND.1 * column, below + 4.0 + LEGEND.0 * row);
+                    @let (from, line) = (left + wide * column, below + 4.0 + LEGEND.0 * row);
                     rect x=(from) y=(line) width="10" height="10" fill=(hex(*color)) {}
                     text x=(from + 14.0) y=(line + 9.0) { (name) }
                 }
@@ -348,6 +356,30 @@ mod tests {
         assert!(!svg.contains("xmlns"));
         let file = file(&[chart.clone(), chart]);
         assert!(file.starts_with("<svg xmlns=") && !file.contains("href"), "{file}");
+    }
+
+    #[test]
+    fn the_names_of_a_legend_have_room() {
+        let places = |names: &[&str]| -> Vec<(f64, f64)> {
+            let chart = Chart {
+                title: String::new(),
+                x: Axis::linear("", 0.0, 1.0),
+                y: Axis::linear("", 0.0, 1.0),
+                marks: Vec::new(),
+                legend: names.iter().map(|name| ((*name).to_owned(), [0; 3])).collect(),
+            };
+            let svg = chart.svg(None).into_string();
+            let number = |text: &str| text.split('"').next()?.parse::<f64>().ok();
+            let place = |rect: &str| Some((number(rect)?, number(rect.split_once("y=\"")?.1)?));
+            svg.split("<rect x=\"").skip(1).filter_map(place).collect()
+        };
+        let short = places(&["FB", "PM", "MI"]);
+        assert_eq!([short[1].0 - short[0].0, short[2].0 - short[1].0], [LEGEND.1; 2]);
+        let long = "as long as a name gets, or so";
+        let long = places(&[long, long, long, long]);
+        assert!(long[1].0 - long[0].0 > 29.0 * NAMED.1, "{long:?}");
+        // Where a row is full, the next begins.
+        assert_eq!((long[2].0, long[2].1 - long[0].1), (long[0].0, LEGEND.0));
     }
 
     #[test]

@@ -90,7 +90,10 @@ pub(super) fn page(
             }
             section aria-labelledby="why" {
                 h2 id="why" { "Why not elsewhere" }
-                (table(&causes(answers)))
+                @let causes = causes(answers);
+                @if causes.rows.is_empty() {
+                    p { "Each method localises every photo that is near a reference." }
+                } @else { (table(&causes)) }
             }
             section aria-labelledby="trust" {
                 h2 id="trust" { "How far to trust a pose here" }

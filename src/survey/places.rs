@@ -136,3 +136,36 @@ pub(super) fn summary(places: &[Place<'_>]) -> Table {
     }
     rows
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_method_has_its_column_and_the_best_of_a_frame_is_counted_once() {
+        let place = |frame, chances: [f64; 2]| Place {
+            frame,
+            pose: Pose::identity(),
+            reference: "r",
+            away_m: 4.5,
+            chances: [Method::FB, Method::MI].into_iter().zip(chances).collect(),
+        };
+        let places = [
+            place("a", [0.9, 0.6]),
+            place("b", [0.2, 0.55]),
+            // Equal ones belong to the first.
+            place("c", [0.3, 0.3]),
+        ];
+        let csv = table(&places).to_csv();
+        let expected = "frame,reference,distance,fb,mi\n\
+                        a,r,4.500,0.900,0.600\n\
+                        b,r,4.500,0.200,0.550\n\
+                        c,r,4.500,0.300,0.300\n";
+        assert_eq!(csv, expected);
+        let expected = "method,frames,from 80 % on,from 50 % on,best of all\n\
+                        FB,3,1,1,2\n\
+                        MI,3,0,2,1\n";
+        assert_eq!(summary(&places).to_csv(), expected);
+        assert!(table(&[]).to_csv().starts_with("frame,reference,distance"));
+    }
+}
