@@ -258,3 +258,68 @@ impl Design {
         std::iter::once(weights[0] - shift).chain(slopes).collect()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::calibration::trials::Shown;
+    use rand::{RngExt as _, SeedableRng as _};
+    use rand_pcg::Pcg64;
+
+    /// Signals that have nothing to do with the errors, as many as make a fit to 150 poses follow their chance.
+    const SIGNALS: usize = 25;
+
+    /// Poses whose errors are as their covariance says, and one in three of a query that does not show its place.
+    fn samples(count: usize, seed: u64) -> Vec<Sample> {
+        let mut rng = Pcg64::seed_from_u64(seed);
+        let mut normal = move || {
+            let (radius, angle): (f64, f64) = (rng.random(), rng.random());
+            (-2.0 * (1.0 - radius).ln()).sqrt() * (std::f64::consts::TAU * angle).cos()
+        };
+        let deviations = [0.004, 0.004, 0.004, 0.06, 0.06, 0.06];
+        let alone = Matrix6::from_diagonal(&Vector6::from(deviations.map(|d| d * d)));
+        let sample = |place: usize| Sample {
+            method: "fb".to_owned(),
+            of: "town".to_owned(),
+            pair: [place, 0],
+            shown: if place.is_multiple_of(3) { Shown::Town } else { Shown::Same },
+            fault: None,
+            radius_m: 10.0,
+            metre: 1.0,
+            error: (!place.is_multiple_of(3))
+                .then(|| deviations.map(|deviation| deviation * normal())),
+            alone: PoseCovariance::new(alone),
+            names: (0..SIGNALS).map(|k| k.to_string()).collect(),
+            values: (0..SIGNALS).map(|_| normal()).collect(),
+            stated: None,
+            named: false,
+        };
+        (0..count).map(sample).collect()
+    }
+
+    #[test]
+    fn intervals_hold_poses_that_were_not_fitted_although_they_follow_chance() {
+        let own = samples(225, 1);
+        let fitted = fitted(&own.iter().collect::<Vec<_>>()).expect("enough");
+        let others = samples(3000, 2);
+        let near: Vec<&Sample> = others.iter().filter(|sample| sample.is_near()).collect();
+        assert_eq!(near.len(), 2000);
+        for first in [0, 3] {
+            let held = near.iter().filter(|s| square(&fitted, s, first) <= NINETY_OF_THREE).count();
+            assert!(
+                (0.86..=0.96).contains(&(held as f64 / 2000.0)),
+                "from {first}: {held} of 2000"
+            );
+        }
+    }
+
+    #[test]
+    fn few_right_poses_that_were_not_fitted_are_accused_of_showing_another_place() {
+        let own = samples(225, 3);
+        let fitted = fitted(&own.iter().collect::<Vec<_>>()).expect("enough");
+        let others = samples(3000, 4);
+        let near = others.iter().filter(|sample| sample.is_near());
+        let accused = near.filter(|s| fitted.shown(&s.values) < fitted.shown_from).count();
+        assert!(accused < 60, "{accused} of 2000");
+    }
+}
