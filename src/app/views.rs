@@ -14,6 +14,7 @@ mod images;
 pub(super) mod legend;
 mod lockstep;
 mod log;
+mod ovals;
 mod parameters;
 mod queries;
 mod ransac;

@@ -2,11 +2,15 @@
 //!
 //! How far a pose may be off, and how its errors go together.
 
-use nalgebra::{Matrix2, Matrix3, Matrix6, UnitQuaternion, Vector2, Vector3, Vector6};
+use nalgebra::{
+    Matrix2, Matrix2x3, Matrix3, Matrix3x6, Matrix6, Point3, UnitQuaternion, Vector2, Vector3,
+    Vector6,
+};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_pcg::Pcg64;
 use serde::{Deserialize, Serialize};
 
+use crate::camera::Intrinsics;
 use crate::diagnosis::Tolerance;
 use crate::geometry::Pose;
 
@@ -93,21 +97,38 @@ impl PoseCovariance {
     /// The outline of what holds 95 % of the errors to the right and forward in another frame: points around the camera's
     /// centre, right and forward \[m\]. `turn` leads from the camera's frame to the other.
     pub fn outline(&self, turn: &UnitQuaternion<f64>) -> Vec<[f64; 2]> {
-        /// Below this, 95 % of the squares of a normally distributed vector in a plane are.
-        const NINETY_FIVE_OF_TWO: f64 = 5.991_465;
-        const POINTS: u32 = 48;
         let turn = turn.to_rotation_matrix();
         let position = turn.matrix() * self.of_position() * turn.matrix().transpose();
-        let across =
-            Matrix2::new(position[(0, 0)], position[(0, 2)], position[(2, 0)], position[(2, 2)]);
-        let Some(factor) = (across * NINETY_FIVE_OF_TWO).cholesky() else {
+        ellipse(Matrix2::new(
+            position[(0, 0)],
+            position[(0, 2)],
+            position[(2, 0)],
+            position[(2, 2)],
+        ))
+    }
+
+    /// The outline of where a point is truly seen in 95 % of cases: pixels of the photo \[px\]. `point` is in the frame
+    /// of the estimated camera \[m\]. Empty for a point that is not in front of it.
+    pub fn outline_of_point(&self, camera: &Intrinsics, point: &Point3<f64>) -> Vec<[f64; 2]> {
+        let Some(centre) = camera.project(point) else {
             return Vec::new();
         };
-        let point = |at: u32| {
-            let angle = std::f64::consts::TAU * f64::from(at) / f64::from(POINTS);
-            (factor.l() * Vector2::new(angle.cos(), angle.sin())).into()
-        };
-        (0..POINTS).map(point).collect()
+        // A camera that is turned and shifted by a little sees p at p − ω × p − t.
+        let mut moves = Matrix3x6::zeros();
+        moves.fixed_view_mut::<3, 3>(0, 0).copy_from(&point.coords.cross_matrix());
+        moves.fixed_view_mut::<3, 3>(0, 3).copy_from(&-Matrix3::identity());
+        let (x, y, z) = (point.x, point.y, point.z);
+        let sees = Matrix2x3::new(
+            camera.fx / z,
+            0.0,
+            -camera.fx * x / (z * z),
+            0.0,
+            camera.fy / z,
+            -camera.fy * y / (z * z),
+        );
+        let by = sees * moves;
+        let around = ellipse(by * self.0 * by.transpose()).into_iter();
+        around.map(|[right, down]| [centre.x + right, centre.y + down]).collect()
     }
 
     /// Distances \[m\] and angles \[rad\] of errors that are drawn from it, always the same.
@@ -146,6 +167,21 @@ impl PoseCovariance {
         };
         errors.iter().filter(is_within).count() as f64 / errors.len().max(1) as f64
     }
+}
+
+/// Points around what holds 95 % of normally distributed vectors in a plane; empty where they have no spread.
+fn ellipse(covariance: Matrix2<f64>) -> Vec<[f64; 2]> {
+    /// Below this, 95 % of the squares of a normally distributed vector in a plane are.
+    const NINETY_FIVE_OF_TWO: f64 = 5.991_465;
+    const POINTS: u32 = 48;
+    let Some(factor) = (covariance * NINETY_FIVE_OF_TWO).cholesky() else {
+        return Vec::new();
+    };
+    let point = |at: u32| {
+        let angle = std::f64::consts::TAU * f64::from(at) / f64::from(POINTS);
+        (factor.l() * Vector2::new(angle.cos(), angle.sin())).into()
+    };
+    (0..POINTS).map(point).collect()
 }
 
 /// What is added to an estimate to reach the truth, both `world_from_camera`, as a [`PoseCovariance`] orders it.
@@ -268,15 +304,43 @@ mod tests {
         let outline = some().outline(&turn);
         let share = share_of_positions(|position| {
             let seen = turn * position;
-            // Inside of an outline that goes around anticlockwise, every edge has the point at its left.
-            let next = outline.iter().cycle().skip(1);
-            outline.iter().zip(next).all(|(from, to)| {
-                let (along, to_point) =
-                    ([to[0] - from[0], to[1] - from[1]], [seen.x - from[0], seen.z - from[1]]);
-                along[0] * to_point[1] - along[1] * to_point[0] >= 0.0
-            })
+            is_inside(&outline, [seen.x, seen.z])
         });
         assert!((share - 0.95).abs() < 0.006, "{share}");
+    }
+
+    /// Inside of an outline that goes around anticlockwise, every edge has the point at its left.
+    fn is_inside(outline: &[[f64; 2]], point: [f64; 2]) -> bool {
+        let next = outline.iter().cycle().skip(1);
+        outline.iter().zip(next).all(|(from, to)| {
+            let (along, to_point) =
+                ([to[0] - from[0], to[1] - from[1]], [point[0] - from[0], point[1] - from[1]]);
+            along[0] * to_point[1] - along[1] * to_point[0] >= 0.0
+        })
+    }
+
+    #[test]
+    fn the_outline_of_a_point_holds_nineteen_of_twenty_of_where_it_is_seen() {
+        let camera =
+            Intrinsics { fx: 700.0, fy: 650.0, cx: 600.0, cy: 180.0, width: 1241, height: 376 };
+        let small = some().scaled(0.1);
+        let factor = small.matrix().cholesky().expect("positive");
+        for point in [Point3::new(-3.0, 0.5, 9.0), Point3::new(4.0, -1.5, 22.0)] {
+            let outline = small.outline_of_point(&camera, &point);
+            let mut rng = Pcg64::seed_from_u64(5);
+            let count = 20_000;
+            let held = (0..count).filter(|_| {
+                let error = factor.l() * Vector6::from_fn(|_, _| normal(&mut rng));
+                let [turn, shift] = [0, 3].map(|first| error.fixed_rows::<3>(first).into_owned());
+                let from_truth =
+                    Pose::from_parts(shift.into(), UnitQuaternion::from_scaled_axis(turn));
+                let seen = camera.project(&(from_truth.inverse() * point)).expect("in front");
+                is_inside(&outline, seen.into())
+            });
+            let share = held.count() as f64 / f64::from(count);
+            assert!((share - 0.95).abs() < 0.01, "{share}");
+        }
+        assert!(small.outline_of_point(&camera, &Point3::new(0.0, 0.0, -1.0)).is_empty());
     }
 
     #[test]

@@ -15,6 +15,7 @@ use self::visible::VisibleFeatures;
 use super::View;
 use super::canvas::PanZoom;
 use super::features::{self, INLIER, KINDS};
+use super::ovals::Ovals;
 use crate::app::ViewContext;
 use crate::diagnosis::true_match_px;
 use crate::feature_progress::FeatureProgress;
@@ -62,8 +63,10 @@ impl View for ImagesView {
             format!("query photo {}", problem.query().name()),
             format!("reference photo {}", problem.reference().name()),
         ];
+        let ovals = context.method().map(|method| Ovals::of(context, problem, method));
+        let ovals = ovals.unwrap_or_default();
         let captions = [
-            caption("Query", progress.query.len()),
+            caption("Query", progress.query.len()) + ovals.words(),
             caption("Reference", progress.reference.len()),
         ];
         let pair = PhotoPair::show(ui, photos, [query, reference], names, &mut self.pan_zoom);
@@ -82,6 +85,7 @@ impl View for ImagesView {
             visible.draw_unmatched(painter, &progress, &pair.at[1], strength);
         }
         visible.draw(painter, strength);
+        ovals.draw(&pair.at[0].painter(painter), &pair.at[0]);
         for feature in [selected, hovered].into_iter().flatten() {
             visible.draw_accent(painter, feature);
         }

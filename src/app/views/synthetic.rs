@@ -11,10 +11,11 @@ use self::mode::Mode;
 use super::View;
 use super::canvas::{self, PanZoom};
 use super::legend::name_picture;
+use super::ovals::Ovals;
 use crate::app::action::{Action, toggle};
 use crate::app::textures::color_image;
-use crate::app::{ShownView, ViewContext};
-use crate::event::Side;
+use crate::app::{ShownReason, ShownView, ViewContext};
+use crate::event::{Moment, Side};
 use crate::method::Method;
 use crate::place::place;
 use crate::problem::Problem;
@@ -141,6 +142,15 @@ impl SynthesisView {
             }
             (_, Some(picture)) => at.paint(&painter, picture.id(), Color32::WHITE),
         }
+        // They belong to the query as the result sees it.
+        let is_result = shown.is_some_and(|shown| shown.reason == ShownReason::Event(Moment::End));
+        let ovals = match mode {
+            Mode::Query | Mode::View | Mode::Blend if is_result => {
+                Ovals::of(context, problem, method)
+            }
+            _ => Ovals::default(),
+        };
+        ovals.draw(&at.painter(&painter), &at);
         let words = match (shown, blinks) {
             (None, _) => {
                 format!("query {}", context.setup.label_of(Side::Query, problem.query().name()))
@@ -148,7 +158,7 @@ impl SynthesisView {
             (Some(_), true) => format!("{name} (blinking)"),
             (Some(_), false) => name,
         };
-        canvas::tag(&painter, at.visible().min, &words, Color32::WHITE);
+        canvas::tag(&painter, at.visible().min, &(words + ovals.words()), Color32::WHITE);
     }
 }
 
