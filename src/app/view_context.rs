@@ -184,8 +184,13 @@ impl<'a> ViewContext<'a> {
         self.finished(method)?.pose.as_ref()?.to_pose()
     }
 
-    /// How far the pose of a method can be trusted.
+    /// How far the pose of [`estimate`](Self::estimate) can be trusted: a fused one as its own result says.
     pub fn confidence(&self, method: Method) -> Option<&'a PoseConfidence> {
+        let span = self.span()?;
+        if span.part == Part::Fusion(method) {
+            let result = span.result.as_ref().filter(|_| self.state.is_finished_at_cursor(span));
+            return result?.confidence.as_ref();
+        }
         self.finished(method)?.confidence.as_ref()
     }
 
