@@ -31,7 +31,8 @@ fn test(case: &Case<'_>) -> Option<Diagnosis> {
                 // Of many matches that agree on where the photos lie against each other, the depths are missing and not
                 // the place.
                 Failure::TooFewDepths { unique, .. } => {
-                    *unique <= r3::FEW_MATCHES || relation::is_chance(case.subject.evidence) == Some(true)
+                    *unique <= r3::FEW_MATCHES
+                        || relation::is_chance(case.subject.evidence) == Some(true)
                 }
                 _ => false,
             };
