@@ -121,6 +121,20 @@ impl<'a> ViewContext<'a> {
         (!is_future || !self.options.hides_future).then_some((span, last))
     }
 
+    /// The latest estimator of a kind that the one at the cursor has run inside itself, with its records and the cursor in
+    /// them. The second part of a hybrid goes on where the first one ended, so a hybrid has none.
+    pub fn inside(&self, is_one: impl Fn(Method) -> bool) -> Option<(Method, Span, usize)> {
+        let span = self.span()?;
+        if estimator::find(self.method()?)?.hybrid().is_some() {
+            return None;
+        }
+        let latest = self.run.inner(span, self.cursor).filter(|(method, _)| is_one(*method)).last();
+        latest.map(|(method, inner)| {
+            let last = inner.records.end.saturating_sub(1);
+            (method, inner, self.cursor.min(last))
+        })
+    }
+
     /// The latest event of a type that a method has reported: up to the cursor if the cursor is in its
     /// part, else in all of its part.
     pub fn latest_of<E: DebugEvent + 'static>(&self, method: Method) -> Option<&'a E> {

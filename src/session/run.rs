@@ -326,6 +326,23 @@ impl Run {
         self.stages.iter().filter(move |bar| bar.records.contains(&cursor))
     }
 
+    /// The estimators that the one of a part has run inside itself up to a cursor, in the order of their beginning, each
+    /// with its records.
+    pub fn inner(&self, span: &Span, cursor: usize) -> impl Iterator<Item = (Method, Span)> {
+        let (part, own) = (span.part, span.records.clone());
+        let begun = self
+            .stages
+            .iter()
+            .filter(move |bar| own.contains(&bar.records.start) && bar.records.start <= cursor);
+        begun.filter_map(move |bar| match bar.stage {
+            Stage::Estimator(method) if part.method() != Some(method) => {
+                let records = bar.records.clone();
+                Some((method, Span { part, records, result: None, times: None }))
+            }
+            _ => None,
+        })
+    }
+
     /// The latest records of a part.
     pub fn span_of(&self, part: Part) -> Option<&Span> {
         self.spans.iter().rev().find(|span| span.part == part)

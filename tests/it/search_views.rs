@@ -4,7 +4,9 @@ use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
 use posescope::app::{App, ViewName};
 use posescope::cost::Explanation;
-use posescope::event::{ConsensusJudged, DebugEvent, HypothesisTried, PoseScored, ViewRendered};
+use posescope::event::{
+    ConsensusJudged, DebugEvent, FeaturesClassified, HypothesisTried, PoseScored, ViewRendered,
+};
 use posescope::grid::{DenseSurface, Offset, Phase};
 use posescope::method::Method;
 use posescope::session::{RunMode, Span};
@@ -258,6 +260,39 @@ fn ransac_counts_the_trials_and_a_click_goes_to_one() {
     let place = place.expect("the cursor is at a trial");
     let middle = trials.len() / 2;
     assert!(place.abs_diff(middle) < trials.len() / 3, "trial {place}, not about {middle}");
+}
+
+#[test]
+fn what_robust_takes_of_fb_and_fb2_is_shown_as_theirs() {
+    let mut setup = setup();
+    let robust = Method::named("robust");
+    setup.job.task.protocol.methods = vec![robust];
+    let mut window = finished(setup);
+    let ends: Vec<(usize, FeaturesClassified)> = told(&window, robust);
+    let trials: Vec<usize> =
+        told::<HypothesisTried>(&window, robust).into_iter().map(|(at, _)| at).collect();
+    assert_eq!(ends.len(), 2, "of FB and fb2");
+    let mut begin = 0;
+    for (end, classified) in &ends {
+        let own: Vec<usize> =
+            trials.iter().copied().filter(|at| (begin..*end).contains(at)).collect();
+        send(&mut window, |app| app.app_state_mut().show_alone(Some(ViewName::Ransac)));
+        for (made, at) in own.iter().enumerate().step_by(own.len() / 3 + 1) {
+            move_to(&mut window, *at);
+            text(&window, &format!("{} trials made", made + 1));
+            text(&window, &format!("inside {}", robust.label()));
+        }
+        send(&mut window, |app| app.app_state_mut().show_alone(Some(ViewName::Images)));
+        move_to(&mut window, *end);
+        let inliers = classified.states.iter().filter(|state| state.name() == "inlier").count();
+        window.get_by_label(&format!("inlier: {inliers}, shown"));
+        begin = *end;
+    }
+    // At the end those of fb2 stay.
+    let (_, classified) = &ends[1];
+    move_to_end(&mut window, robust);
+    let inliers = classified.states.iter().filter(|state| state.name() == "inlier").count();
+    window.get_by_label(&format!("inlier: {inliers}, shown"));
 }
 
 #[test]

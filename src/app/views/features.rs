@@ -1,5 +1,7 @@
 //! What an estimator has reported up to the cursor about each query feature, and how that looks.
 
+use std::borrow::Cow;
+
 use egui::Color32;
 
 use super::legend::MarkShape;
@@ -65,19 +67,30 @@ pub(super) fn position(keypoint: &Keypoint) -> [f32; 2] {
     [keypoint.x, keypoint.y]
 }
 
-/// The method at the cursor and then those that are asked for, of those that match features: with what they are, or of a
-/// hybrid what its first part is.
+/// The method at the cursor, one that it has run inside itself, and then those that are asked for, of those that match
+/// features: with what they are, or of a hybrid what its first part is.
 pub(super) fn methods<'a>(
     context: &ViewContext<'a>,
 ) -> impl Iterator<Item = (Method, Method)> + use<'a> {
     let params = &context.run.params;
     let asked = context.setup.task.protocol.methods.iter().copied();
-    let methods = context.method().into_iter().chain(asked);
-    methods.filter_map(move |method| {
+    let matching = move |method: Method| {
         let first = estimator::find(method)?.hybrid().map_or(method, |parts| parts.first);
         let family = estimator::find(first)?.family(params);
         matches!(family, Some(Family::Features | Family::Guided)).then_some((method, first))
-    })
+    };
+    let inside = context.inside(|method| matching(method).is_some()).map(|(method, ..)| method);
+    context.method().into_iter().chain(inside).chain(asked).filter_map(matching)
+}
+
+/// The part of a method of [`methods`], and the cursor in it.
+pub(super) fn part_of<'a>(
+    context: &ViewContext<'a>,
+    method: Method,
+) -> Option<(Cow<'a, Span>, usize)> {
+    let inside = context.inside(|inner| inner == method);
+    let inside = inside.map(|(_, span, cursor)| (Cow::Owned(span), cursor));
+    inside.or_else(|| context.part_of(method).map(|(span, cursor)| (Cow::Borrowed(span), cursor)))
 }
 
 /// How the method whose matches are shown agrees on a pose.
@@ -90,11 +103,11 @@ pub(super) fn mlesac<'a>(context: &ViewContext<'a>) -> &'a MlesacParams {
     }
 }
 
-/// The progress at the cursor; for the direct methods that of FB or `fb2`, or of the hybrid where these were
-/// not asked to run.
+/// The progress at the cursor; for the direct methods that of the FB or `fb2` inside them, or of these alone, or of the
+/// hybrid where these were not asked to run.
 pub(super) fn at<'a>(context: &ViewContext<'a>) -> FeatureProgress<'a> {
-    let part = methods(context).find_map(|(method, _)| context.part_of(method));
-    part.map_or_else(FeatureProgress::default, |(span, cursor)| of(context, span, cursor))
+    let part = methods(context).find_map(|(method, _)| part_of(context, method));
+    part.map_or_else(FeatureProgress::default, |(span, cursor)| of(context, &span, cursor))
 }
 
 /// The progress of a part up to a cursor.

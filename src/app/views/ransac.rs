@@ -3,6 +3,7 @@
 mod trials;
 mod verdict;
 
+use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -34,18 +35,25 @@ impl View for RansacView {
         egui::ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
             let mut matching = features::methods(context).map(|(_, method)| method);
             let method = matching.next().unwrap_or(Method::FB);
-            let part = part_with::<HypothesisTried>(context, method);
-            let Some(((span, cursor), trials)) = part.and_then(|(span, cursor)| {
-                Some(((span, cursor), self.read(context, span, cursor)?))
+            let hybrid = || {
+                let (span, cursor) = part_with::<HypothesisTried>(context, method)?;
+                Some((Cow::Borrowed(span), cursor))
+            };
+            let inside = context.inside(|inner| inner == method);
+            let inside = inside.map(|(_, span, cursor)| (Cow::Owned(span), cursor));
+            let part = inside.or_else(hybrid);
+            let Some((span, cursor, trials)) = part.and_then(|(span, cursor)| {
+                let trials = self.read(context, &span, cursor)?;
+                Some((span, cursor, trials))
             }) else {
                 ui.weak(
                     "No hypothesis yet. Run FB (1) or FB2, which try hypotheses in their stage ransac",
                 );
                 return;
             };
-            head(ui, context, span, method, trials);
+            head(ui, context, &span, method, trials);
             plot(ui, context, method, trials);
-            verdict::ui(ui, context, span, cursor, trials);
+            verdict::ui(ui, context, &span, cursor, trials);
         });
     }
 }
