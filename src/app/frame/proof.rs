@@ -1,8 +1,8 @@
 //! A proof picture on the canvas.
 
 use egui::{
-    Align2, Color32, Pos2, Rect, Role, Sense, Shape, Stroke, TextureHandle, Ui, WidgetInfo, pos2,
-    vec2,
+    Align2, Color32, FontId, Pos2, Rect, Role, Sense, Shape, Stroke, TextureHandle, Ui, WidgetInfo,
+    pos2, vec2,
 };
 
 use crate::app::textures::{Textures, color_image};
@@ -80,23 +80,29 @@ fn draw(ui: &Ui, textures: &Textures, panel: &Panel, rect: Rect, title_end: f32)
         paint_mark(&painter, mark.thing, at(mark.at), MARK);
     }
     let marks = || panel.marks.iter().map(|mark| (mark, at(mark.at)));
-    let scale = panel.scale.as_ref();
-    let taken = scale.map(|scale| color_scale(&painter, scale, rect, marks().map(|(_, at)| at)));
-    labels(&painter, marks(), rect, taken);
+    let colors = panel.scale.as_ref();
+    let taken = colors.map(|colors| color_scale(&painter, colors, rect, marks().map(|(_, at)| at)));
+    labels(&painter, marks(), rect, taken, scale.min_elem());
 }
 
-/// Labels beside their marks, inside the panel, none upon another.
+/// Labels beside their marks, inside the panel, none upon another. Words have a place among others in the picture, so they
+/// shrink with it.
 fn labels<'a>(
     painter: &egui::Painter,
     marks: impl Iterator<Item = (&'a Mark, Pos2)>,
     panel: Rect,
     taken: Option<Rect>,
+    scale: f32,
 ) {
     const MARGIN: egui::Vec2 = vec2(3.0, 1.0);
+    /// Smaller words cannot be read.
+    const LEAST: f32 = 0.7;
+    let small = FontId { size: theme::CAPTION.size * scale.clamp(LEAST, 1.0), ..theme::CAPTION };
     let within = place_of(panel);
     let mut taken: Vec<Place> = taken.into_iter().map(place_of).collect();
     for (mark, at) in marks.filter(|(mark, _)| !mark.label.is_empty()) {
-        let galley = painter.layout_no_wrap(mark.label.clone(), theme::CAPTION, Color32::WHITE);
+        let font = if mark.thing == Thing::Words { small.clone() } else { theme::CAPTION };
+        let galley = painter.layout_no_wrap(mark.label.clone(), font, Color32::WHITE);
         let size = galley.size();
         if mark.thing == Thing::Words {
             painter.galley(at - vec2(0.0, size.y / 2.0), galley, Color32::WHITE);
