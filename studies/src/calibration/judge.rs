@@ -4,6 +4,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use posescope::diagnosis::PoseConfidence;
 use posescope::diagnosis::confidence::{Confidence, Fitted};
+use rand::{RngExt as _, SeedableRng as _};
+use rand_pcg::Pcg64;
 
 use super::fit::{beyond, square};
 use super::trials::{Sample, Shown};
@@ -64,7 +66,7 @@ pub fn judge(
         intervals.extend(coverage(name, own, fitted));
     }
     print_table(
-        "poses,number,near,calibration error,AUC,trusted of wrong,low of near,trusted of well found",
+        "poses,number,near,calibration error / by chance,AUC,trusted of wrong,low of near,trusted of well found",
         &likely,
     );
     print_table(
@@ -116,7 +118,9 @@ fn as_stated(samples: &[&Sample]) {
         vec![
             name.to_owned(),
             own.len().to_string(),
-            format!("{:.3}", calibration_error(&scored)),
+            format!("{:.3}", mean(scored.iter().map(|one| one.0))),
+            format!("{:.3}", mean(scored.iter().map(|one| f64::from(u8::from(one.1))))),
+            errors(&scored),
             share(&|sample| !sample.is_near(), Confidence::Trusted),
             share(&Sample::is_near, Confidence::Trusted),
             share(&Sample::is_near, Confidence::Low),
@@ -135,7 +139,7 @@ fn as_stated(samples: &[&Sample]) {
     }
     rows.push(row("all", &known));
     print_table(
-        "as stated,poses,calibration error,trusted of wrong,trusted of near,low of near,lowered near / wrong,position \
+        "as stated,poses,mean probability,share near,calibration error / by chance,trusted of wrong,trusted of near,low of near,lowered near / wrong,position \
          in 95 %,rotation in 95 %",
         &rows,
     );
@@ -229,7 +233,7 @@ fn probabilities(
         name.to_owned(),
         scored.len().to_string(),
         format!("{:.1} %", percent(near, scored.len())),
-        format!("{:.3}", calibration_error(&scored)),
+        errors(&scored),
         area_under_curve(&scored).map_or("–".to_owned(), |area| format!("{area:.3}")),
         share(&|s| !s.is_near(), Confidence::Trusted),
         share(&Sample::is_near, Confidence::Low),
@@ -290,6 +294,22 @@ pub fn calibration_error(scored: &[Scored]) -> f64 {
         (predicted - actual).abs() * count as f64 / all
     };
     tenths(scored).map(error).sum()
+}
+
+/// The calibration error, and what it would be by chance.
+fn errors(scored: &[Scored]) -> String {
+    format!("{:.3} / {:.3}", calibration_error(scored), error_by_chance(scored))
+}
+
+/// What [`calibration_error`] would be on average if each pose were near as often as its probability says: few poses
+/// differ from their probabilities by chance.
+fn error_by_chance(scored: &[Scored]) -> f64 {
+    const DRAWS: usize = 200;
+    let mut rng = Pcg64::seed_from_u64(0);
+    mean((0..DRAWS).map(|_| {
+        let drawn = |(probability, _): &Scored| (*probability, rng.random::<f64>() < *probability);
+        calibration_error(&scored.iter().map(drawn).collect::<Vec<_>>())
+    }))
 }
 
 /// The share of pairs of a near and a far pose in which the near one is believed more; ties are half.
