@@ -55,9 +55,9 @@ pub struct Options {
     /// Fit to the samples of these earlier runs, and judge that.
     #[arg(long)]
     fit: Vec<PathBuf>,
-    /// Fit the intervals alone, and keep the probabilities.
+    /// Fit this alone, and keep the rest as posescope has it now.
     #[arg(long, requires = "fit")]
-    intervals: bool,
+    only: Option<Only>,
     /// Keep what was fitted as posescope's own.
     #[arg(long, requires = "fit")]
     write: bool,
@@ -76,6 +76,15 @@ pub struct Options {
     /// Only compare pairs of frames of each map, as posescope doctor does.
     #[arg(long)]
     frame_pairs: bool,
+}
+
+/// A part of what is fitted.
+#[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum Only {
+    /// How far poses may be off.
+    Intervals,
+    /// How likely poses are right, and what tells that a query does not show the place.
+    Probabilities,
 }
 
 pub fn run(options: &Options) -> Result<(), Failure> {
@@ -120,12 +129,20 @@ pub fn run(options: &Options) -> Result<(), Failure> {
         for method in &options.methods {
             let name = method.name();
             let of_method: Vec<&Sample> = own.iter().filter(|s| s.method == name).collect();
-            let Some(mut found) = fit::fitted(&of_method) else {
+            let Some(found) = fit::fitted(&of_method) else {
                 continue;
             };
-            if let Some(own) = now.get(name).filter(|_| options.intervals) {
-                found.near.clone_from(&own.near);
-            }
+            let kept = now.get(name).map(|own| fit::with_signals(own, &found));
+            let found = match (options.only, kept) {
+                (Some(Only::Intervals), Some(kept)) => Fitted { near: kept.near, ..found },
+                (Some(Only::Probabilities), Some(kept)) => Fitted {
+                    deviations: kept.deviations,
+                    tail: kept.tail,
+                    seen: kept.seen,
+                    ..found
+                },
+                _ => found,
+            };
             fitted.insert(name.to_owned(), found);
         }
         judge("Fitted, on what it was fitted to", &own, &[], &fitted);

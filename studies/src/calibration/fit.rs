@@ -101,6 +101,26 @@ pub fn fitted(samples: &[&Sample]) -> Option<Fitted> {
     Some(fitted)
 }
 
+/// The same fit with the signals of another one. Those that it did not know decide nothing.
+pub fn with_signals(fitted: &Fitted, other: &Fitted) -> Fitted {
+    let known = |name: &String| fitted.signals.iter().position(|own| own == name);
+    // A constant, and what else comes before the signals.
+    let weights = |own: &[f64], before: usize| -> Vec<f64> {
+        let of_signals =
+            other.signals.iter().map(|name| known(name).map_or(0.0, |k| own[before + k]));
+        own[..before].iter().copied().chain(of_signals).collect()
+    };
+    let seen = other.signals.iter().zip(&other.seen);
+    Fitted {
+        signals: other.signals.clone(),
+        seen: seen.map(|(name, seen)| known(name).map_or(*seen, |k| fitted.seen[k])).collect(),
+        near: weights(&fitted.near, 1),
+        shown: weights(&fitted.shown, 1),
+        deviations: fitted.deviations.each_ref().map(|own| weights(own, 2)),
+        ..*fitted
+    }
+}
+
 /// Parts of the places; each is judged by what is fitted to the others.
 const FOLDS: u64 = 6;
 
@@ -310,6 +330,24 @@ mod tests {
                 (0.86..=0.96).contains(&(held as f64 / 2000.0)),
                 "from {first}: {held} of 2000"
             );
+        }
+    }
+
+    #[test]
+    fn a_signal_that_was_not_known_decides_nothing() {
+        let own = samples(225, 5);
+        let fitted = fitted(&own.iter().collect::<Vec<_>>()).expect("enough");
+        let mut other = fitted.clone();
+        other.signals.insert(3, "light".to_owned());
+        other.seen.insert(3, [-4.0, 0.0]);
+        let same = with_signals(&fitted, &other);
+        for sample in &own[..20] {
+            let values = [&sample.values[..3], &[-2.5], &sample.values[3..]].concat();
+            assert_eq!(same.probability(&values), fitted.probability(&sample.values));
+            assert_eq!(same.shown(&values), fitted.shown(&sample.values));
+            let alone = sample.alone.expect("known");
+            let covariance = same.covariance(&alone, &values, Scale::PAPER);
+            assert_eq!(covariance, fitted.covariance(&alone, &sample.values, Scale::PAPER));
         }
     }
 

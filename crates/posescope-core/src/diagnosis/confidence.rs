@@ -4,8 +4,9 @@
 //! the inliers beyond chance, how well they determine the pose, and whether the photos agree better there than
 //! elsewhere. For a grid search it is the depth of the minimum compared with other hypotheses, the runner-up and
 //! shuffled pixels. For a multi-start search it is how many of them end there, whether features agree, how many
-//! matches the pose explains, and whether the photos agree better there than elsewhere. A logistic function of these
-//! signals is the probability of being [near](NEAR). How far a pose that is near is off follows from the inliers or
+//! matches the pose explains, and whether the photos agree better there than elsewhere. Whether both photos were taken in
+//! the same light says how much of that to expect. A logistic function of these signals is the probability of being
+//! [near](NEAR). How far a pose that is near is off follows from the inliers or
 //! the edges that fix it, scaled by another function of the same signals. Both together say how likely the pose is
 //! right, whatever error still counts as right. What is fitted was fitted on generated towns with default parameters,
 //! and evaluated on others (numbers in `studies/README.md`). Lengths are in units of the scene's scale.
@@ -15,6 +16,7 @@ mod coefficients;
 mod edges;
 mod explained;
 mod inliers;
+mod light;
 mod lowered;
 mod minimum;
 mod settled;
@@ -396,6 +398,7 @@ pub fn evidenced(subject: &Subject<'_>) -> Option<Evidenced> {
     // The farther a method looked, the more it may have confused with the place.
     let radius = problem.uncertainty_radius_m() / params.scale.metre();
     found.signals.push(("radius", radius.ln()));
+    found.signals.push(light::signal(problem));
     Some(found)
 }
 
@@ -473,6 +476,22 @@ mod tests {
             assert!((0.5..5.0).contains(&fitted.tail), "{method}: {}", fitted.tail);
         }
         assert!(super::fitted(Method::HY).is_none());
+    }
+
+    #[test]
+    fn in_the_same_light_more_must_speak_for_a_pose() {
+        for method in ["fb", "pm", "mi", "fb2", "mi6", "robust"] {
+            let fitted = fitted(Method::named(method)).expect(method);
+            assert_eq!(fitted.signals.last().map(String::as_str), Some("light"), "{method}");
+            let with_light = |light: f64| {
+                let middle = fitted.seen.iter().map(|[least, most]| 0.5 * (least + most));
+                let mut signals: Vec<f64> = middle.collect();
+                *signals.last_mut().expect("the light") = light.ln();
+                (fitted.probability(&signals), fitted.shown(&signals))
+            };
+            let (same, other) = (with_light(0.04), with_light(0.3));
+            assert!(same.0 < other.0 && same.1 < other.1, "{method}: {same:?}, {other:?}");
+        }
     }
 
     #[test]
