@@ -116,7 +116,7 @@ pub fn wait(window: &mut Harness<'_, App>, is_so: impl Fn(&App) -> bool) {
         if is_so(window.state()) {
             return;
         }
-        assert!(begun.elapsed() < Duration::from_secs(120), "it hangs");
+        assert!(begun.elapsed() < Duration::from_secs(600), "it hangs");
         std::thread::sleep(Duration::from_millis(2));
     }
 }
