@@ -15,12 +15,14 @@ use xxhash_rust::xxh3::Xxh3;
 
 use crate::diagnosis::confidence::NEAR;
 use crate::doctor::{self, FramePair};
+use crate::geometry::Pose;
+use crate::grid::Reach;
 use crate::scale::Scale;
 use crate::scene::{Scene, SceneSize, cache_file, format_of, street};
 use posescope_core::survey::FramePairs;
 
 /// The version of the file.
-const SCHEMA: &str = "posescope.map-check/2";
+const SCHEMA: &str = "posescope.map-check/3";
 
 /// Fewer pairs of frames say nothing.
 const LEAST_PAIRS: usize = 6;
@@ -39,7 +41,7 @@ pub struct MapFit {
     /// What is wrong with it, in a phrase; `None` where `posescope doctor` finds nothing.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mistake: Option<String>,
-    /// How closely pairs of its frames fit each other; `None` where too few share features.
+    /// How closely pairs of its frames fit each other, and what searches reach; `None` where too few share features.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub frame_pairs: Option<FramePairs>,
 }
@@ -48,9 +50,11 @@ impl MapFit {
     /// What `posescope doctor` finds.
     pub fn of(scene: &dyn Scene) -> Self {
         let (mistake, pairs) = doctor::fit(scene);
+        let size = SceneSize::of(scene);
         Self {
             mistake: mistake.map(|found| found.mistake.about().to_owned()),
-            frame_pairs: compared(&pairs, SceneSize::of(scene).scale),
+            frame_pairs: compared(&pairs, size.scale)
+                .map(|pairs| FramePairs { reach: reach(scene, &size), ..pairs }),
         }
     }
 }
@@ -73,7 +77,17 @@ fn compared(pairs: &[FramePair], scale: Scale) -> Option<FramePairs> {
         near: near.len(),
         position: factor(|pair| pair.error.translation_m / pair.within.translation_m, IN_TOWNS[0]),
         rotation: factor(|pair| pair.error.rotation_deg / pair.within.rotation_deg, IN_TOWNS[1]),
+        reach: Reach::ALL,
     })
+}
+
+/// What a search with three freedoms reaches of the ways between a map's cameras, at its scale and usual radius.
+fn reach(scene: &dyn Scene, size: &SceneSize) -> Reach {
+    let scale = size.scale;
+    let cameras: Vec<Pose> =
+        (0..scene.frames().len()).filter_map(|frame| scene.pose(frame)).collect();
+    let depth_m = size.depth_m.unwrap_or(scale.least_depth());
+    Reach::among(&cameras, scale.radius(), NEAR.at(scale), depth_m)
 }
 
 /// What was found in a map.

@@ -178,13 +178,39 @@ fn poses_in_a_room_have_a_confidence_by_how_closely_its_frames_fit_each_other() 
         fs::copy(file.path(), to.join(file.file_name())).expect("writable");
     }
     fs::copy(from.join("intrinsics.K.txt"), to.join("camera-intrinsics.txt")).expect("writable");
-    let said = desk.run("run box --query 55 --reference 63 --method fb2 --json -");
+    let said = desk.run("run box --query 55 --reference 63 --method fb2,mi --json -");
     has(&said.err, "Confidence follows how closely the map's frames fit each other ~ survey box");
     let results = said.results();
-    let known = results[0].confidence.as_ref().expect("a pose");
+    // In the order of methods.
+    let [mi, fb2] = &results[..] else { panic!("{results:?}") };
+    let known = fb2.confidence.as_ref().expect("a pose");
     assert_eq!(known.calibrated_on, Calibration::FramePairs);
     // What is fitted says 0.98 and more; so few pairs cannot.
     assert!((0.8..0.97).contains(&known.probability), "{known:?}");
-    let (held, error) = (known.within_95.expect("an interval"), results[0].error.expect("a truth"));
+    let (held, error) = (known.within_95.expect("an interval"), fb2.error.expect("a truth"));
     assert!(error.translation_m <= held.m && error.rotation_deg <= held.deg, "{held:?} {error:?}");
+    // It is held in a hand, and MI looks for a camera that keeps its height and tilt.
+    assert!(known.lowered_by.is_empty(), "{known:?}");
+    let level = mi.confidence.as_ref().expect("a pose");
+    let Some(Lowered::Freedoms { reached }) = level.lowered_by.first() else {
+        panic!("{level:?}");
+    };
+    assert!((0.1..0.4).contains(reached) && level.probability < *reached, "{level:?}");
+}
+
+/// A camera on a car keeps its height and tilt.
+#[test]
+fn a_search_of_three_freedoms_is_believed_on_a_real_drive() {
+    let Some(data) = std::env::var_os("POSESCOPE_DATA") else {
+        println!("skipped: no data (POSESCOPE_DATA)");
+        return;
+    };
+    let drive = "kitti_raw_dense/2011_09_26/2011_09_26_drive_0013_sync";
+    let drive = Path::new(&data).join(drive);
+    let asked = format!("run {} --query 10 --reference 6 --method mi --json -", drive.display());
+    let said = Desk::new().run(&asked);
+    has(&said.err, "Confidence follows how closely the map's frames fit each other");
+    let results = said.results();
+    let known = results[0].confidence.as_ref().expect("a pose");
+    assert!(known.lowered_by.is_empty() && known.probability > 0.5, "{known:?}");
 }

@@ -193,7 +193,7 @@ fn a_pose_by_the_camera_of_another_photo_is_not_trusted_and_one_by_its_own_is() 
         assert!(error > 1.0 && other.word != Confidence::Trusted, "{frame}: {error} m, {other:?}");
         let named = other.lowered_by.iter().find_map(|why| match why {
             Lowered::Camera { focal_length_px, .. } => Some(focal_length_px / stated.fx),
-            Lowered::Radius { .. } => None,
+            Lowered::Radius { .. } | Lowered::Freedoms { .. } => None,
         });
         doubted += usize::from(named.is_some_and(|ratio| (ratio - 1.0).abs() < 0.1));
     }

@@ -7,11 +7,13 @@
 mod basin;
 mod dense;
 mod lattice;
+mod reach;
 mod scan;
 mod scored;
 mod settle;
 
 pub use lattice::{Lattice, LatticeTooLarge, MAX_CELLS};
+pub use reach::Reach;
 pub use scan::{Scored, scan};
 pub use scored::ScoredLattice;
 

@@ -8,7 +8,7 @@ use std::str::FromStr;
 use crate::cost::CostSettings;
 use crate::describe::{Describe, list, set};
 use crate::features::SurfParams;
-use crate::grid::{GridParams, SurfaceParams};
+use crate::grid::{GridParams, Reach, SurfaceParams};
 use crate::retrieval::{IndexParams, RetrievalParams};
 use crate::scale::Scale;
 use crate::survey::{FramePairs, Survey, Surveyed};
@@ -229,7 +229,7 @@ impl Params {
                 let pairs = entries.clone().try_into().ok().filter(FramePairs::is_sound);
                 self.frame_pairs = Some(pairs.ok_or_else(|| ParamError::BadValue {
                     key: group.clone(),
-                    expected: "a table of pairs, near, position and rotation".to_owned(),
+                    expected: "a table of pairs, near, position, rotation and reach".to_owned(),
                     given: entries.to_string(),
                 })?);
                 continue;
@@ -269,10 +269,12 @@ impl Params {
             let (metre, is_metric) = (self.scale.metre(), self.scale.is_metric());
             text += &format!("[{SCALE}]\nmetre = {metre:?}\nis_metric = {is_metric}\n\n");
         }
-        if let Some(FramePairs { pairs, near, position, rotation }) = self.frame_pairs {
+        if let Some(FramePairs { pairs, near, position, rotation, reach }) = self.frame_pairs {
             text += &format!(
                 "[{FRAME_PAIRS}]\npairs = {pairs}\nnear = {near}\nposition = {position:?}\nrotation = {rotation:?}\n\n"
             );
+            let Reach { level, ahead } = reach;
+            text += &format!("[{FRAME_PAIRS}.reach]\nlevel = {level:?}\nahead = {ahead:?}\n\n");
         }
         for (method, one) in self.survey.methods() {
             let Surveyed { shift, slope, position, rotation } = one;
@@ -406,7 +408,9 @@ mod tests {
         let surveyed = Surveyed { shift: -0.25, slope: 0.75, position: 2.0, rotation: 1.5 };
         let survey: Survey = [(crate::method::Method::FB, surveyed)].into_iter().collect();
         let mistake_of_map = Some("a \"mistake\"".to_owned());
-        let frame_pairs = Some(FramePairs { pairs: 16, near: 12, position: 2.5, rotation: 1.0 });
+        let reach = Reach { level: 0.75, ahead: 0.5 };
+        let frame_pairs =
+            Some(FramePairs { pairs: 16, near: 12, position: 2.5, rotation: 1.0, reach });
         let room = Params::at_scale(Scale::of_depth(1.8, true));
         let params = Params { survey, mistake_of_map, frame_pairs, ..room };
         assert_eq!(params.changes(), [""; 0]);
@@ -415,6 +419,7 @@ mod tests {
             "mistake_of_map = 1.0",
             "frame_pairs = 1.0",
             "[frame_pairs]\npairs = 1\nnear = 2\nposition = 1.0\nrotation = 1.0",
+            "[frame_pairs]\npairs = 2\nnear = 1\nposition = 1.0\nrotation = 1.0\nreach = { level = 0.5, ahead = 1.0 }",
             "survey = 1.0",
             "[survey.fb]\nshift = 0.0",
             "[survey.fb]\nshift = 0.0\nslope = 0.0\nposition = 1.0\nrotation = 1.0",

@@ -19,6 +19,10 @@ pub struct Scale {
     is_metric: bool,
 }
 
+/// A depth that still belongs to the scale of the paper: in KITTI, the median depth of what a camera sees of a scan is 11 to
+/// 13 m.
+const STREET_DEPTH_M: f64 = 10.0;
+
 impl Scale {
     /// That of the paper's streets.
     pub const PAPER: Self = Self { metre: 1.0, is_metric: true };
@@ -26,9 +30,6 @@ impl Scale {
     /// The scale of a scene in which things have this typical depth \[m, or the unit of the scene\]. It is 1, 2 or 5
     /// times a power of ten, so that the lengths that follow from it are short numbers.
     pub fn of_depth(depth: f64, is_metric: bool) -> Self {
-        /// A depth that still belongs to the scale of the paper: in KITTI, the median depth of what a camera sees of a
-        /// scan is 11 to 13 m.
-        const STREET_DEPTH_M: f64 = 10.0;
         let exact = if depth.is_finite() { depth / STREET_DEPTH_M } else { 1.0 };
         let powers = (-3..=3).map(|power| 10_f64.powi(power));
         let mut steps = powers.flat_map(|power| [1.0, 2.0, 5.0].map(|digit| short(digit * power)));
@@ -45,6 +46,11 @@ impl Scale {
     /// Whether lengths are in metres.
     pub fn is_metric(self) -> bool {
         self.is_metric
+    }
+
+    /// The least typical depth of scenes with this scale \[m, or the unit of the scene\].
+    pub fn least_depth(self) -> f64 {
+        self.length(STREET_DEPTH_M)
     }
 
     /// The unit of lengths.

@@ -12,6 +12,7 @@ use nalgebra::Vector6;
 use serde::{Deserialize, Serialize};
 
 use crate::covariance::PoseCovariance;
+use crate::grid::Reach;
 use crate::method::Method;
 use crate::scale::Scale;
 
@@ -34,7 +35,7 @@ pub struct Surveyed {
     pub rotation: f64,
 }
 
-/// How closely pairs of frames of a map fit each other, where nobody surveyed the map.
+/// How closely pairs of frames of a map fit each other, and what searches reach there, where nobody surveyed the map.
 ///
 /// The features of two photos and the cloud of one say how the cameras stand to each other, and the stated poses say it,
 /// too. A pose that is localised in the map is off at least as these are.
@@ -49,6 +50,9 @@ pub struct FramePairs {
     pub position: f64,
     /// How many times farther their rotations are off.
     pub rotation: f64,
+    /// What a search with three freedoms reaches. All, where it was not looked at.
+    #[serde(default)]
+    pub reach: Reach,
 }
 
 impl FramePairs {
@@ -70,7 +74,8 @@ impl FramePairs {
     /// Whether its numbers can be used.
     pub fn is_sound(&self) -> bool {
         let is_factor = |factor: f64| factor >= 1.0 && factor.is_finite();
-        self.near <= self.pairs && is_factor(self.position) && is_factor(self.rotation)
+        let are_factors = is_factor(self.position) && is_factor(self.rotation);
+        self.near <= self.pairs && are_factors && self.reach.is_sound()
     }
 }
 
@@ -170,7 +175,8 @@ mod tests {
 
     #[test]
     fn pairs_that_do_not_fit_lower_the_probability_and_widen_the_interval() {
-        let of = |near| FramePairs { pairs: 15, near, position: 2.0, rotation: 1.5 };
+        let of =
+            |near| FramePairs { pairs: 15, near, position: 2.0, rotation: 1.5, reach: Reach::ALL };
         let room = Scale::of_depth(1.8, true);
         assert!((of(15).probability(1.0, room) - 15.5 / 16.0).abs() < 1e-12);
         assert!((of(9).probability(0.5, room) - 0.5 * 9.5 / 16.0).abs() < 1e-12);

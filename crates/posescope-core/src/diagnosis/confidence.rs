@@ -277,6 +277,7 @@ impl Trust {
         let near = lower(fitted.probability(&values), lowered::by_radius(subject, fitted));
         let near = surveyed.probability(near);
         let near = pairs.map_or(near, |pairs| pairs.probability(near, scale));
+        let near = lower(near, pairs.and_then(|pairs| lowered::by_freedoms(subject, &pairs.reach)));
         let near = lower(near, lowered::by_camera(subject));
         Some(Self {
             elsewhere: Some(shown).filter(|shown| *shown < fitted.shown_from),

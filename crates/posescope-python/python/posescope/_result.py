@@ -89,8 +89,8 @@ class Confidence:
 
     @property
     def lowered_by(self) -> List[Dict[str, Any]]:
-        """What speaks against the pose, beside what the method left behind: each with its ``why``, ``camera`` or
-        ``radius``, and its numbers."""
+        """What speaks against the pose, beside what the method left behind: each with its ``why``,
+        ``camera``, ``radius`` or ``freedoms``, and its numbers."""
         return list(self.details.get("lowered_by", []))
 
     def __float__(self) -> float:

@@ -5,11 +5,12 @@ use std::fmt;
 use serde::{Deserialize, Serialize};
 
 use super::explained::correspondences;
-use super::{NEAR, coefficients::Fitted};
+use super::{NEAR, coefficients::Fitted, responsible};
 use crate::diagnosis::Subject;
 use crate::diagnosis::numbers::with_digits;
 use crate::estimator::Family;
 use crate::geometry::{Pose, PoseError};
+use crate::grid::Reach;
 use crate::judge::Judge;
 use crate::render::Objective as _;
 use crate::solver::{Loss, Zoomed, refine_zoomed};
@@ -37,6 +38,11 @@ pub enum Lowered {
         /// How far those went, at the scale of the scene.
         fitted_to_m: f64,
     },
+    /// The search keeps the height and the tilt of the reference, or turns little, and the map's cameras differ in these.
+    Freedoms {
+        /// The share of the pairs of the map's frames that such a search can find.
+        reached: f64,
+    },
 }
 
 /// As a clause after *because*.
@@ -53,6 +59,12 @@ impl fmt::Display for Lowered {
                 "the search went {} m far, and probabilities are known up to {} m",
                 with_digits(*searched_m, 2),
                 with_digits(*fitted_to_m, 2)
+            ),
+            Self::Freedoms { reached } => write!(
+                f,
+                "the search changes position and heading alone, and so reaches {:.0} % of the ways from one camera of the map \
+                 to another: use --method robust or mi6",
+                100.0 * reached
             ),
         }
     }
@@ -71,6 +83,7 @@ impl Lowered {
                 let by = (fitted_to_m / searched_m).powi(2);
                 by * probability / (1.0 - probability + by * probability)
             }
+            Self::Freedoms { reached } => reached * probability,
         }
     }
 }
@@ -82,6 +95,16 @@ pub(super) fn by_radius(subject: &Subject<'_>, fitted: &Fitted) -> Option<Lowere
     let fitted_to_m = fitted.farthest()? * metre;
     // What is kept of the fit is rounded.
     (searched_m > 1.001 * fitted_to_m).then_some(Lowered::Radius { searched_m, fitted_to_m })
+}
+
+/// Whether the method searches fewer freedoms than the cameras of the map have. The minimum of its cost does not show it.
+pub(super) fn by_freedoms(subject: &Subject<'_>, reach: &Reach) -> Option<Lowered> {
+    /// Cameras of which more are reached move as those that were fitted to.
+    const AS_IN_TOWNS: f64 = 0.95;
+    let method = responsible(subject.method, subject.outcome);
+    let is_grid = Family::of(method, subject.params) == Some(Family::Grid);
+    let reached = reach.of(&subject.params.grid, subject.params.scale);
+    (is_grid && reached < AS_IN_TOWNS).then_some(Lowered::Freedoms { reached })
 }
 
 /// Whether the matches of the photos, and the photos themselves, go better with another focal length of the query at
@@ -167,11 +190,16 @@ mod tests {
             stated_explains: 21,
         };
         assert_eq!([0.99, 0.1].map(|one| camera.applied(one)), [OF_ANOTHER_CAMERA, 0.1]);
-        let said = [radius.to_string(), camera.to_string()];
+        let freedoms = Lowered::Freedoms { reached: 0.25 };
+        assert_eq!(freedoms.applied(0.8), 0.2);
+        let said = [radius.to_string(), camera.to_string(), freedoms.to_string()];
         assert_eq!(said[0], "the search went 50 m far, and probabilities are known up to 25 m");
         let words = "a focal length of 883 px explains 60 matches, from another place, and the stated 707 px explain \
                      21: check the query's camera";
         assert_eq!(said[1], words);
+        let words = "the search changes position and heading alone, and so reaches 25 % of the ways from one camera of \
+                     the map to another: use --method robust or mi6";
+        assert_eq!(said[2], words);
         let text = serde_json::to_string(&camera).expect("numbers");
         assert_eq!(serde_json::from_str::<Lowered>(&text).ok(), Some(camera));
     }
