@@ -13,7 +13,6 @@ mod scored;
 mod settle;
 
 pub use lattice::{Lattice, LatticeTooLarge, MAX_CELLS};
-pub use reach::Reach;
 pub use scan::{Scored, scan};
 pub use scored::ScoredLattice;
 
@@ -21,6 +20,8 @@ pub use scored::ScoredLattice;
 pub use basin::Basin;
 #[doc(hidden)]
 pub use dense::DenseSurface;
+#[doc(hidden)]
+pub use reach::Reach;
 
 pub use crate::render::Score;
 

@@ -1,3 +1,5 @@
+//! For posescope's own crates: may change in any version.
+//!
 //! What a search with three freedoms reaches of the ways that a map's cameras differ.
 
 use serde::{Deserialize, Serialize};
