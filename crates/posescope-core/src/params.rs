@@ -415,6 +415,10 @@ mod tests {
         let params = Params { survey, mistake_of_map, frame_pairs, ..room };
         assert_eq!(params.changes(), [""; 0]);
         assert_eq!(params.to_toml().parse(), Ok(params));
+        // Runs that were begun before searches were looked at have no reach.
+        let older = "[frame_pairs]\npairs = 2\nnear = 1\nposition = 1.0\nrotation = 1.0";
+        let older: Params = older.parse().expect("it was complete");
+        assert_eq!(older.frame_pairs.map(|pairs| pairs.reach), Some(Reach::ALL));
         for wrong in [
             "mistake_of_map = 1.0",
             "frame_pairs = 1.0",
